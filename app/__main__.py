@@ -22,10 +22,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from nep.errors import NepError
-from nep.i18n import _, begin
+from nep.i18n import _, set_initial_language
 from nep.system.addresses import MASTER_VARIABLE, master_address
-from nep.system.descriptors import allow_many
-from nep.system.streams import close_streams, prepare_streams, print_error, words_given
+from nep.system.descriptors import raise_open_file_limit
+from nep.system.streams import close_streams, command_line_arguments, prepare_streams, print_error
 from nep.version import __version__
 
 PROCESSES = (
@@ -117,11 +117,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run Studio with these command-line arguments and return the exit code (0 on success)."""
     prepare_streams()
     try:
-        return _main(words_given() if arguments is None else list(arguments))
+        return _main(command_line_arguments() if arguments is None else list(arguments))
     except ImportError as error:
-        from app.core.reports.not_installed import why_not_imported  # noqa: PLC0415  needed only here
+        from app.core.reports.not_installed import import_problem  # noqa: PLC0415  needed only here
 
-        why = why_not_imported(error)
+        why = import_problem(error)
         if not why:
             raise
         print_error(f"nep-studio: {why}")
@@ -132,14 +132,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(given: Sequence[str]) -> int:
     if given[:1] == ["--child"]:
-        return hand_over("app.blocks.runtime.child", given[1:])
+        return run_child_module("app.blocks.runtime.child", given[1:])
     if given[:1] == ["--module"] and len(given) > 1:
-        return hand_over(given[1], given[2:])
-    from app.core.storage.settings import kept_language  # noqa: PLC0415  not needed by child processes of a frozen build
+        return run_child_module(given[1], given[2:])
+    from app.core.storage.settings import saved_language  # noqa: PLC0415  not needed by child processes of a frozen build
 
     # a self-test leaves the user's settings unchanged
     tests_itself = any(word.startswith("--selft") for word in given)
-    begin("" if tests_itself else kept_language())
+    set_initial_language("" if tests_itself else saved_language())
     if given[:1] == ["run"]:
         return run_behaviour(given[1:])
     parser = window_parser()
@@ -157,19 +157,19 @@ def _main(given: Sequence[str]) -> int:
     gc.disable()
     # Shiboken reads the source of every module imported after Qt, so modules without Qt are imported first.
     importlib.import_module("app.core.session")
-    allow_many()
+    raise_open_file_limit()
     from app.ui.application import RESTART, Options, run  # noqa: PLC0415  Qt is loaded only for a window
 
     code = run(
         Options(tuple(options.files), options.demo, options.theme, options.self_drive, options.new_window)
     )
     if code == RESTART:
-        start_again(options.theme)
+        restart(options.theme)
         code = 0
     return end_process(code)
 
 
-def start_again(theme: str | None) -> None:
+def restart(theme: str | None) -> None:
     """Start Studio in a new process. Call this after all resources of this process were closed."""
     from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  needed only here
     from nep.masters.process import NO_CONSOLE  # noqa: PLC0415  needed only here
@@ -197,16 +197,16 @@ def self_test(folder: Path, *, web: bool) -> int:
         return 2
 
     def show() -> int:
-        test.begin("program", _("the program was loaded"))
+        test.start_step("program", _("the program was loaded"))
         importlib.import_module("app.core.session")
-        allow_many()
-        from app.ui.self_test import show_steps  # noqa: PLC0415  import errors go into the report
+        raise_open_file_limit()
+        from app.ui.self_test import run_window_steps  # noqa: PLC0415  import errors go into the report
 
-        return show_steps(test, web=web)
+        return run_window_steps(test, web=web)
 
     gc.disable()  # as at every start of the window
     code = test.run(show)
-    words = test.report.why or _("the self-test passed")
+    words = test.report.failure or _("the self-test passed")
     with suppress(OSError, ValueError):  # the output stream may be closed; the report is the result
         (sys.stderr if code else sys.stdout).write(f"{words}: {test.place.folder}\n")
     return code
@@ -226,7 +226,7 @@ def run_behaviour(arguments: Sequence[str]) -> int:
     )
 
 
-def hand_over(module: str, arguments: Sequence[str]) -> int:
+def run_child_module(module: str, arguments: Sequence[str]) -> int:
     """Run one of `PROCESSES` as ``__main__`` in this process; return 2 if ``module`` is not in the list."""
     if module not in PROCESSES:
         sys.stderr.write(
@@ -239,7 +239,7 @@ def hand_over(module: str, arguments: Sequence[str]) -> int:
     return 0
 
 
-def still_running(within_s: float) -> tuple[str, ...]:
+def join_threads(within_s: float) -> tuple[str, ...]:
     """Return the names of non-daemon threads that don't end within ``within_s`` seconds."""
     until = time.monotonic() + within_s
     others = [
@@ -258,7 +258,7 @@ def end_process(code: int, within_s: float = GRACE_S) -> int:
     Python waits for every non-daemon thread at exit. A plug-in's thread that never ends, or a thread that
     writes to a disk that doesn't respond, would keep a process without a window alive forever.
     """
-    left = still_running(within_s)
+    left = join_threads(within_s)
     if not left:
         return code
     _log.error("exiting while threads are still running: %s", ", ".join(f"'{name}'" for name in left))

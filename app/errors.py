@@ -143,7 +143,7 @@ class InputProblem(NamedTuple):
     """
 
     parameter: str
-    sentence: str
+    message: str
 
 
 class RobotInputError(AppError):
@@ -170,13 +170,13 @@ class RobotValueError(AppError, ValueError):
         self._words, self._holes = words, holes
         super().__init__(_(words).format(place=place or _("the value"), **holes))
 
-    def inside(self, outer: str) -> RobotValueError:
+    def nested_in(self, outer: str) -> RobotValueError:
         """Return this error for a value that contains the invalid value."""
         place = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
         return RobotValueError(self._words, place, **self._holes)
 
 
-class RobotUnknownError(AppError):
+class UnknownRobotError(AppError):
     """A robot is not connected; ``name`` is its name."""
 
     def __init__(self, name: str) -> None:

@@ -23,7 +23,7 @@ from app.blocks.runtime.find_robots import FoundRobots, find_robots
 from app.blocks.runtime.interrupts import without_interrupts
 from app.core.documents.document import read
 from app.core.robots.launcher import VIRTUAL_ROBOTS, VirtualProcesses
-from app.core.robots.motion.permission import risky, wanted_by
+from app.core.robots.motion.permission import actions_by_robot, risky_actions
 from app.core.robots.stop.lines import StopTarget
 from app.core.robots.stop.report import StopReport
 from app.core.robots.stop.stopper import RobotStopper
@@ -32,18 +32,18 @@ from app.errors import AppError, DescriptionError
 from app.robots.description.description import Robot, parse
 from app.robots.identity import controls_of
 from nep.errors import NepError
-from nep.i18n import _, listed, number
+from nep.i18n import _, format_list, number
 from nep.programs.robots.moving import description_topics, moving_topics
 from nep.system.streams import print_error
 from nep.text import escaped
 
 OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 130
 ROBOT_WAIT_S = 10.0
-WAIT_STEP_S = 0.1
+POLL_INTERVAL_S = 0.1
 ALL_ROBOTS_WAIT_S = 3.0
 """Time that a behaviour with publish blocks waits for the descriptions of all robots on the network."""
-LATE_S = 1.0
-_STARTER = re.compile(r"events_|robot_.*_when_")
+LATE_ROBOT_CHECK_INTERVAL_S = 1.0
+_START_BLOCK_TYPE = re.compile(r"events_|robot_.*_when_")
 
 
 def run_file(
@@ -73,14 +73,14 @@ def run_file(
             position.
     """
     ending = interrupted or threading.Event()
-    say = _Lines(out or sys.stdout, ending)
+    say = _LineWriter(out or sys.stdout, ending)
     try:
         name, workspace, descriptions = read(Path(path))
-        known = _known(descriptions)
-        wanted = robots_named(workspace)
+        known = _parse_descriptions(descriptions)
+        wanted = used_robot_names(workspace)
         with nep.node("behaviour runner", master=master) as node:
             found = _with_trusted_virtual(_robots_for(workspace, node, robot_wait_s, known))
-            for claim in found.claims:
+            for claim in found.rejected_claims:
                 say(_("warning: {sentence}").format(sentence=claim))
             program = compile_behaviour(workspace, found.robots, absent=known, name=name)
             code = _rejection_code(program, wanted, found.robots, say)
@@ -100,13 +100,13 @@ def run_file(
         say(f"{error}.")
         return UNUSABLE
     finally:
-        say.tell_problem()
+        say.report_problem()
 
 
 def _robots_for(
     workspace: Mapping[str, object], node: nep.Node, wait_s: float, known: Sequence[Robot]
 ) -> FoundRobots:
-    wanted = robots_named(workspace)
+    wanted = used_robot_names(workspace)
     found = find_robots(node, wait_s, wanted=wanted, known=known) if wanted else FoundRobots()
     if compile_behaviour(workspace, found.robots, absent=known).publishes:
         found = find_robots(
@@ -119,7 +119,7 @@ def _with_trusted_virtual(found: FoundRobots) -> FoundRobots:
     # Only robots whose programs are known to be Studio's own count as virtual (docs/trust.md).
     processes = VirtualProcesses(VIRTUAL_ROBOTS.values())
     robots = (
-        replace(robot, virtual=robot.virtual and processes.is_ours(found.owners[robot.name]))
+        replace(robot, virtual=robot.virtual and processes.is_started_by_studio(found.owners[robot.name]))
         if robot.name in found.owners
         else robot
         for robot in found.robots
@@ -127,18 +127,18 @@ def _with_trusted_virtual(found: FoundRobots) -> FoundRobots:
     return replace(found, robots=tuple(robots))
 
 
-def robots_named(workspace: Mapping[str, object]) -> tuple[str, ...]:
+def used_robot_names(workspace: Mapping[str, object]) -> tuple[str, ...]:
     """Return the names of the robots used in scripts that an event starts.
 
     Includes robots that the file does not describe.
     """
     parsed = parse_workspace(workspace)
-    started = tuple(script for script in parsed.scripts if _STARTER.match(script[0].type))
+    started = tuple(script for script in parsed.scripts if _START_BLOCK_TYPE.match(script[0].type))
     blocks = Workspace(started, parsed.variables).all_blocks()
-    return tuple(sorted({block.field_id("ROBOT") for block in blocks if block.enabled} - {""}))
+    return tuple(sorted({block.field_text("ROBOT") for block in blocks if block.enabled} - {""}))
 
 
-class _Lines:
+class _LineWriter:
     """Writes lines to a stream. Thread-safe. Sets ``ending`` if the stream can't be written any more."""
 
     def __init__(self, stream: TextIO, ending: threading.Event) -> None:
@@ -148,7 +148,7 @@ class _Lines:
         self._problem: str | None = None
 
     @property
-    def is_lost(self) -> bool:
+    def has_failed(self) -> bool:
         return self._problem is not None
 
     def __call__(self, text: str) -> None:
@@ -166,7 +166,7 @@ class _Lines:
                 self._problem = "" if is_gone else reason.lower()
                 self._ending.set()
 
-    def tell_problem(self) -> None:
+    def report_problem(self) -> None:
         # Silent when the reader closed the stream: that is a normal end.
         if self._problem:
             print_error(
@@ -176,7 +176,7 @@ class _Lines:
             )
 
 
-def _known(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
+def _parse_descriptions(descriptions: Mapping[str, Mapping[str, object]]) -> list[Robot]:
     found = []
     for description in descriptions.values():
         try:
@@ -191,10 +191,14 @@ def _rejection_code(
 ) -> int | None:
     for problem in program.problems:
         words = _("error: {sentence}") if problem.severity == "error" else _("warning: {sentence}")
-        say(words.format(sentence=problem.sentence))
+        say(words.format(sentence=problem.message))
     missing = sorted(set(wanted) - {robot.name for robot in robots})
     if missing:
-        say(_("{robots} not found. Switch it on, or start the virtual robot.").format(robots=listed(missing)))
+        say(
+            _("{robots} not found. Switch it on, or start the virtual robot.").format(
+                robots=format_list(missing)
+            )
+        )
         return ROBOT_MISSING
     if program.errors or not program.starts:
         say(_("“{name}” can't run.").format(name=program.name))
@@ -204,8 +208,8 @@ def _rejection_code(
 
 def _would_move(program: Program, robots: Sequence[Robot], say: Callable[[str], None]) -> bool:
     real = [robot for robot in robots if not robot.virtual]
-    wanted = wanted_by(program, real)
-    moves = {robot.name: risky(robot, asked) for robot, asked in wanted}
+    wanted = actions_by_robot(program, real)
+    moves = {robot.name: risky_actions(robot, asked) for robot, asked in wanted}
     for name, titles in moves.items():
         if titles:
             say(
@@ -233,19 +237,19 @@ class _Connection:
 
 
 def _run(
-    program: Program, found: FoundRobots, reach: _Connection, say: _Lines, interrupted: threading.Event
+    program: Program, found: FoundRobots, reach: _Connection, say: _LineWriter, interrupted: threading.Event
 ) -> int:
     stopper = reach.stopper
     events = _RunEvents(say)
     runner = Runner(events)
     say(_("Running “{name}”").format(name=program.name))
     if interrupted.is_set():
-        return FAILED if say.is_lost else INTERRUPTED
+        return FAILED if say.has_failed else INTERRUPTED
     owners = {name: owner.node_id for name, owner in found.owners.items()}
-    late = _LateRobots(reach.node, runner) if program.publishes else None
+    late = _LateRobotMonitor(reach.node, runner) if program.publishes else None
     try:
         runner.start(program, [robot.source for robot in found.robots], reach.master, owners=owners)
-        while not runner.wait(WAIT_STEP_S) and not interrupted.is_set():
+        while not runner.wait(POLL_INTERVAL_S) and not interrupted.is_set():
             if late is not None:
                 late.poll()
         was_interrupted = interrupted.is_set()
@@ -260,16 +264,16 @@ def _run(
         for line in stop_lines(report):
             say(line)
     if was_interrupted:
-        return INTERRUPTED if not report.unproven and not say.is_lost else FAILED
+        return INTERRUPTED if not report.unproven and not say.has_failed else FAILED
     return OK if events.ok and not report.unproven else FAILED
 
 
-class _LateRobots:
+class _LateRobotMonitor:
     """Reports newly found robots to a program with publish blocks, which must not move these robots."""
 
     def __init__(self, node: nep.Node, runner: Runner) -> None:
         self._node, self._runner = node, runner
-        self._next_s = time.monotonic() + LATE_S
+        self._next_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
         self._known: tuple[str, ...] = ()
 
     def poll(self) -> None:
@@ -279,12 +283,12 @@ class _LateRobots:
             view = self._node.graph()
             there = tuple(sorted(description_topics(view)))
             if there != self._known:
-                found = find_robots(self._node, LATE_S)
+                found = find_robots(self._node, LATE_ROBOT_CHECK_INTERVAL_S)
                 unread = set(there) - {robot.topics.description for robot in found.robots}
                 moving = moving_topics(view, map(controls_of, found.robots), unread)
                 self._runner.set_robots({}, moving.topics)
                 self._known = there if not unread else ()
-        self._next_s = time.monotonic() + LATE_S
+        self._next_s = time.monotonic() + LATE_ROBOT_CHECK_INTERVAL_S
 
 
 class _RunEvents:
@@ -297,14 +301,14 @@ class _RunEvents:
         self.silent: tuple[str, ...] = ()
 
     def __call__(self, event: RunnerEvent) -> None:
-        if event.kind == "running" and event.says != self._last:
-            self._last = event.says
-            if event.says:
-                self._say(event.says)
+        if event.kind == "running" and event.description != self._last:
+            self._last = event.description
+            if event.description:
+                self._say(event.description)
         elif event.kind in ("print", "error") or (event.kind == "ended" and event.text):
             self._say(event.text)
         if event.kind == "ended":
-            self.ok, self.silent = event.ok, event.silent
+            self.ok, self.silent = event.is_ok, event.unresponsive_robots
             if event.elapsed_s is not None:
                 self._say(_("ended after {seconds} s").format(seconds=number(event.elapsed_s, ".1f")))
 
@@ -319,9 +323,9 @@ def stop_lines(report: StopReport) -> list[str]:
     ]
     if not report.robots:
         return strange
-    others = [robot.sentence for robot in report.robots if not robot.answered]
+    others = [robot.message for robot in report.robots if not robot.is_confirmed]
     if others or strange:
-        return [*(robot.sentence for robot in report.robots if robot.answered), *others, *strange]
+        return [*(robot.message for robot in report.robots if robot.is_confirmed), *others, *strange]
     if len(report.robots) == 1:
         return [
             _("{robot} stopped ({elapsed} ms)").format(

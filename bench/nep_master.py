@@ -33,7 +33,7 @@ from blocks import Child, is_trusted, other_process
 
 import nep
 from nep.protocol.encoding import encode_request
-from nep.protocol.requests import Look
+from nep.protocol.requests import QueryGraph
 
 MASTER = """
 import os, sys, nep
@@ -144,7 +144,7 @@ def looker(context: zmq.Context[zmq.Socket[bytes]], address: str) -> Callable[[]
     """Asks for the graph with a bare socket."""
     socket = context.socket(zmq.DEALER)
     socket.connect(f"tcp://{address}")
-    body = encode_request(Look(), 1)
+    body = encode_request(QueryGraph(), 1)
 
     def look() -> int:
         socket.send(body)

@@ -35,7 +35,7 @@ from typing import Any
 from blocks import Child, Sample, cpu_s, interleaved, is_trusted, other_process, verdict
 
 import nep
-from nep.backends.ros.library import library
+from nep.backends.ros.library import get_rospy
 
 SIZES = (1_024, 16_384, 65_536, 262_144, 1_048_576, 4_194_304, 8_388_608)
 WAIT_S = 30.0
@@ -216,7 +216,7 @@ def main() -> int:
     )
     arguments = parser.parse_args()
     try:
-        rospy = library()
+        rospy = get_rospy()
     except nep.NepError as error:
         print(f"not run: {error}")
         return 0

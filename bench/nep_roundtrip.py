@@ -28,7 +28,7 @@ import zmq
 from blocks import Child, Sample, cpu_s, interleaved, is_trusted, other_process, verdict
 
 import nep
-from nep.backends.zeromq.bindings import has_local_names
+from nep.backends.zeromq.bindings import has_unix_sockets
 
 SIZES = (100, 1_024, 16_384, 65_536, 262_144, 1_048_576, 4_194_304, 8_388_608)
 JUDGED = 16_384
@@ -173,7 +173,7 @@ def main() -> int:
     context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
     plain = Plain(context, "tcp://127.0.0.1:*")
     # Where there is no such name: TCP once more.
-    local = Plain(context, f"ipc://@nep-bench-{os.getpid()}" if has_local_names() else "tcp://127.0.0.1:*")
+    local = Plain(context, f"ipc://@nep-bench-{os.getpid()}" if has_unix_sockets() else "tcp://127.0.0.1:*")
     with (
         nep.master("127.0.0.1:0", learn_s=0.0) as master,
         nep.node("bench", master=master.address) as node,

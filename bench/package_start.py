@@ -30,7 +30,7 @@ from pathlib import Path
 
 import psutil
 
-from app.ui.startup.single_instance import OK, place
+from app.ui.startup.single_instance import OK, socket_name
 
 ROOT = Path(__file__).resolve().parents[1]
 DROP = Path("/proc/sys/vm/drop_caches")
@@ -96,7 +96,7 @@ def once(command: Sequence[str], *, cold: bool) -> Start:
         if cold:
             forget()
         os.environ["XDG_RUNTIME_DIR"] = environ["XDG_RUNTIME_DIR"]
-        name = place(Path(environ["NEP_STUDIO_HOME"]))
+        name = socket_name(Path(environ["NEP_STUDIO_HOME"]))
         began = time.monotonic()
         process = subprocess.Popen(command, cwd=ROOT, env=environ, stdout=subprocess.DEVNULL)
         family: list[psutil.Process] = []

@@ -49,7 +49,7 @@ from paper_ends import KINDS
 from paper_figures import AGAIN, PLAIN, ROWS, does_count, goals, report, write
 from paper_pairs import NotRunError, Pair, Places, around, end, guard
 
-from nep.backends.ros.library import PLACES
+from nep.backends.ros.library import SEARCH_FOLDERS
 
 ROOT = Path(__file__).parents[1]
 SIZES = {
@@ -224,7 +224,7 @@ def versions() -> dict[str, str]:
     )
     if not asked.returncode:
         found["nep-studio"] += f" ({asked.stdout.strip()})"
-    rospy = next(iter(metadata.distributions(name="rospy", path=list(PLACES))), None)
+    rospy = next(iter(metadata.distributions(name="rospy", path=list(SEARCH_FOLDERS))), None)
     return found | ({"rospy": rospy.version} if rospy else {}) | paper_clients.versions()
 
 

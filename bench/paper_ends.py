@@ -321,9 +321,9 @@ class RospyEnd(Called):
     def __init__(self, role: str, host: str, place: str) -> None:
         super().__init__(role, host, place)
         os.environ.update(ROS_MASTER_URI=place, ROS_IP=host)
-        from nep.backends.ros.library import library  # noqa: PLC0415 - each row imports its own library
+        from nep.backends.ros.library import get_rospy  # noqa: PLC0415 - each row imports its own get_rospy
 
-        rospy = library()
+        rospy = get_rospy()
         from std_msgs.msg import String, UInt8MultiArray  # type: ignore[import-not-found] # noqa: PLC0415
 
         rospy.init_node(role, anonymous=True, disable_signals=True, disable_rosout=True)

@@ -36,7 +36,7 @@ from blocks import Sample, cpu_s, interleaved, verdict
 from mcap.writer import Writer
 
 from nep.messages.clocks import OWN_CLOCK
-from nep.messages.message import Message, arrived, kind_of
+from nep.messages.message import Message, message_kind, received_message
 from nep.recordings.formats.destination import WriterLimits
 from nep.recordings.formats.mcap_file import FileWriter
 from nep.recordings.formats.records import ChunkInfo
@@ -45,28 +45,30 @@ from nep.recordings.ring import FlightRecorder
 from nep.recordings.writer import RecordingWriter
 
 PICTURE_BYTES = 200_000
-LIMITS = WriterLimits(queue_bytes=2_000_000_000, queue_messages=2_000_000, least_free_bytes=0)
+LIMITS = WriterLimits(queue_bytes=2_000_000_000, queue_messages=2_000_000, min_free_bytes=0)
 
 
 def pictures(count: int) -> list[Message]:
     """As a camera sends them: bytes that nobody makes smaller, behind the head of a JPEG."""
-    kind = kind_of("/camera", "image", "image", clock=OWN_CLOCK)
+    kind = message_kind("/camera", "image", "image", clock=OWN_CLOCK)
     rnd = random.Random(1)
     data = [b"\xff\xd8\xff\xda\x00\x02" + rnd.randbytes(PICTURE_BYTES) for _each in range(20)]
     extension = {"shape": [480, 640, 3], "encoding": "jpeg"}
-    return [arrived(kind, data[at % 20], time.time_ns(), at + 1, 7, extension) for at in range(count)]
+    return [
+        received_message(kind, data[at % 20], time.time_ns(), at + 1, 7, extension) for at in range(count)
+    ]
 
 
 def states(count: int, topics: int = 20) -> list[Message]:
     """As arms send them: 600 bytes of JSON."""
-    kinds = [kind_of(f"/arm{number}/state", "json", "json", clock=OWN_CLOCK) for number in range(topics)]
+    kinds = [message_kind(f"/arm{number}/state", "json", "json", clock=OWN_CLOCK) for number in range(topics)]
     rnd = random.Random(2)
     data = [
         json.dumps({"joints": [rnd.gauss(0, 1) for _each in range(28)], "name": "arm"}).encode()
         for _each in range(50)
     ]
     return [
-        arrived(kinds[at % topics], data[at % 50], time.time_ns(), at // topics + 1, at % topics)
+        received_message(kinds[at % topics], data[at % 50], time.time_ns(), at // topics + 1, at % topics)
         for at in range(count)
     ]
 
@@ -174,7 +176,7 @@ def paced(folder: Path, seconds: float) -> bool:
     camera, arms = pictures(int(500 * seconds)), states(int(20_000 * seconds))
     never, step_s = threading.Event(), 0.01
     used, started = cpu_s(), time.perf_counter()
-    with RecordingWriter(path, limits=WriterLimits(least_free_bytes=0)) as writer:
+    with RecordingWriter(path, limits=WriterLimits(min_free_bytes=0)) as writer:
         most_queued = 0
         for step in range(int(seconds / step_s)):
             writer.post(camera[step * 5 : step * 5 + 5])
@@ -205,7 +207,7 @@ def large_file(folder: Path, gigabytes: float) -> bool:
     with Recording(made) as small, made.open("rb") as file:
         large = FileWriter(path)
         for number, each in small._index.definitions.channels.items():  # noqa: SLF001 - the copy's channels
-            large.table.put(number, each)
+            large.table.add_numbered(number, each)
         chunks = small.chunks()
         shift = 0
         while large.size_bytes < gigabytes * 1e9:

@@ -18,7 +18,7 @@ import types
 from pathlib import Path
 from typing import Any
 
-from nep.backends.ros.library import library
+from nep.backends.ros.library import get_rospy
 
 CLIENTS = """ConnectedClient[] clients
 ================================================================================
@@ -46,7 +46,7 @@ def topic_type(topic: str, *_rest: object) -> tuple[str | None, str | None, None
 def main(arguments: list[str]) -> None:
     """Serve until it is ended."""
     sources, host, port = arguments
-    library()
+    get_rospy()
     import genpy.dynamic  # type: ignore[import-not-found] # noqa: PLC0415
     import roslib.launcher  # type: ignore[import-not-found] # noqa: PLC0415
     from autobahn.twisted import websocket  # type: ignore[import-not-found] # noqa: PLC0415

@@ -177,7 +177,7 @@ def recorded_all(session: Session) -> bool:
     until(lambda: not session.recordings.is_recording, "the recording has ended", 60.0)
     (path,) = session.recordings.folder.glob("*.mcap")
     with Recording(path) as recording:
-        unkept = sum(each.unkept for each in recording.figures().values())
+        unkept = sum(each.unkept for each in recording.stats().values())
         print(
             f"recorded {recording.message_count} messages of {len(recording.topics)} topics, "
             f"{path.stat().st_size / 1e6:.1f} MB in {recording.duration_s:.0f} s; {unkept} not kept"

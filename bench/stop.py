@@ -103,8 +103,8 @@ def one_round(
         watching.send(robot.name, id="", op="alive")
     echoed = _timed(lambda: _echo(number, robots, watching))
     report = stopper.stop_all(timeout_s=STOP_S)
-    if not report.proven:
-        raise SystemExit(f"round {number}: {', '.join(report.silent)} did not answer")
+    if not report.is_proven:
+        raise SystemExit(f"round {number}: {', '.join(report.unconfirmed_names)} did not answer")
     watching.wait(ids, ["canceled"], MOVE_S)
     return report.elapsed_ms, echoed
 

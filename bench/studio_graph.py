@@ -22,7 +22,7 @@ from typing import cast
 from PySide6.QtCore import QTimer
 from studio_window import BARE, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
-from app.core.network.source import GraphSeen
+from app.core.network.source import GraphReceived
 from app.ui.panels.graph.panel import GraphPanel
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
@@ -71,7 +71,7 @@ class Figures:
     def tell(self) -> None:
         """The next figures."""
         self._turn += 1
-        self._post(GraphSeen(self._graphs[self._turn % len(self._graphs)], 0.001))
+        self._post(GraphReceived(self._graphs[self._turn % len(self._graphs)], 0.001))
 
     def go_on(self, on: bool) -> None:
         """Tell them from now on, or no more."""

@@ -138,7 +138,7 @@ def main() -> int:
             replot(plot, fields)
             fill(plot, points)
             if points > BEFORE_S * HZ:
-                plot._choose_span("all")  # noqa: SLF001
+                plot._set_span("all")  # noqa: SLF001
             sender.tell(f"{what} {seconds + SETTLE_S + 1}")
             sender.answer()
             run_for(SETTLE_S)

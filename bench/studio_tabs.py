@@ -107,7 +107,7 @@ class Bench:
 
     def switch(self, path: Path) -> tuple[float, float]:
         """Press on a tab. Milliseconds until the page has done its work, and until the picture is there."""
-        document = self.window.session.documents.with_path(path)
+        document = self.window.session.documents.find_by_path(path)
         assert document is not None
         (tab,) = (
             each for each in self.window.window.findChildren(BehaviourTab) if each.facts.key == document.key

@@ -18,7 +18,7 @@ from time import time_ns
 from PySide6.QtCore import QTimer
 from studio_window import BARE, Meter, Row, Studio, child, network, run_for, studio, until, verdict
 
-from app.core.network.source import GraphSeen
+from app.core.network.source import GraphReceived
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 
 SHARE, HZ, SETTLE_S = 0.25, 20, 4.0
@@ -55,7 +55,7 @@ def fed(opened: Studio, meter: Meter, topics: int, seconds: float) -> Row:
 
     def tell() -> None:
         turn[0] += 1
-        post(GraphSeen(graphs[turn[0] % len(graphs)], 0.001))
+        post(GraphReceived(graphs[turn[0] % len(graphs)], 0.001))
 
     timer = QTimer()
     timer.timeout.connect(tell)

@@ -62,7 +62,7 @@ def network() -> Iterator[str]:
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         os.environ["QTWEBENGINE_DISABLE_SANDBOX"] = "1"  # Chromium refuses root otherwise
     os.environ["NEP_GATEWAY"] = "0"  # its ports exist once on a computer
-    qt_log.listen()
+    qt_log.install_handlers()
     make_application()
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -89,7 +89,7 @@ def studio(address: str, layout: str = "developer") -> Iterator[Studio]:
         )
         window = make_window(session, Options(theme="light", new_window=True))
         window.show()
-        window.begin()
+        window.start_session()
         window.commands.run(f"layout.{layout}")
         try:
             yield Studio(window, window.commands, session)

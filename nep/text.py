@@ -30,7 +30,7 @@ _CONTROL_EXCEPT_NEWLINES = re.compile(f"(?![\n\t])[{_CONTROLS}]")
 _SURROGATE = re.compile("[\ud800-\udfff]")
 
 
-def control_in(text: str) -> str:
+def first_control(text: str) -> str:
     r"""Return the first control character of `text`, escaped (`\x1b`), or "" if it has none."""
     found = _CONTROL.search(text)
     return "" if found is None else _escape_match(found)
@@ -46,7 +46,7 @@ def escaped(text: str, *, lines: bool = False) -> str:
     return (_CONTROL_EXCEPT_NEWLINES if lines else _CONTROL).sub(_escape_match, text)
 
 
-def harmless(text: str, *, lines: bool = False) -> str:
+def strip_controls(text: str, *, lines: bool = False) -> str:
     """Remove the control characters of untrusted text.
 
     Args:

@@ -181,7 +181,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
     Whoever had to give up waiting needs this long.
     """
-    monkeypatch.setattr("nep.backends.zeromq.transport.HANDSHAKE_S", GREETINGS_S)
+    monkeypatch.setattr("nep.backends.zeromq.transport.HANDSHAKE_TIMEOUT_S", GREETINGS_S)
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import pytest
 import nep
 from app.blocks import compile_behaviour, editor_definitions
 from app.blocks.toolbox.catalogue import english_categories
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.robots.kit import Driver
 from nep.masters.master import Master
 from nep.system.plugins import discover
@@ -118,7 +118,7 @@ def test_robot_plug_in_is_described_driven_and_offered_as_blocks(write: Write, m
         ROBOT = Kind("lamp", "Lamp", Lamp)
         ''',
     )
-    robot = parse(td_for(module.ROBOT.thing_model, "Desk lamp"))
+    robot = parse(thing_description(module.ROBOT.thing_model, "Desk lamp"))
     definitions = json.dumps(editor_definitions([robot]))
     assert "robot_lamp_do_blink" in definitions
     assert robot.action("blink").check({"times": 10}) != ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nep.i18n import _, listed, ngettext, number
+from nep.i18n import _, format_list, ngettext, number
 from tests import pseudo as shown
 from tests.pseudo import marked, untranslated
 
@@ -26,7 +26,7 @@ def test_untranslated_words_are_detected(one_sentence) -> None:
 
 
 def test_lists_numbers_and_markup_are_recognized_as_translated(pseudo) -> None:
-    assert untranslated(listed(["Pepper", "ana", "ben"], "or"), "ana", "ben") == []
+    assert untranslated(format_list(["Pepper", "ana", "ben"], "or"), "ana", "ben") == []
     assert number(0.5) == "0,5"
     assert untranslated("<b>3 ms</b> `nep topic list` Ctrl+Enter") == []
 

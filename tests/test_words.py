@@ -18,12 +18,12 @@ import typer
 from babel.messages.pofile import read_po
 
 from app import resources
-from app.blocks.toolbox.catalogue import Catalogue, categories, has_words
+from app.blocks.toolbox.catalogue import Catalogue, categories, is_translatable
 from app.blocks.toolbox.definitions import editor_definitions
 from app.blocks.toolbox.help import help_of
 from nep import i18n
 from nep.cli.app import app as nep_command
-from nep.i18n import _, install, lazy, listed, ngettext, number, pgettext, plazy
+from nep.i18n import _, format_list, install, lazy, ngettext, number, pgettext, plazy
 from tests.blocks.samples import robot
 from tests.pseudo import marked
 
@@ -113,7 +113,7 @@ def pseudo(pseudo_folder) -> None:
 
 
 def is_pseudo(text: str) -> bool:
-    return not has_words(text) or (text.strip().startswith("[") and text.strip().endswith("]"))
+    return not is_translatable(text) or (text.strip().startswith("[") and text.strip().endswith("]"))
 
 
 def test_translation_template_is_up_to_date(words) -> None:
@@ -175,13 +175,18 @@ def test_lazy_constant_keeps_its_context(words, tmp_path, spanish) -> None:
 
 
 def test_lists_numbers_and_dates_are_localized(spanish) -> None:
-    assert listed(["a", "b", "c", "d"]) == "a, b, c y d"
-    assert listed(["a", "b"], "or") == "a o b"
+    assert format_list(["a", "b", "c", "d"]) == "a, b, c y d"
+    assert format_list(["a", "b"], "or") == "a o b"
     assert number(1234.5, ",.1f") == "1,234.5"  # as in most of Latin America
     assert i18n.day_text(3, 11) == "3 de noviembre"
     assert i18n.day_text(3, 11, 2026) == "3 de noviembre de 2026"
     install("en")
-    assert [listed(list(names)) for names in ("", "a", "ab", "abcd")] == ["", "a", "a and b", "a, b, c and d"]
+    assert [format_list(list(names)) for names in ("", "a", "ab", "abcd")] == [
+        "",
+        "a",
+        "a and b",
+        "a, b, c and d",
+    ]
     assert i18n.day_text(3, 11, 2026) == "3 November 2026"
 
 
@@ -222,7 +227,7 @@ def test_system_language_and_best_match() -> None:
 
 def test_nep_lang_overrides_the_chosen_language(monkeypatch) -> None:
     monkeypatch.setenv("NEP_LANG", "en")
-    i18n.begin("es")
+    i18n.set_initial_language("es")
     assert i18n.language() == "en"
 
 
@@ -232,22 +237,22 @@ def test_system_language_is_used_if_it_is_offered(share, expected, spanish, monk
     monkeypatch.setenv("LANGUAGE", "es_MX")
     known = {"en": {"share": 1.0}, "es": {"share": share}}
     monkeypatch.setattr(i18n, "known_languages", lambda _folder: known)
-    i18n.begin()
+    i18n.set_initial_language()
     assert i18n.language() == expected
     monkeypatch.setenv("NEP_LANG", "")
-    i18n.begin("es")
+    i18n.set_initial_language("es")
     assert i18n.language() == "es"
     monkeypatch.setenv("NEP_LANG", "es_MX")
-    i18n.begin("en")
+    i18n.set_initial_language("en")
     assert i18n.language() == "es"
 
 
 def test_pseudo_language_is_offered_only_while_in_use(pseudo, pseudo_folder) -> None:
     install("en")
-    assert "qps" not in dict(i18n.offered())
-    assert dict(i18n.offered())["en"] == "English"
+    assert "qps" not in dict(i18n.selectable_languages())
+    assert dict(i18n.selectable_languages())["en"] == "English"
     install("qps", pseudo_folder)
-    assert "qps" in dict(i18n.offered())
+    assert "qps" in dict(i18n.selectable_languages())
 
 
 def test_pseudo_text_is_longer_and_keeps_placeholders_and_code(words) -> None:
@@ -280,8 +285,8 @@ def test_every_block_help_is_translated(pseudo) -> None:
 
 def test_translated_block_is_found_by_its_english_words(pseudo) -> None:
     found = {described.type: described for category in categories() for described in category.blocks}
-    assert "array" in found["lists_empty"].english_words
-    assert found["lists_empty"].words.startswith("[")
+    assert "array" in found["lists_empty"].english_search_words
+    assert found["lists_empty"].search_words.startswith("[")
 
 
 def test_python_code_of_blocks_is_independent_of_the_language(pseudo) -> None:
@@ -368,7 +373,7 @@ TWO_WORDS = {
 
 
 def test_spanish_terms_are_consistent() -> None:
-    path = i18n.LOCALE / "es" / "LC_MESSAGES" / f"{i18n.DOMAIN}.po"
+    path = i18n.LOCALE_FOLDER / "es" / "LC_MESSAGES" / f"{i18n.DOMAIN}.po"
     catalogue = read_po(BytesIO(path.read_bytes()))
     said = [
         each for message in catalogue if not (message.context or "").startswith("words to find")

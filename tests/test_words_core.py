@@ -18,7 +18,7 @@ from app import errors as app_errors
 from app.core.alerts import Alerts
 from app.core.documents.file_format import parse_file
 from app.core.network import graph_changes
-from app.core.network.decode_checks import Checked
+from app.core.network.decode_checks import CheckResult
 from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.topics import Topic, Topics
 from app.core.robots.fleet import Fleet
@@ -28,14 +28,14 @@ from app.core.robots.motion.permission import MayNotMoveError, Question
 from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.core.robots.stop.report import RobotStop, StopReport, not_reached
-from app.core.run.view import RunState, clock_words, stop_words, view_of
+from app.core.run.view import RunState, clock_text, stop_text, view_of
 from app.errors import DocumentError
 from app.robots import simulated
-from app.robots.description.description import parse, td_for
-from app.robots.description.inputs import Parameter, check_input, wrong_value
+from app.robots.description.description import parse, thing_description
+from app.robots.description.inputs import Parameter, check_input, value_problem
 from app.robots.description.validate import validate
-from app.robots.driver.tasks import still_moving
-from app.robots.identity import may_move, said_of_stop
+from app.robots.driver.tasks import still_moving_message
+from app.robots.identity import is_may_move_error, stop_error_text
 from app.run import stop_lines
 from nep import errors as nep_errors
 from nep.i18n import _
@@ -49,17 +49,17 @@ from nep.programs.doctor.facts import (
     PortFact,
     ProcessFact,
     ProgramFact,
-    Reach,
+    ReachFailure,
 )
-from nep.protocol.encoding import decode_answer, decode_request
+from nep.protocol.encoding import decode_reply, decode_request
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
 from nep.system.terminal import Terminal
 from tests.pseudo import untranslated
 
-PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
+PEPPER = parse(thing_description(simulated.ROBOT.thing_model, "Pepper"))
 DONE = RobotStop("Pepper", True, 38.2)
 SILENT = RobotStop("Turtle", False, None)
-REFUSED = RobotStop("Turtle", False, 3.0, error="Xx", refused=True, program="zz")
+REFUSED = RobotStop("Turtle", False, 3.0, error="Xx", is_refused=True, program="zz")
 RIZE = RobotStop("Nao", False, None, can_confirm=False)
 LISTENS = RobotStop("Turtle", False, None, can_confirm=False, program="zz")
 DATA = ("Turtle", "Nao", "Xx", "zz", "Greeting")
@@ -86,16 +86,16 @@ def reports() -> list[StopReport]:
 def test_run_bar_is_translated_in_all_states() -> None:
     states = [
         RunState(),
-        RunState(nothing_in=object()),
-        RunState(nothing_in=object(), errors={"a": "Xx"}),
-        RunState("running", "Greeting", begun=False),
+        RunState(unrunnable_program=object()),
+        RunState(unrunnable_program=object(), errors={"a": "Xx"}),
+        RunState("running", "Greeting", is_started=False),
         RunState("running", "Greeting"),
         RunState("paused", "Greeting"),
         RunState("paused", "Greeting", paused_at="Xx"),
-        RunState("stopping", "Greeting", elapsed_s=3.0, asked=("Turtle", "Pepper"), answered=(DONE,)),
+        RunState("stopping", "Greeting", elapsed_s=3.0, robots_to_stop=("Turtle", "Pepper"), replies=(DONE,)),
         RunState("proven", "Greeting", elapsed_s=3.0, errors={"a": "Xx"}),
         RunState("proven", "Greeting", finished=True),
-        RunState("proven", "Greeting", dashed=True, elapsed_s=100.0),
+        RunState("proven", "Greeting", has_stopped_blocks=True, elapsed_s=100.0),
         *(
             RunState("unanswered" if each.unproven else "proven", "Greeting", report=each)
             for each in reports()
@@ -105,23 +105,23 @@ def test_run_bar_is_translated_in_all_states() -> None:
         for now in (0.01, 9.0):
             for elsewhere in (False, True):
                 view = view_of(state, ["Pepper", "Turtle"], now, elsewhere=elsewhere)
-                said(view.title, view.detail, view.compact, view.result or "", view.confirm or "")
-                said(_(view.run_word), _(view.stop_word))
+                said(view.title, view.detail, view.compact, view.result or "", view.confirm_label or "")
+                said(_(view.run_label), _(view.stop_label))
     said(view_of(RunState(), [], 0).detail)
 
 
 def test_stop_reports_are_translated() -> None:
     for report in reports():
-        said(*stop_lines(report), *(robot.sentence for robot in report.robots))
-        said(*(stop_words(robot, clock_words(time.localtime(0))) for robot in report.robots))
+        said(*stop_lines(report), *(robot.message for robot in report.robots))
+        said(*(stop_text(robot, clock_text(time.localtime(0))) for robot in report.robots))
 
 
 def test_robot_that_may_still_move_is_recognized_in_every_language() -> None:
-    ours = still_moving("Turtle", ["Xx"])
-    said(ours, said_of_stop("Turtle", None))
-    assert said_of_stop("Turtle", ours) == ours
-    assert may_move("Turtle", ours)
-    assert said_of_stop("Turtle", "Turtle may still move: Xx") == "Turtle may still move: Xx"
+    ours = still_moving_message("Turtle", ["Xx"])
+    said(ours, stop_error_text("Turtle", None))
+    assert stop_error_text("Turtle", ours) == ours
+    assert is_may_move_error("Turtle", ours)
+    assert stop_error_text("Turtle", "Turtle may still move: Xx") == "Turtle may still move: Xx"
 
 
 def test_robot_facts_are_translated() -> None:
@@ -130,11 +130,11 @@ def test_robot_facts_are_translated() -> None:
     sensors = tuple(sensor.title for sensor in PEPPER.sensors)
     links = [
         link,
-        replace(link, connected=False),
-        replace(link, connected=False, gone_s=3.0),
-        replace(link, mute=True),
-        replace(link, mute=True, answered_s=3.0),
-        replace(link, answered_s=3.0, stopping=True, values={"battery": 4}),
+        replace(link, is_connected=False),
+        replace(link, is_connected=False, gone_s=3.0),
+        replace(link, is_unresponsive=True),
+        replace(link, is_unresponsive=True, replied_s=3.0),
+        replace(link, replied_s=3.0, is_stopping=True, values={"battery": 4}),
         replace(link, values={"battery": 80}),
         replace(link, rejected=ReportedCount(12, 8.0), errors=ReportedCount(1)),
     ]
@@ -144,8 +144,8 @@ def test_robot_facts_are_translated() -> None:
                 topic.silent_s, topic.age_s, topic.rate_hz = silent_s, silent_s, 3.0
             each.silent = "" if silent_s else None
             facts = facts_of(each, cast("Topics", topics), 9.0, lambda age_s: f"{age_s:g} s")
-            said(*(_(fact.title) for fact in facts), *(fact.words for fact in facts), data=sensors)
-        said(each.state_words)
+            said(*(_(fact.title) for fact in facts), *(fact.text for fact in facts), data=sensors)
+        said(each.state_label)
 
 
 def test_health_alerts_are_translated() -> None:
@@ -177,11 +177,11 @@ def test_health_alerts_are_translated() -> None:
     now[0] = RESTART_TIMEOUT_S + 1
     health.check({"Pepper"}, {"Turtle"})
     for unchecked in (0, 7):
-        health.update({f"/{unchecked}": Checked(3, 2, unchecked, "Xx", last_good=False)})
-    health.journal("Xx")
-    health.gives_up("Greeting", "Xx")
-    health.settings("Xx")
-    health.unreachable({"Nao": "Xx"})
+        health.update({f"/{unchecked}": CheckResult(3, 2, unchecked, "Xx", is_last_good=False)})
+    health.report_journal_problem("Xx")
+    health.confirm_discard("Greeting", "Xx")
+    health.report_settings_problem("Xx")
+    health.update_unreachable({"Nao": "Xx"})
     assert len(alerts.active) >= 8
     for alert in alerts.active:
         said(alert.title, alert.detail, alert.button or "")
@@ -207,19 +207,19 @@ def test_graph_changes_are_translated() -> None:
         (view(), view(*many)),
         (view(*many), view()),
     ):
-        lines = graph_changes.arrivals(before, after)
+        lines = graph_changes.change_messages(before, after)
         assert lines
         said(*lines)
 
 
 def test_questions_and_errors_are_translated() -> None:
     question = Question({"Nao": ("Xx",), "Turtle": ("Xx", "zz")}, lambda: None)
-    said(question.title, question.sentence, MayNotMoveError(["Nao", "Turtle"]))
+    said(question.title, question.message, MayNotMoveError(["Nao", "Turtle"]))
     said(
         app_errors.SettingsError(Path("/Xx"), "Xx"),
         app_errors.DescriptionError("Xx", ("zz", "zz")),
         app_errors.DescriptionError("Xx", ()),
-        app_errors.RobotUnknownError("Nao"),
+        app_errors.UnknownRobotError("Nao"),
         nep_errors.WaitTimeoutError("Xx", 1.5),
         nep_errors.ClosedError("Xx"),
         nep_errors.ClosedError("Xx", is_forked=True),
@@ -244,7 +244,7 @@ def test_errors_of_invalid_behaviour_files_are_translated(content: bytes) -> Non
 def test_errors_of_rejected_values_are_translated() -> None:
     number = Parameter("zz", "Xx", "number", minimum=1.0, maximum=9.0)
     text = Parameter("zz", "Xx", "text", min_length=2, max_length=3)
-    items = Parameter("zz", "Xx", "list", min_length=2, max_length=3, each=number)
+    items = Parameter("zz", "Xx", "list", min_length=2, max_length=3, item=number)
     for parameter, values in (
         (number, (0, "a", None)),
         (replace(number, maximum=None, unit="m"), (0,)),
@@ -259,7 +259,7 @@ def test_errors_of_rejected_values_are_translated() -> None:
         (Parameter("zz", "Xx", "object", fields=(number,)), (1, {"z": 3})),
     ):
         for value in values:
-            wrong = wrong_value(parameter, value)
+            wrong = value_problem(parameter, value)
             assert wrong is not None
             said(wrong)
     said(*check_input("Xx", (replace(number, required=True),), {"zy": 1}), data=("zy",))
@@ -286,8 +286,8 @@ def test_errors_of_invalid_descriptions_are_translated() -> None:
 
 def test_doctor_findings_are_translated() -> None:
     now = 1_800_000_000.0
-    master = ProcessFact(41, "zz", is_master=True, since_s=now - 7200)
-    other = ProcessFact(77, "zz", since_s=now - 5)
+    master = ProcessFact(41, "zz", is_master=True, started_s=now - 7200)
+    other = ProcessFact(77, "zz", started_s=now - 5)
     people = GraphView(1, 1, {"a": NodeInfo("a", "Nao", "zz", 1, "Python", "0.5.4.6", 0)}, {}, ())
     well = Facts(
         now, "127.0.0.1:7780", "linux", {}, "/zz", people, 0.004, PortFact(7780, "", True, master),
@@ -296,16 +296,19 @@ def test_doctor_findings_are_translated() -> None:
     )  # fmt: skip
     for facts in (
         well,
-        replace(well, answered_s=9.0, folders=(FolderFact("/zz", "Xx"), FolderFact("/zz", "Xx", "Xx"))),
+        replace(well, reply_time_s=9.0, folders=(FolderFact("/zz", "Xx"), FolderFact("/zz", "Xx", "Xx"))),
         replace(well, view=None),
-        replace(well, view=None, is_known=False),
+        replace(well, view=None, is_host_known=False),
         replace(well, view=None, master_port=PortFact(7780, "", True, other)),
         replace(well, view=None, master_port=None),
         replace(well, view=None, master_port=None, address="10.0.0.5:7780"),
-        *(replace(well, view=None, master_port=None, reach=reach) for reach in get_args(Reach)),
-        replace(well, masters=((master, 7780), (other, None)), loopback="Xx", now_s=1.0),
-        replace(well, packages=(PackageFact("nep", "0.1", "/zz"),), joins_originals=False),
-        replace(well, strange_files=("zz.py",), shadow="zz.py", clocks=(ClockFact("zz", 3.0),)),
+        *(
+            replace(well, view=None, master_port=None, reach_failure=reach)
+            for reach in get_args(ReachFailure)
+        ),
+        replace(well, masters=((master, 7780), (other, None)), loopback_problem="Xx", now_s=1.0),
+        replace(well, packages=(PackageFact("nep", "0.1", "/zz"),), is_gateway_enabled=False),
+        replace(well, original_files=("zz.py",), shadow="zz.py", clocks=(ClockFact("zz", 3.0),)),
         replace(well, files=FileFact(100, 100, 90, 100), programs=(ProgramFact(1, "zz", 99, 100),)),
     ):
         for finding in findings(facts):
@@ -334,7 +337,7 @@ def test_errors_of_invalid_requests_and_replies_are_translated() -> None:
     assert isinstance(no_request, nep_errors.WireError)
     assert no_request.reason.startswith("[")  # what follows is said by msgpack
     with pytest.raises(nep_errors.WireError) as caught:
-        decode_answer(packb({"is": "xx"}))
+        decode_reply(packb({"is": "xx"}))
     said(caught.value.reason, data=("xx",))
 
 

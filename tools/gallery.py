@@ -114,7 +114,7 @@ def _rest(theme: Theme) -> list[QWidget]:
     bar = ValueBar(theme, 0.6)
     bar.setFixedWidth(200)
     banner = Banner(theme)
-    banner.show_words(
+    banner.show_text(
         "error", "The camera of Pepper has been silent for 4 s.", "The behaviour waits.", "Look", 2
     )
     card = Card(theme)
@@ -126,7 +126,7 @@ def _rest(theme: Theme) -> list[QWidget]:
         "radio-tower",
         "No master is running",
         "A master lets programs find each other. Start one here, or choose a computer that has one.",
-        [EmptyAction("Start a master here", print, "play", primary=True), EmptyAction("Choose", print)],
+        [EmptyAction("Start a master here", print, "play", is_primary=True), EmptyAction("Choose", print)],
     )
     status = StatusItem(theme, "circle-check", "Master 127.0.0.1:7780", "ok")
     lost = StatusItem(theme, "triangle-alert", "12 lost in 30 s", "warn")

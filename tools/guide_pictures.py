@@ -189,12 +189,12 @@ class GuidePictures(SelfDrive):
     def _open(self, name: str) -> list[Step]:
         path = write_behaviour(self._home, name)
         files, page = self._commands.files, self._page_is_there
-        return [Step(f"the behaviour {name}", lambda: files.example(path), page, 30, settle_s=1.5)]
+        return [Step(f"the behaviour {name}", lambda: files.open_example(path), page, 30, settle_s=1.5)]
 
     def _stop(self) -> list[Step]:
         run, runs = self._commands.run, self._window.session.runs
         stopped = Step("stopped", lambda: run("run.stop"), lambda: runs.view().state == "proven")
-        world = self._window.session.fleet.world
+        world = self._window.session.fleet.change_world
         return [stopped, Step("its place", lambda: world("Pepper", {"reset": True}), self._robot_there)]
 
     def _drag_out(self) -> list[Step]:
@@ -351,7 +351,7 @@ def take_screenshots(folder: Path, theme: str) -> int:
         window = make_window(Session(), Options(theme=theme, self_drive=folder))
         window.on_shut = lambda: QTimer.singleShot(0, application.quit)
         window.show()
-        window.begin()
+        window.start_session()
         pictures = GuidePictures(window, folder, Path(home), theme)
         application.exec()
     for picture in pictures.pictures:

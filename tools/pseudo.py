@@ -36,22 +36,22 @@ def sentences_of_blocks() -> Iterator[tuple[str | None, str, str]]:
     """Yield (context, English text, file) for the block definitions, whose texts are not passed to `_`."""
     # imported here because catalogues are also compiled with only the build requirements installed
     from app.blocks.categories.robot import GROUPS  # noqa: PLC0415
-    from app.blocks.toolbox.catalogue import english_categories, has_words  # noqa: PLC0415
-    from app.blocks.toolbox.help import EXAMPLES, english_name_of_gap  # noqa: PLC0415
+    from app.blocks.toolbox.catalogue import english_categories, is_translatable  # noqa: PLC0415
+    from app.blocks.toolbox.help import EXAMPLES, english_slot_name  # noqa: PLC0415
 
     found: dict[tuple[str | None, str], str] = {}
     for category in english_categories():
         place = f"app/blocks/categories/{category.name}.py"
 
         def say(context: str | None, english: str, place: str = place) -> str:
-            if has_words(english):
+            if is_translatable(english):
                 found.setdefault((context, english), place)
             return english
 
         category.translated(say)
         for block in category.blocks:
             for argument in block.arguments:
-                say("gap", english_name_of_gap(argument))
+                say("gap", english_slot_name(argument))
     for title in GROUPS:
         found.setdefault(("category", title), "app/blocks/categories/robot.py")
     for example in EXAMPLES.values():

@@ -132,8 +132,8 @@ class Pictures(SelfDrive):
     def _plan(self) -> list[Step]:
         run, session = self._commands.run, self._window.session
         return [
-            Step("the start page", self._first, self._window.isVisible, picture="start"),
-            Step("the virtual robot", self._begin, self._robot_there, 40, settle_s=2.5),
+            Step("the start page", self._show_start_page, self._window.isVisible, picture="start"),
+            Step("the virtual robot", self._start_demo, self._robot_there, 40, settle_s=2.5),
             *self._run_to(TOUCH),
             *self._stop(),
             *self._run_to(TOUCH, "behaviour-light", settle_s=0.5),
@@ -179,9 +179,9 @@ class Pictures(SelfDrive):
         return any(link.state in {"ready", "busy"} for link in self._window.session.fleet.links)
 
     def _reset(self) -> None:
-        self._window.session.fleet.world("Pepper", {"reset": True})
+        self._window.session.fleet.change_world("Pepper", {"reset": True})
 
-    def _begin(self) -> None:
+    def _start_demo(self) -> None:
         self._commands.run("robots.virtual")
         self._commands.files.open(self._behaviour)
 
@@ -213,7 +213,7 @@ def take_screenshots(folder: Path) -> int:
         window = make_window(Session(), Options(theme="light", self_drive=folder))
         window.on_shut = lambda: QTimer.singleShot(0, application.quit)
         window.show()
-        window.begin()
+        window.start_session()
         pictures = Pictures(window, folder, behaviour)
         application.exec()
     for picture in pictures.pictures:

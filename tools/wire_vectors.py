@@ -24,7 +24,7 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.masters.graph import Graph
 from nep.protocol import requests, wire
-from nep.protocol.encoding import AnswerEncoder, encode_request, write
+from nep.protocol.encoding import ReplyEncoder, encode_request, write
 
 FOLDER = Path(__file__).resolve().parents[1] / "tests" / "data" / "wire"
 MALFORMED_COUNT = 1000
@@ -74,20 +74,20 @@ def filters() -> list[dict[str, Any]]:
                 }
             )
     for seq, wanted in ((1, 24 * 2**20), (2**40, 192 * 2**20), (2**64 - 1, 2**64 - 1)):
-        read = wire.Read(SUBSCRIBER, PUBLISHER, seq, wanted)
+        read = wire.Acknowledgement(SUBSCRIBER, PUBLISHER, seq, wanted)
         made.append(
             {
                 "name": f"read up to {seq}",
-                "filter": wire.read_part(read).hex(),
+                "filter": wire.acknowledgement_part(read).hex(),
                 "means": {"kind": "read", **as_text(read._asdict())},
             }
         )
     for generation in (1, 2**32 - 1):
-        shares = wire.Shares(SUBSCRIBER, PUBLISHER, generation)
+        shares = wire.OfferAcceptance(SUBSCRIBER, PUBLISHER, generation)
         made.append(
             {
                 "name": f"reads shared memory of generation {generation}",
-                "filter": wire.shares_part(shares).hex(),
+                "filter": wire.acceptance_part(shares).hex(),
                 "means": {"kind": "shares", **as_text(shares._asdict())},
             }
         )
@@ -267,7 +267,7 @@ PUSHED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
 class _Master:
     def __init__(self) -> None:
         self._graph = Graph(EPOCH, 0.0, learn_s=0.0)
-        self._encoder = AnswerEncoder()
+        self._encoder = ReplyEncoder()
         self._calls = {"talker": 0, "listener": 0}
 
     def ask(self, asked: Asked) -> tuple[bytes, bytes, list[bytes]]:
@@ -275,8 +275,8 @@ class _Master:
         self._calls[sender] += 1
         call = self._calls[sender]
         outgoing = self._graph.apply(request, call, 0.0, sender, is_foreign=True)
-        reply = next(self._encoder.encode(each.answer, call) for each in outgoing if each.call is not None)
-        pushes = [self._encoder.encode(each.answer) for each in outgoing if each.call is None]
+        reply = next(self._encoder.encode(each.body, call) for each in outgoing if each.call is not None)
+        pushes = [self._encoder.encode(each.body) for each in outgoing if each.call is None]
         return encode_request(request, call), reply, pushes
 
 

@@ -33,7 +33,7 @@ from babel.messages.pofile import read_po, write_po
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from nep.i18n import DOMAIN, EDITOR_WORDS, ENGLISH, LOCALE, PSEUDO, holes  # noqa: E402 - started by its path
+from nep.i18n import DOMAIN, EDITOR_CATALOGUE, ENGLISH, LOCALE_FOLDER, PSEUDO, placeholders  # noqa: E402 - started by its path
 from tools.pseudo import MARKUP, pseudo, sentences_of_blocks, sentences_of_examples  # noqa: E402
 
 KEYWORDS = {
@@ -110,12 +110,12 @@ def _marked(
 
 def sentences_of_robots(root: Path) -> Iterator[tuple[str, str]]:
     """Yield (English text, file) for the robot descriptions shipped with Studio."""
-    from app.blocks.toolbox.catalogue import has_words  # noqa: PLC0415 - as above
+    from app.blocks.toolbox.catalogue import is_translatable  # noqa: PLC0415 - as above
 
     for path in sorted((root / "resources" / "robots").glob("*.tm.jsonld")):
         place = path.relative_to(root).as_posix()
         for english in _of_description(json.loads(path.read_text(encoding="utf-8")), is_inside=False):
-            if has_words(english):
+            if is_translatable(english):
                 yield english, place
 
 
@@ -186,14 +186,14 @@ def write(catalog: Catalog, path: Path) -> None:
     path.write_bytes(held.getvalue())
 
 
-def extract(folder: Path = LOCALE) -> Catalog:
+def extract(folder: Path = LOCALE_FOLDER) -> Catalog:
     """Write the template with all texts and return it."""
     made = template()
     write(made, pot_file(folder))
     return made
 
 
-def update(folder: Path = LOCALE) -> None:
+def update(folder: Path = LOCALE_FOLDER) -> None:
     """Update the template and all translations from the sources, and compile them."""
     made = extract(folder)
     for language in languages(folder):
@@ -203,7 +203,7 @@ def update(folder: Path = LOCALE) -> None:
     compile_all(folder)
 
 
-def add(language: str, folder: Path = LOCALE) -> None:
+def add(language: str, folder: Path = LOCALE_FOLDER) -> None:
     """Create the .po file of a new language, with all texts untranslated."""
     about = f"# NEP Studio in '{language}'; see docs/translate.md."
     catalog = Catalog(
@@ -213,7 +213,7 @@ def add(language: str, folder: Path = LOCALE) -> None:
     write(catalog, po_file(folder, language))
 
 
-def compile_all(folder: Path = LOCALE) -> None:
+def compile_all(folder: Path = LOCALE_FOLDER) -> None:
     """Write the generated files: compiled languages, the pseudo-language, and languages.json."""
     known: dict[str, Mapping[str, object]] = {ENGLISH: {"name": "English", "share": 1.0}}
     for language in languages(folder):
@@ -224,7 +224,7 @@ def compile_all(folder: Path = LOCALE) -> None:
     (folder / "languages.json").write_text(_json(known), encoding="utf-8")
 
 
-def compile_pseudo(folder: Path = LOCALE) -> None:
+def compile_pseudo(folder: Path = LOCALE_FOLDER) -> None:
     """Write the pseudo-language, which is not part of a release."""
     _write_mo(pseudo_catalog(read(pot_file(folder))), po_file(folder, PSEUDO).with_suffix(".mo"))
 
@@ -242,7 +242,7 @@ def _write_mo(catalog: Catalog, path: Path) -> None:
     )  # so that programs starting meanwhile read either the old or the new file
     beside.write_bytes(held.getvalue())
     beside.replace(path)
-    path.with_name(EDITOR_WORDS).write_text(_json(_for_editor(catalog)), encoding="utf-8")
+    path.with_name(EDITOR_CATALOGUE).write_text(_json(_for_editor(catalog)), encoding="utf-8")
 
 
 def _for_editor(catalog: Catalog) -> dict[str, str]:
@@ -312,7 +312,7 @@ def pseudo_catalog(pot: Catalog) -> Catalog:
     return made
 
 
-def check(folder: Path = LOCALE) -> list[str]:
+def check(folder: Path = LOCALE_FOLDER) -> list[str]:
     """Return a message for each inconsistency between sources, template and translations."""
     made, pot = template(), read(pot_file(folder))
     wrong = [
@@ -331,7 +331,7 @@ def check(folder: Path = LOCALE) -> list[str]:
         if keys(catalog) != keys(pot):
             wrong.append(f"{language}: its sentences are not those of the .pot; run 'tools/words.py update'")
         made_of_it = (_told(catalog), _for_editor(catalog), facts(language, catalog))
-        there = (_compiled(path), _read_json(path.with_name(EDITOR_WORDS)), known.get(language))
+        there = (_compiled(path), _read_json(path.with_name(EDITOR_CATALOGUE)), known.get(language))
         if made_of_it != there:
             wrong.append(f"{language}: compiled from other words; run 'python tools/words.py compile'")
     return wrong
@@ -345,7 +345,7 @@ def _wrong_entries(catalog: Catalog) -> Iterator[str]:
         if entry.fuzzy:
             yield f"'{_shown(key)}' is marked as fuzzy"
         for form in filter(None, _ids(entry.string)):
-            if holes(form) not in [holes(each) for each in key.ids]:
+            if placeholders(form) not in [placeholders(each) for each in key.ids]:
                 yield f"'{form}' has not the holes of '{_shown(key)}'"
             if sorted(MARKUP.findall(form)) not in [sorted(MARKUP.findall(each)) for each in key.ids]:
                 yield f"'{form}' has not the markup of '{_shown(key)}'"

@@ -157,7 +157,7 @@ wait_until = _runtime.wait_until
 write = _runtime.write
 
 ROBOT_DISCOVERY_S = 3.0
-STOP_ANSWER_S = 1.0
+STOP_REPLY_TIMEOUT_S = 1.0
 
 
 def run(name: str) -> None:
@@ -172,7 +172,7 @@ def run(name: str) -> None:
     prepare_streams()  # scripts may write characters that a Windows pipe can't encode
     with new_node(f"program {name}") as node:
         found = find_robots(node, ROBOT_DISCOVERY_S)
-        for claim in found.claims:
+        for claim in found.rejected_claims:
             _print(claim)
         owners = {robot: owner.node_id for robot, owner in found.owners.items()}
         network = Network(node, f"program {name}", found.robots, owners=owners)
@@ -185,8 +185,8 @@ def run(name: str) -> None:
         finally:
             with without_interrupts():
                 _runtime.scheduler.stop()
-                moving = network.stop_robots(STOP_ANSWER_S)
-                wrong = [network.stop_words(robot) for robot in moving]
+                moving = network.stop_robots(STOP_REPLY_TIMEOUT_S)
+                wrong = [network.stop_error(robot) for robot in moving]
                 network.close()
     for words in wrong:
         _print(_("{words}. Switch it off by hand.").format(words=words))

@@ -20,18 +20,18 @@ from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.robots.voices import Notes, RobotVoices
 from app.core.run.control import Runs
 from app.core.storage.atomic_file import write_atomically
-from app.core.storage.kept_file import read_kept
+from app.core.storage.kept_file import read_stored
 from app.core.storage.settings import Settings
-from nep.i18n import _, lazy, listed
+from nep.i18n import _, format_list, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmFile, AlarmRule, Alarms
-from nep.programs.alarms.alarms import Carrier, Done
+from nep.programs.alarms.alarms import ActionStarter, DoneCallback
 from nep.programs.alarms.commands import AlarmCommands
 from nep.programs.alarms.history import AlarmHistory
 from nep.programs.alarms.rule import EVENT_KINDS, Scalar, new_id, problem_of
-from nep.programs.alarms.rule_file import MAX_ALARMS, NewerAlarmsError, alarms_text, read_text
-from nep.programs.alarms.sentences import subject_words, time_words, what_words
+from nep.programs.alarms.rule_file import MAX_ALARMS, NewerAlarmsError, encode_alarms, parse_alarms
+from nep.programs.alarms.sentences import duration_text, event_text, subject_text
 from nep.protocol.graph_view import GraphView
 
 FILE = "alarms.json"
@@ -42,15 +42,15 @@ MAX_AGE_S = 10.0
 """
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
 VOLUME = 0.6
-NOT_CARRIED = lazy("an alarm can't carry out its action: {error}")
+ACTION_FAILED = lazy("an alarm can't carry out its action: {error}")
 _MAX_FILE_BYTES = 4_000_000
-MILD = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
+WARNING_KINDS = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
 """Kinds of conditions that are warnings; all others are errors."""
 
 
 def severity_of(condition: AlarmCondition) -> str:
     """Return the severity of an alarm with this condition: "error" or "warn"."""
-    return "warn" if condition.kind in MILD else "error"
+    return "warn" if condition.kind in WARNING_KINDS else "error"
 
 
 class AlarmSession(Protocol):
@@ -73,7 +73,7 @@ class _PendingSend:
     """Message of an alarm, held until the user has answered the motion question."""
 
     question: Question
-    done: Done
+    done: DoneCallback
 
 
 class SessionAlarms:
@@ -95,11 +95,11 @@ class SessionAlarms:
         self._session = session
         self.path: Path | None = session.settings.path.with_name(FILE)
         self._clock, self._clock_s = clock, clock_s
-        self._commands = AlarmCommands(session.fleet.gate.refusal_now)
+        self._commands = AlarmCommands(session.fleet.gate.current_rejection_reason)
         self._pending_send: _PendingSend | None = None
         self.on_moved: OnMoved = ignore_moved
         """Called before a message that moves robots is sent, with the robots and "alarm"."""
-        self.keep: Carrier | None = None
+        self.keep: ActionStarter | None = None
         self.run_behaviour: Callable[[str], str] | None = None
         self.on_event: Callable[[AlarmEvent], object] = _ignore_event
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-alarms")
@@ -107,13 +107,13 @@ class SessionAlarms:
         self._removed: tuple[AlarmRule, int] | None = None
         self._is_newer = False
         found = self._read(self.path)
-        carriers: dict[str, Carrier] = {
+        carriers: dict[str, ActionStarter] = {
             "banner": _done_by_alert,
-            "console": self._console,
-            "sound": self._sound,
-            "keep": self._keep,
+            "console": self._log_to_console,
+            "sound": self._play_sound,
+            "keep": self._save_recording,
             "run": self._run,
-            "call": self._command,
+            "call": self._submit_command,
             "send": self._send,
             "stop": self._stop,
         }
@@ -140,28 +140,28 @@ class SessionAlarms:
         return self.alarms.revision + self.history.revision
 
     @property
-    def on(self) -> Sequence[AlarmRule]:
+    def active(self) -> Sequence[AlarmRule]:
         """Alarms whose condition is true and that are not snoozed."""
         return [rule for rule in self.rules if rule.id in self._on and not rule.is_snoozed(self._clock_s())]
 
-    def new(self, condition: AlarmCondition) -> AlarmRule:
+    def create(self, condition: AlarmCondition) -> AlarmRule:
         """Add an alarm that shows a banner. Evaluation starts as soon as the alarm is complete."""
         rule = AlarmRule(new_id(), condition, (AlarmAction("banner"),))
-        self.put(rule)
+        self.set_rule(rule)
         return rule
 
-    def put(self, rule: AlarmRule) -> None:
+    def set_rule(self, rule: AlarmRule) -> None:
         """Add an alarm or replace the one with this id; raise an alert when the list is full."""
         if self.alarms.rule(rule.id) is not None or self._has_room():
-            self.alarms.put(rule)
-            self._follow_rules()
+            self.alarms.set_rule(rule)
+            self._update_watches()
 
     def _has_room(self) -> bool:
         if len(self.rules) < MAX_ALARMS:
             return True
         text = _("You have {count} alarms, the maximum.").format(count=MAX_ALARMS)
         hint = _("Delete one you don't need.")
-        self._session.alerts.put(
+        self._session.alerts.raise_alert(
             "alarms:most", "warn", text, hint, button=_("Show the alarms"), action=SHOW, count=0
         )
         return False
@@ -173,17 +173,17 @@ class SessionAlarms:
             self._removed = (rule, self.rules.index(rule))
             self.alarms.remove(rule_id)
             self._session.alerts.resolve("alarms:most")
-            self._follow_rules()
+            self._update_watches()
         return rule
 
-    def put_back(self) -> None:
+    def restore(self) -> None:
         """Restore the last removed alarm at its position."""
         if self._removed is not None and self._has_room():
             (rule, place), self._removed = self._removed, None
             rules = [*self.rules]
             rules.insert(place, rule)
             self.alarms.set_rules(rules)
-            self._follow_rules()
+            self._update_watches()
 
     def snooze(self, rule_id: str, until_s: float) -> None:
         """Suppress the actions of an alarm until ``until_s`` (seconds since 1970); 0 ends the snooze."""
@@ -197,40 +197,42 @@ class SessionAlarms:
         """Evaluate messages of a topic. Called in the thread that receives them."""
         self.alarms.evaluator.evaluate(topic, messages)
 
-    def see(self, view: GraphView | None) -> None:
+    def update_graph(self, view: GraphView | None) -> None:
         """Evaluate a new graph; None if the connection to the master was lost."""
         self._view = view
-        self.alarms.evaluator.see(view)
+        self.alarms.evaluator.update_graph(view)
 
     def start(self) -> None:
         """Subscribe to the topics of the alarms."""
-        self._follow_rules()
+        self._update_watches()
 
     def tick(self) -> None:
         """Process the events and actions that are due."""
         for event in self.alarms.tick():
             self._show(event)
-        self.alarms.take_deeds()
+        self.alarms.take_action_results()
         asked = self._pending_send
         if asked is not None and self._session.fleet.permission.question is not asked.question:
             self._pending_send = None
             asked.done(
                 False,
-                _("not sent: {robots} is not allowed to move").format(robots=listed(asked.question.names)),
+                _("not sent: {robots} is not allowed to move").format(
+                    robots=format_list(asked.question.names)
+                ),
             )
 
     def check(self) -> None:
         """Refresh the alerts and save changes. Called once a second."""
         for rule in self.rules:
             if rule.id in self._on:
-                self._update_alert(rule, self.alarms.evaluator.state(rule).seen, count=0)
+                self._update_alert(rule, self.alarms.evaluator.state(rule).value, count=0)
         self._write()
         try:
             if self._worker.pop_result(FILE):
                 self._session.alerts.resolve("alarms:kept")
         except OSError as error:
             self._written = None  # retried at the next check
-            self._session.alerts.put(
+            self._session.alerts.raise_alert(
                 "alarms:kept",
                 "warn",
                 _("Alarms can't be saved."),
@@ -248,14 +250,14 @@ class SessionAlarms:
         self._worker.close()
         self._commands.close()
 
-    def _follow_rules(self) -> None:
+    def _update_watches(self) -> None:
         wanted = self.alarms.evaluator.topics
         for topic in self._watches.keys() - wanted:
             self._watches.pop(topic).close()
         for topic in wanted - self._watches.keys():
             self._watches[topic] = self._session.watch(topic)
         if self._view is not None:
-            self.alarms.evaluator.see(self._view)
+            self.alarms.evaluator.update_graph(self._view)
 
     # ---- alerts
 
@@ -269,21 +271,21 @@ class SessionAlarms:
         if event.kind == "still":
             alerts.resolve(_alert_id(rule.id))  # the snooze dismissed its banner
         self._on.add(rule.id)
-        self._update_alert(rule, event.seen, count=1)
+        self._update_alert(rule, event.value, count=1)
         if event.is_snoozed or not any(action.kind == "banner" for action in rule.actions):
             alerts.dismiss(_alert_id(rule.id))
 
     def _update_alert(self, rule: AlarmRule, seen: Scalar, count: int) -> None:
         condition, record = rule.condition, self.history.last(rule.id)
         # use the value that triggered the alarm, if it was recorded, instead of the current one
-        words = record.words if record is not None else what_words(condition, seen)
+        words = record.cause if record is not None else event_text(condition, seen)
         if condition.kind == "silent" and isinstance(seen, int | float) and seen >= 1:
             template = _("{topic} has been silent for {time}")
-            words = template.format(topic=subject_words(condition), time=time_words(round(seen)))
-        details = [deed.words for deed in record.deeds] if record is not None else []
+            words = template.format(topic=subject_text(condition), time=duration_text(round(seen)))
+        details = [deed.text for deed in record.action_results] if record is not None else []
         now = self.alarms.evaluator.state(rule).count
         known = next((each.count for each in self._session.alerts.active if each.id == _alert_id(rule.id)), 0)
-        self._session.alerts.put(
+        self._session.alerts.raise_alert(
             _alert_id(rule.id),
             severity_of(condition),
             f"{words[:1].upper()}{words[1:]}.",
@@ -295,12 +297,12 @@ class SessionAlarms:
 
     # ---- actions
 
-    def _console(self, event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
-        words = what_words(event.rule.condition, event.seen)
+    def _log_to_console(self, event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
+        words = event_text(event.rule.condition, event.value)
         self._session.console.add(severity_of(event.rule.condition), "alarms", words)
         done(True, "")
 
-    def _sound(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+    def _play_sound(self, _event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
         speaker = self._session.voices.speaker
         if speaker is None:
             done(False, _("sound is not available"))
@@ -308,55 +310,55 @@ class SessionAlarms:
         speaker.play(SOUND, VOLUME)
         done(True, _("sound"))
 
-    def _keep(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+    def _save_recording(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         if self.keep is None:
             done(False, _("nothing saved: recording is off"))
         else:
             self.keep(event, action, done)
 
-    def _run(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+    def _run(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         why_not = _("no window is open") if self.run_behaviour is None else self.run_behaviour(action.name)
         if why_not:
             done(False, _("“{name}” was not run: {reason}").format(name=action.name, reason=why_not))
         else:
             done(True, _("ran “{name}”").format(name=action.name))
 
-    def _stop(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+    def _stop(self, _event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
         self._session.runs.stop()
         done(True, _("Stop was sent to all robots"))
 
-    def _send(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+    def _send(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         fleet, (topic, msg_type) = self._session.fleet, (action.name, action.msg_type)
         if not fleet.gate.is_permitted(topic, msg_type) and fleet.permission.question is not None:
             done(False, _("not sent: waiting for permission to move a robot"))
             return
         reason = _("An alarm wants to send a message on {topic} ({what}).").format(
-            topic=topic, what=what_words(event.rule.condition, event.seen)
+            topic=topic, what=event_text(event.rule.condition, event.value)
         )
         go_on = partial(self._send_permitted, event, action, done)
-        if not fleet.gate.permits(topic, go_on, msg_type, reason=reason):
+        if not fleet.gate.request_permission(topic, go_on, msg_type, reason=reason):
             question = fleet.permission.question
             self._pending_send = None if question is None else _PendingSend(question, done)
             return
         moved = fleet.gate.moved_by(topic, msg_type)
         if moved:
             self.on_moved(moved, "alarm")
-        self._command(event, action, done)
+        self._submit_command(event, action, done)
 
-    def _send_permitted(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+    def _send_permitted(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         self._pending_send = None
         self._send(event, action, done)
 
-    def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+    def _submit_command(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         asked = self._clock()
 
         def job(node: Node) -> None:
             if self._clock() - asked > MAX_AGE_S:
                 done(False, _("no master was running"))
             else:
-                self._commands.carry(node, action, done)
+                self._commands.start_action(node, action, done)
 
-        self._session.source.submit(NOT_CARRIED, job)
+        self._session.source.submit(ACTION_FAILED, job)
 
     # ---- file
 
@@ -373,22 +375,22 @@ class SessionAlarms:
         kept = AlarmHistory([replace(record) for record in self.history.records])
 
         def write() -> bool:
-            write_atomically(path, alarms_text(rules, kept), durable=False, private=True)
+            write_atomically(path, encode_alarms(rules, kept), durable=False, private=True)
             return True
 
-        self._worker.ask(FILE, write)
+        self._worker.submit(FILE, write)
 
     def _read(self, path: Path) -> AlarmFile:
         def parse(data: bytes) -> tuple[AlarmFile, str]:
-            found = read_text(data, path.name, lenient=True)
+            found = parse_alarms(data, path.name, lenient=True)
             return found, next(iter(found.problems), "")
 
-        kept = read_kept(path, parse, NewerAlarmsError, _MAX_FILE_BYTES)
+        kept = read_stored(path, parse, NewerAlarmsError, _MAX_FILE_BYTES)
         self._is_newer = kept.is_newer
         if kept.problem:
             some = kept.value is not None
             title = _("Some alarms could not be read.") if some else _("The alarms could not be read.")
-            self._session.alerts.put(
+            self._session.alerts.raise_alert(
                 "alarms:file", "warn", title, kept.problem, button=_("Show the alarms"), action=SHOW
             )
         return kept.value if kept.value is not None else AlarmFile()
@@ -401,5 +403,5 @@ def _alert_id(rule_id: str) -> str:
     return f"alarm:{rule_id}"
 
 
-def _done_by_alert(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+def _done_by_alert(_event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
     done(True, "")

@@ -54,7 +54,7 @@ class Alerts:
             )
         return self._sorted
 
-    def to_tell(self, *, for_developers: bool = False) -> Sequence[ActiveAlert]:
+    def errors_and_warnings(self, *, for_developers: bool = False) -> Sequence[ActiveAlert]:
         """Return errors and warnings, worst first. Alerts for developers are included only on request."""
         return [
             alert
@@ -62,7 +62,7 @@ class Alerts:
             if alert.severity != "info" and (for_developers or not alert.for_developers)
         ]
 
-    def put(
+    def raise_alert(
         self,
         id: str,
         severity: str,
@@ -124,7 +124,7 @@ class Alerts:
             self._dismissed.add(id)
             self.revision += 1
 
-    def dismissed(self, id: str) -> bool:
+    def is_dismissed(self, id: str) -> bool:
         """Return True if the user closed the banner of the alert."""
         return id in self._dismissed
 

@@ -19,7 +19,7 @@ from nep.text import shortened
 
 CAPACITY = 5000
 TEXT_LIMIT = 2000
-OWN_KEPT = 50
+MAX_IGNORED_PROCESSES = 50
 _LEVELS = {"warning": "warn"}
 
 
@@ -42,7 +42,7 @@ class ConsoleRecord:
     text: str
     number: int = 0
     logger: str = ""
-    place: str = ""
+    location: str = ""
 
 
 class Console:
@@ -52,7 +52,7 @@ class Console:
         self._clock = clock
         self._lines: deque[ConsoleRecord | Message] = deque(maxlen=capacity)
         self._unread = 0
-        self._own: deque[int] = deque(maxlen=OWN_KEPT)
+        self._own: deque[int] = deque(maxlen=MAX_IGNORED_PROCESSES)
         self._errors = log_handler.ShownErrors()
         self._count = 0
         self.left_out = 0
@@ -62,12 +62,12 @@ class Console:
     @property
     def records(self) -> Sequence[ConsoleRecord]:
         """Records, oldest first; decodes pending messages."""
-        self._decode_unread()
+        self._decode_pending()
         return self._lines  # type: ignore[return-value]  # all entries are decoded
 
     def add(self, level: str, origin: str, text: str) -> None:
         """Add a record. Text longer than `TEXT_LIMIT` is truncated visibly."""
-        self._append([ConsoleRecord(self._clock(), level, origin, _shortened(text))])
+        self._append([ConsoleRecord(self._clock(), level, origin, _truncate(text))])
 
     def add_messages(self, messages: Sequence[Message], dropped: int = 0) -> None:
         """Add log messages from the network; ``dropped`` is the number of messages lost before them."""
@@ -82,7 +82,7 @@ class Console:
         if messages:
             self._append(messages)
 
-    def leave_out(self, pid: int | None) -> None:
+    def ignore_process(self, pid: int | None) -> None:
         """Ignore log messages of a process whose output already arrives through a pipe."""
         if pid is not None:
             self._own.append(pid)
@@ -103,36 +103,36 @@ class Console:
         self._unread = min(self._unread + len(lines), len(self._lines))
         self.revision += 1
 
-    def _decode_unread(self) -> None:
+    def _decode_pending(self) -> None:
         unread = [self._lines.pop() for _unread in range(self._unread)]
         self._unread = 0
         for line in reversed(unread):
-            for record in self._decoded(line) if isinstance(line, Message) else (line,):
+            for record in self._records_of(line) if isinstance(line, Message) else (line,):
                 self._count += 1
                 self._lines.append(replace(record, number=self._count))
 
-    def _decoded(self, message: Message) -> Sequence[ConsoleRecord]:
+    def _records_of(self, message: Message) -> Sequence[ConsoleRecord]:
         try:
             if message.topic == log_handler.LAST_ERRORS_TOPIC:
-                given = self._errors.new_in(message.payload)
+                given = self._errors.new_records(message.payload)
             else:
                 one = log_handler.LogRecord.from_plain(message.payload, message.stamp_ns)
                 given = [one] if self._errors.is_new(one) else []
         except NepError:
             return ()  # an alert reports it, as for every topic
-        return [self._record(each) for each in given if each.pid is None or each.pid not in self._own]
+        return [self._record_of(each) for each in given if each.pid is None or each.pid not in self._own]
 
-    def _record(self, given: log_handler.LogRecord) -> ConsoleRecord:
+    def _record_of(self, given: log_handler.LogRecord) -> ConsoleRecord:
         place = f"{given.file}:{given.line}" if given.file and given.line else given.file or ""
         return ConsoleRecord(
             given.stamp_ns / 1e9 if given.stamp_ns else self._clock(),
             _LEVELS.get(given.level, given.level),
             given.node or given.name or _("unknown sender"),
-            _shortened(given.text),
+            _truncate(given.text),
             logger="" if given.name == given.node else given.name,
-            place=place,
+            location=place,
         )
 
 
-def _shortened(text: str) -> str:
+def _truncate(text: str) -> str:
     return shortened(text, TEXT_LIMIT)

@@ -25,10 +25,10 @@ from nep.i18n import _
 from nep.version import __version__
 
 FILE_BYTES, FILES_KEPT = 1_000_000, 3
-FAULTS_KEPT = 500
-IN_CONSOLE: dict[str, object] = {"in_console": True}
+MAX_COUNTED_FAULTS = 500
+CONSOLE_EXTRA: dict[str, object] = {"in_console": True}
 """``extra`` of a record that the Console already shows in other words, and that only the log file needs."""
-WRITER = "NEP Studio %s writes from here on"
+WRITER_MESSAGE = "NEP Studio %s writes from here on"
 FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
 ALERT = "studio"
@@ -76,10 +76,10 @@ class RepeatFilter:
 
         Never raises, not even if the record's arguments can't be formatted.
         """
-        record = _formattable(record)
+        record = _make_formattable(record)
         key = (record.name, record.levelno, _raise_location(record) or record.getMessage())
         count = self._counts.pop(key, 0) + 1
-        while len(self._counts) >= FAULTS_KEPT:
+        while len(self._counts) >= MAX_COUNTED_FAULTS:
             del self._counts[next(iter(self._counts))]
         self._counts[key] = count
         if count == 1:
@@ -92,7 +92,7 @@ class RepeatFilter:
         return again
 
 
-def _formattable(record: logging.LogRecord) -> logging.LogRecord:
+def _make_formattable(record: logging.LogRecord) -> logging.LogRecord:
     try:
         record.getMessage()
     except Exception as error:  # noqa: BLE001  arguments may have any class
@@ -145,7 +145,7 @@ class LogFile(RotatingFileHandler):
         path.parent.mkdir(0o700, parents=True, exist_ok=True)
         number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
         stream = os.fdopen(number, "a", encoding="utf-8", errors="backslashreplace")
-        begins = logging.LogRecord("studio", logging.INFO, "", 0, WRITER, (__version__,), None)
+        begins = logging.LogRecord("studio", logging.INFO, "", 0, WRITER_MESSAGE, (__version__,), None)
         stream.write(f"{self.format(begins)}{self.terminator}")
         return stream
 
@@ -164,7 +164,7 @@ def _log_uncaught(kind: type[BaseException], error: BaseException, trace: Traceb
     if issubclass(kind, KeyboardInterrupt):
         sys.__excepthook__(kind, error, trace)
         return
-    _log.error("uncaught exception: %s", error_words(error), exc_info=(kind, error, trace))
+    _log.error("uncaught exception: %s", error_text(error), exc_info=(kind, error, trace))
 
 
 def _log_uncaught_in_thread(raised: threading.ExceptHookArgs) -> None:
@@ -175,7 +175,7 @@ def _log_uncaught_in_thread(raised: threading.ExceptHookArgs) -> None:
     _log.error(
         "uncaught exception in thread '%s': %s",
         name,
-        error_words(error),
+        error_text(error),
         exc_info=(type(error), error, raised.exc_traceback),
     )
 
@@ -185,11 +185,11 @@ def _log_unraisable(raised: sys.UnraisableHookArgs) -> None:
     if error is not None:
         trace = raised.exc_traceback
         _log.error(
-            "exception ignored in a finalizer: %s", error_words(error), exc_info=(type(error), error, trace)
+            "exception ignored in a finalizer: %s", error_text(error), exc_info=(type(error), error, trace)
         )
 
 
-def error_words(error: BaseException) -> str:
+def error_text(error: BaseException) -> str:
     """Return an exception as one line: type and message."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
@@ -199,9 +199,9 @@ def error_words(error: BaseException) -> str:
 class _Fault:
     """Failed step: its message, the time of the last failure, and True if it succeeded since."""
 
-    said: str
+    message: str
     last_s: float
-    is_well: bool = False
+    has_recovered: bool = False
 
 
 class FaultAlerts:
@@ -224,12 +224,12 @@ class FaultAlerts:
         except Exception as error:  # noqa: BLE001  the following steps must run after any error
             english, translated = what.format(**holes), _(what).format(**holes)
             _log.exception("can't %s", english)
-            self._failed(
-                english, _("Studio can't {what}: {error}").format(what=translated, error=error_words(error))
+            self._record_failure(
+                english, _("Studio can't {what}: {error}").format(what=translated, error=error_text(error))
             )
         else:
             if self._faults and what in self._faults:
-                self._faults[what].is_well = True
+                self._faults[what].has_recovered = True
 
     def check(self) -> None:
         """Remove resolved faults, and resolve the alert if none is left. Called once a second."""
@@ -237,7 +237,7 @@ class FaultAlerts:
         over = [
             what
             for what, fault in self._faults.items()
-            if now - fault.last_s >= (RECOVERY_S if fault.is_well else EXPIRY_S)
+            if now - fault.last_s >= (RECOVERY_S if fault.has_recovered else EXPIRY_S)
         ]
         for what in over:
             del self._faults[what]
@@ -246,7 +246,7 @@ class FaultAlerts:
         elif over:
             self._update_alert(next(iter(self._faults.values())), count=0)
 
-    def _failed(self, what: str, said: str) -> None:
+    def _record_failure(self, what: str, said: str) -> None:
         is_new = what not in self._faults
         while is_new and len(self._faults) >= MAX_FAULTS:
             del self._faults[next(iter(self._faults))]
@@ -256,6 +256,6 @@ class FaultAlerts:
 
     def _update_alert(self, fault: _Fault, *, count: int) -> None:
         title = _("Something went wrong in Studio. It may show outdated values.")
-        self._alerts.put(
-            ALERT, "error", title, fault.said, button=_("Show the log"), action="help.log", count=count
+        self._alerts.raise_alert(
+            ALERT, "error", title, fault.message, button=_("Show the log"), action="help.log", count=count
         )

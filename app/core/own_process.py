@@ -9,7 +9,7 @@ from typing import Literal
 
 from nep.i18n import LANG_VARIABLE
 
-Fate = Literal["", "replaced", "gone"]
+ExecutableState = Literal["", "replaced", "gone"]
 
 
 def module_command(module: str) -> list[str]:
@@ -42,7 +42,7 @@ class OwnProgram:
         self._file = file if file is not None or not frozen else Path(sys.executable)
         self._initial = self._signature()
 
-    def fate(self) -> Fate:
+    def executable_state(self) -> ExecutableState:
         """Return the state of the executable file: "" (unchanged), "replaced" by an update, or "gone"."""
         now = self._signature()
         if now == self._initial:

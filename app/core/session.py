@@ -24,13 +24,13 @@ from app.core.faults import FaultAlerts, log_errors
 from app.core.messages.image_streams import Images
 from app.core.network.decode_checks import Checks
 from app.core.network.doctor import doctor_of
-from app.core.network.graph_changes import arrivals
+from app.core.network.graph_changes import change_messages
 from app.core.network.mailbox import Batch, Drained, Mailbox
 from app.core.network.master import MasterChange, MasterState
 from app.core.network.nodes import Nodes
 from app.core.network.remote_access import RemoteAccess, RemoteAccessChanged
 from app.core.network.source import (
-    GraphSeen,
+    GraphReceived,
     JobFailed,
     LiveSource,
     MakeSource,
@@ -44,19 +44,19 @@ from app.core.network.traffic import Traffic
 from app.core.network.watches import Watch, Watches
 from app.core.network.web_pages import WebPages, WebServerStarted
 from app.core.networks.live_network import LiveNetwork
-from app.core.networks.networks import NetworkEvent, Networks, by_network
+from app.core.networks.networks import NetworkEvent, Networks, split_by_network
 from app.core.networks.parameters import ParameterSetter
 from app.core.own_process import OwnProgram
-from app.core.recording.client import RecorderGone, RecorderSaid
+from app.core.recording.client import RecorderEvent, RecorderExited
 from app.core.recording.recordings import SessionRecordings
 from app.core.robots.fleet import Fleet
-from app.core.robots.health import ASK_DOCTOR, Health
+from app.core.robots.health import OPEN_DOCTOR_LABEL, Health
 from app.core.robots.last_robots import LastRobots
 from app.core.robots.launcher import VIRTUAL_ROBOTS, Launcher, LaunchFailed, VirtualProcesses
 from app.core.robots.motion.bridged_commands import BridgedCommands
 from app.core.robots.room import SessionRoom
 from app.core.robots.stop.lines import StopTarget
-from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, StopDone
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopDone
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.robots.voices import RobotVoices
 from app.core.run.acting.acting import SessionActing
@@ -78,8 +78,8 @@ else:
     replay_module = lazy_module("app.core.recording.replay.replay")
 
 CHECK_INTERVAL_S = 1.0
-NO_WATCH = lazy("can't monitor the robots: {error}")
-LOGS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
+MONITORING_FAILED = lazy("can't monitor the robots: {error}")
+LOG_TOPICS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
 """Topics shown in the Console, with their message types."""
 
 
@@ -91,7 +91,7 @@ class Session:
     """
 
     replay: replay_module.Replay | None = None
-    sources_shown = 0
+    source_revision = 0
     """Counter that increases when another source is shown."""
     _live: LiveNetwork | None = None  # while a recording is shown
     _closing_replays: list[replay_module.Replay]
@@ -114,8 +114,8 @@ class Session:
         self.alerts, self.console = Alerts(), Console()
         self._faults = FaultAlerts(self.alerts, clock)
         self._mailbox, self._checks = Mailbox(), Checks()
-        self._watches = Watches(self._begin_watch, self._end_watch, self._on_unwatched)
-        self._add_network(source if source is not None else partial(LiveSource, always=LOGS))
+        self._watches = Watches(self._start_watch, self._stop_watch, self._on_unwatched)
+        self._add_network(source if source is not None else partial(LiveSource, always=LOG_TOPICS))
         self._add_robots()
         self._add_programs(journal_folder)
         self._health = Health(self.topics, self.fleet, self.alerts, clock)
@@ -133,9 +133,9 @@ class Session:
         self.topics, self.nodes = Topics(), Nodes()
         self.traffic = Traffic(self.topics)
         self.images = Images(self.watch, self._clock)
-        self.series = SeriesFeed(self.watch, self._clock_ns, self._mailbox.set_room)
+        self.series = SeriesFeed(self.watch, self._clock_ns, self._mailbox.set_capacity)
         post_event = self._mailbox.post_event
-        sinks = [self._checks.check, self._mailbox.post, self._offer, self._warn]
+        sinks = [self._checks.check, self._mailbox.post, self._offer_images, self._evaluate_alarms]
         self.source: Source = make_source(self.address, sinks, post_event)
         self.networks = Networks(self.settings, sinks[1:], post_event, self.alerts)
         self.parameters = ParameterSetter(self.source.submit)
@@ -153,7 +153,7 @@ class Session:
         self.room = SessionRoom(self.settings, self._watches, submit, clock, self._clock_ns)
         self.voices = RobotVoices(self.settings, self.fleet, self.watch, self.console.add, clock)
         self.stopper: RobotStopper | None = None
-        self.launcher = Launcher(self.address, self._mailbox.post_event, self.fleet.is_there)
+        self.launcher = Launcher(self.address, self._mailbox.post_event, self.fleet.is_present)
         self.last_robots = LastRobots(self.settings)
 
     def _add_programs(self, journal_folder: Path | None) -> None:
@@ -171,16 +171,19 @@ class Session:
         )
 
     def _connect_parts(self) -> None:
-        self.runs.coming, self.runs.also_stops = (lambda: self.coming), self.acting.disarm
-        self.alarms.keep, self.alarms.on_event = self.recordings.carry, self.recordings.events.take_alarm
-        self.alarms.on_moved = self.acting.on_moved = self.fleet.moved.note
-        self._bridged = BridgedCommands(self.fleet.moved.note)
+        self.runs.coming, self.runs.also_stops = (lambda: self.starting_robots), self.acting.disarm
+        self.alarms.keep, self.alarms.on_event = (
+            self.recordings.save_for_alarm,
+            self.recordings.events.on_alarm,
+        )
+        self.alarms.on_moved = self.acting.on_moved = self.fleet.moved.record_command
+        self._bridged = BridgedCommands(self.fleet.moved.record_command)
 
-    def _offer(self, topic: str, messages: Sequence[Message]) -> None:
+    def _offer_images(self, topic: str, messages: Sequence[Message]) -> None:
         live = self._live
         (self.images if live is None else live.images).offer(messages, topic)
 
-    def _warn(self, topic: str, messages: Sequence[Message]) -> None:
+    def _evaluate_alarms(self, topic: str, messages: Sequence[Message]) -> None:
         self.alarms.evaluate(topic, messages)
 
     # -- public ----------------------------------------------------------------------------------------------
@@ -203,7 +206,7 @@ class Session:
         return self.replay is not None
 
     @property
-    def shown_console(self) -> Console:
+    def displayed_console(self) -> Console:
         """Console of the source that is shown."""
         return self.replay.console if self.replay is not None else self.console
 
@@ -221,11 +224,11 @@ class Session:
         )
         self.topics, self.nodes, self.networks = opened.topics, opened.nodes, opened.networks
         self.images, self.series, self.graph = opened.images, opened.series, None
-        self.sources_shown += 1
+        self.source_revision += 1
         opened.start()
         return opened
 
-    def back_to_live(self) -> None:
+    def return_to_live(self) -> None:
         """Close the recording and show the live network."""
         live = self._live
         if live is None:
@@ -233,7 +236,7 @@ class Session:
         self.topics, self.nodes, self.networks = live.topics, live.nodes, live.networks
         self.images, self.series, self.graph = live.images, live.series, live.graph
         self._live = None
-        self.sources_shown += 1
+        self.source_revision += 1
         self._end_replay()
 
     def _end_replay(self) -> None:
@@ -241,13 +244,13 @@ class Session:
             ended, self.replay = self.replay, None
             self._closing_replays = [each for each in self._closing_replays if not each.has_ended]
             self._closing_replays.append(ended)
-            ended.end()
+            ended.request_stop()
 
     @property
-    def coming(self) -> tuple[str, ...]:
+    def starting_robots(self) -> tuple[str, ...]:
         """Names of virtual robots that are starting."""
         there = {link.name for link in self.fleet.connected}
-        return tuple(name for name in self.launcher.coming if name not in there)
+        return tuple(name for name in self.launcher.starting_robots if name not in there)
 
     def start(self) -> None:
         """Start the threads, and a master if none replies."""
@@ -255,7 +258,7 @@ class Session:
         self.networks.start()
         self.alarms.start()
         self.recordings.start()
-        self.source.submit(NO_WATCH, self._make_stopper)
+        self.source.submit(MONITORING_FAILED, self._make_stopper)
         if self._start_processes:
             self.launcher.ensure_master()
 
@@ -266,7 +269,7 @@ class Session:
         """
         return self._watches.open([topic])
 
-    def watch_shown(self, topic: str) -> Watch:
+    def watch_displayed(self, topic: str) -> Watch:
         """Subscribe to a topic of the source that is shown.
 
         Call this again when `sources_shown` has changed.
@@ -283,12 +286,12 @@ class Session:
         network = self.networks.get(name)
         (network.topics if network is not None else self.topics).mark_seen(topic)
 
-    def gives_up(self, document: Document) -> bool:
+    def confirm_discard(self, document: Document) -> bool:
         """Return True if the user discards work that can't be saved.
 
         The first call raises an alert instead.
         """
-        return self._health.gives_up(document.name, document.journal_error or "")
+        return self._health.confirm_discard(document.name, document.journal_error or "")
 
     def tick(self) -> None:
         """Apply the events and messages that threads posted since the last tick."""
@@ -300,30 +303,30 @@ class Session:
         self._on_messages(drained, now)
         with self.guarded(lazy("update the ages of topics and nodes")):
             live = self.live
-            live.topics.age(now, now_ns)
-            live.nodes.age(now)
-            live.networks.age(now, now_ns)
+            live.topics.update_ages(now, now_ns)
+            live.nodes.update_ages(now)
+            live.networks.update_ages(now, now_ns)
         if self.replay is not None:
             with self.guarded(lazy("update the replay")):
                 self._tick_replay(self.replay, now)
         with self.guarded(lazy("monitor the robots")):
-            self._follow_robots()
+            self._update_robots()
         with self.guarded(lazy("monitor the alarms")):
             self.alarms.tick()
         with self.guarded(lazy("send messages by hand")):
             self.acting.tick()
         with self.guarded(lazy("play the robots' voices")):
-            self.voices.follow()
+            self.voices.update()
         with self.guarded(lazy("update the robots of the program")):
-            self.runs.follow_robots()
+            self.runs.update_robots()
         with self.guarded(lazy("stop robots again")):
             for name in self.fleet.take_settled():
                 self.runs.stop_again(name)
         with self.guarded(lazy("monitor started programs")):
-            self.launcher.follow()
+            self.launcher.start_requested()
         with self.guarded(lazy("update the run")):
             self.runs.tick()
-            self.recordings.events.follow_run(self.runs.state)
+            self.recordings.events.update_run(self.runs.state)
         if now >= self._next_check:
             self._next_check = now + CHECK_INTERVAL_S
             self._check(now)
@@ -334,7 +337,7 @@ class Session:
         replay.tick(now)
         self.graph = replay.graph
         if not was_open and replay.opened is not None:
-            self.sources_shown += 1  # its topics and start time are available from now on
+            self.source_revision += 1  # its topics and start time are available from now on
 
     def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
         """Return a context that suppresses exceptions of one step of a tick after logging and alerting them.
@@ -353,27 +356,29 @@ class Session:
         with self.guarded(lazy("monitor the recorder")):
             self.recordings.check()
         with self.guarded(lazy("save the open tabs")):
-            self.tabs.follow()
+            self.tabs.save_if_changed()
         with self.guarded(lazy("check started programs")):
             self.launcher.check()
             self.last_robots.save(self.launcher)
             if self.master.kind == "none" and self._start_processes:
-                self.launcher.keep_master()
+                self.launcher.ensure_master_running()
             self.web_pages.check()
         with self.guarded(lazy("count lost messages")):
-            missed = self.source.missed()
-            self.traffic.miss({t: count for t, count in missed.items() if self._watches.watched(t)}, now)
+            missed = self.source.lost_counts()
+            self.traffic.count_lost(
+                {t: count for t, count in missed.items() if self._watches.is_watched(t)}, now
+            )
         with self.guarded(lazy("report problems with Stop")):
             self._check_stop_connections()
         with self.guarded(lazy("check for problems")):
-            self._health.check(self.runs.used, self.launcher.virtual_robots)
-            self.documents.unkept()
-            self._health.journal(self.documents.journal_error)
-            self._health.settings(self.settings.not_kept)
-            self._health.program(self._program.fate())
+            self._health.check(self.runs.used_robots, self.launcher.virtual_robots)
+            self.documents.retry_journals()
+            self._health.report_journal_problem(self.documents.journal_error)
+            self._health.report_settings_problem(self.settings.not_kept)
+            self._health.program(self._program.executable_state())
 
     def _close_replays(self) -> None:
-        self.back_to_live()
+        self.return_to_live()
         for each in self._closing_replays:
             each.close()
         self._closing_replays.clear()
@@ -387,7 +392,7 @@ class Session:
             ("save the tabs", lambda: self.tabs.save(ended_well=True)),
             ("save the robots", partial(self.last_robots.save, self.launcher)),
             ("save the alarms", self.alarms.close),
-            ("close the behaviours", self.documents.end),
+            ("close the behaviours", self.documents.close_all),
             ("silence the robots", self.voices.close),
             ("end the robots", self.fleet.close),
             ("keep the room", self.room.close),
@@ -409,31 +414,31 @@ class Session:
 
     # -- private ---------------------------------------------------------------------------------------------
 
-    def _begin_watch(self, topic: str) -> None:
+    def _start_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
             self.live.networks.watch(topic)
             return
         self.source.watch(topic)
         known = self.live.topics.get(topic)
         if known is not None:
-            known.watched = True
+            known.is_watched = True
 
-    def _end_watch(self, topic: str) -> None:
+    def _stop_watch(self, topic: str) -> None:
         if split_key(topic)[0]:
             self.live.networks.unwatch(topic)
             return
         self.source.unwatch(topic)
         self.live.topics.unwatch(topic)
-        self.fleet.unwatched(topic)
+        self.fleet.on_unwatched(topic)
 
     def _on_unwatched(self, topic: str) -> None:
-        self._health.forget(topic)  # only now, because the problem doesn't depend on the panel being shown
+        self._health.discard(topic)  # only now, because the problem doesn't depend on the panel being shown
 
     def _make_stopper(self, node: Node) -> None:
         self.stopper = RobotStopper(node)
 
     def _on_messages(self, drained: Drained, now: float) -> None:
-        batches, others = by_network(drained.batches)
+        batches, others = split_by_network(drained.batches)
         for topic, batch in batches.items():
             with self.guarded(lazy("receive messages of {topic}"), topic=topic):
                 self._on_batch(topic, batch, now)
@@ -452,10 +457,10 @@ class Session:
         with self.guarded(lazy("check messages")):
             found = self._checks.pop_results()
             self._health.update(
-                {topic: what for topic, what in found.items() if self._watches.watched(topic)}
+                {topic: what for topic, what in found.items() if self._watches.is_watched(topic)}
             )
         if drained.lost_events:
-            self.alerts.put(
+            self.alerts.raise_alert(
                 "mailbox",
                 "warn",
                 ngettext(
@@ -468,17 +473,17 @@ class Session:
             )
 
     def _on_batch(self, topic: str, batch: Batch, now: float) -> None:
-        if topic in LOGS:
+        if topic in LOG_TOPICS:
             self.console.add_messages(batch.messages, batch.dropped)
         # else these are the last messages of a subscription that has just ended
-        if self._watches.watched(topic):
+        if self._watches.is_watched(topic):
             topics = self.live.topics
             topics.add(topic, batch, now)
-            topics[topic].watched = True
+            topics[topic].is_watched = True
 
     def _on_event(self, event: object, now: float) -> None:
         match event:
-            case GraphSeen():
+            case GraphReceived():
                 self._on_graph(event.view, now)
             case MasterFound():
                 self.master = MasterState("connected", event.address)
@@ -489,37 +494,41 @@ class Session:
                 self._on_master_lost(event)
             case RunnerEvent():
                 self.runs.on_runner(event)
-            case StopDone() | RobotAnswered() | OneStopped() | LateAnswer():
+            case StopDone() | RobotReplied() | RobotStopped() | LateReply():
                 self.runs.on_stop(event)
             case LaunchFailed():
-                self.console.add("error", event.what, f"{event.sentence} {event.detail}".strip())
-                self.alerts.put(
+                self.console.add("error", event.what, f"{event.message} {event.detail}".strip())
+                self.alerts.raise_alert(
                     f"companion:{event.what}",
                     "error",
-                    event.sentence,
+                    event.message,
                     event.detail.splitlines()[-1] if event.detail else "",
-                    button=_("Restart it") if event.is_robot else _(ASK_DOCTOR),
+                    button=_("Restart it") if event.is_robot else _(OPEN_DOCTOR_LABEL),
                     action=f"connect:{event.what}" if event.is_robot else "help.doctor",
                 )
             case WatchFailed():
-                self.alerts.put(
+                self.alerts.raise_alert(
                     f"watch:{event.topic}",
                     "warn",
                     _("{topic} can't be decoded.").format(topic=event.topic),
-                    event.sentence,
+                    event.message,
                 )
             case (
-                RemoteAccessChanged() | NetworkEvent() | RecorderSaid() | RecorderGone() | WebServerStarted()
+                RemoteAccessChanged()
+                | NetworkEvent()
+                | RecorderEvent()
+                | RecorderExited()
+                | WebServerStarted()
             ):
                 self._on_part(event, now)
             case JobFailed() if event.what:
-                self.console.add("error", "studio", _(event.what).format(error=event.sentence))
+                self.console.add("error", "studio", _(event.what).format(error=event.message))
             case _:
                 pass
 
     def _on_part(
         self,
-        event: RemoteAccessChanged | NetworkEvent | RecorderSaid | RecorderGone | WebServerStarted,
+        event: RemoteAccessChanged | NetworkEvent | RecorderEvent | RecorderExited | WebServerStarted,
         now: float,
     ) -> None:
         if isinstance(event, NetworkEvent):
@@ -532,64 +541,64 @@ class Session:
             self.recordings.on_event(event)
 
     def _on_graph(self, view: GraphView, now: float) -> None:
-        self.remote_access.follow(view)
-        if self._learning.still(self.live.graph, view, now):
+        self.remote_access.update_graph(view)
+        if self._learning.is_incomplete(self.live.graph, view, now):
             return
         live = self.live
         before = live.graph
         if before is not None and (before.epoch, before.revision) != (view.epoch, view.revision):
-            for line in arrivals(before, view):
+            for line in change_messages(before, view):
                 self.console.add("info", "master", line)
         if self._live is None:
             self.graph = view
         live.graph = view
-        self.alarms.see(view)
+        self.alarms.update_graph(view)
         live.topics.update(view, now)
         live.nodes.update(view, now)
         self.fleet.update(view)
         self._bridged.update(view, (link.robot for link in self.fleet.links if not link.virtual))
         self.room.update(view)
-        for note in self.fleet.take_notes():
+        for note in self.fleet.take_notices():
             self.console.add("warn", "robots", note)
         if self.stopper is not None:
-            self.stopper.see(view)
-        self.traffic.follow(view, now)
-        self._health.graph_alerts(view)
+            self.stopper.update_graph(view)
+        self.traffic.update_graph(view, now)
+        self._health.update_graph_alerts(view)
 
     def _on_master_lost(self, event: MasterLost) -> None:
         was_there = self.master.kind == "connected"
-        self.master = MasterState("none", event.address, event.sentence)
-        self.alarms.see(None)
+        self.master = MasterState("none", event.address, event.message)
+        self.alarms.update_graph(None)
         if was_there:
-            self.console.add("error", "master", event.sentence)
-            self.alerts.put(
+            self.console.add("error", "master", event.message)
+            self.alerts.raise_alert(
                 "master",
                 "warn",
                 _("The master disappeared; starting a new one."),
                 _("Connected programs keep running; new ones can't join until it is back."),
-                button=_(ASK_DOCTOR),
+                button=_(OPEN_DOCTOR_LABEL),
                 action="help.doctor",
             )
             self.live.topics.values_revision += 1
 
-    def _follow_robots(self) -> None:
+    def _update_robots(self) -> None:
         if self.fleet.revision != self._robots_revision:
             self._robots_revision = self.fleet.revision
             robots = [link.robot for link in self.fleet.connected]
             self.documents.set_connected(robots)
             for robot in robots:
-                self.launcher.came(robot.name)
+                self.launcher.on_started(robot.name)
                 self.alerts.resolve(f"companion:{robot.name}")
         self._update_stop_targets()
         topics = self.live.topics
         if topics.revision != self._topics_revision:
             self._topics_revision = topics.revision
-            self.documents.set_topics(sorted(topic.name for topic in topics.live()))
+            self.documents.set_topics(sorted(topic.name for topic in topics.existing_topics()))
 
     def _check_stop_connections(self) -> None:
         # Alerts about robots that a stop can't reach; the next tick tries to connect to them again.
         problems = self.stopper.problems if self.stopper is not None else {}
-        self._health.unreachable(problems)
+        self._health.update_unreachable(problems)
         self._retries_stop_connections = bool(problems)
 
     def _update_stop_targets(self) -> None:
@@ -597,10 +606,10 @@ class Session:
         if self.stopper is not None:
             self.stopper.deliver()
             for link in self.fleet.connected:
-                link.is_reached = self.stopper.reaches(link.name)
+                link.is_reachable = self.stopper.is_reachable(link.name)
         targets = self.fleet.stop_targets
         stopper = self.stopper
         if stopper is not None and (targets != self._reachable or self._retries_stop_connections):
             self._reachable, self._retries_stop_connections = targets, False
-            stopper.expect(targets)
-            self.source.submit(NO_WATCH, lambda _node: stopper.set_robots(targets))
+            stopper.set_expected(targets)
+            self.source.submit(MONITORING_FAILED, lambda _node: stopper.set_robots(targets))

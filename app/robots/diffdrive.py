@@ -24,17 +24,17 @@ from app.robots.driver.schema import Colour, Range
 from nep.i18n import _
 
 LIGHTS = "Lights"
-STEP_S = 1 / 30
-FEEDBACK_STEPS = 6
+STEP_INTERVAL_S = 1 / 30
+FEEDBACK_PERIOD_STEPS = 6
 SPEED, TURN_SPEED = 0.35, 80.0
 SLOWEST, SLOWEST_TURN = 0.03, 6.0
 SLOW_DOWN, TURN_SLOW_DOWN = 0.5, 200.0  # m/s², °/s²
 ARRIVED_M, ARRIVED_DEG = 0.008, 0.8
-FAR_ENOUGH_M = 0.03
-STAND_STILL_S = 1.0
-REACH_M = 5.0
+MIN_DISTANCE_M = 0.03
+STANDSTILL_TIMEOUT_S = 1.0
+MAX_DISTANCE_M = 5.0
 
-Distance = Annotated[float, Range(-REACH_M, REACH_M, 0.05, "m")]
+Distance = Annotated[float, Range(-MAX_DISTANCE_M, MAX_DISTANCE_M, 0.05, "m")]
 
 
 class Wheels(Protocol):
@@ -117,30 +117,32 @@ class DiffDrive:
         turn: Annotated[float, Range(-90, 90, 5, "deg/s", "slider")] = 0.0,
     ) -> None:
         """Keep moving until the next drive or stop. The robot stops if its program no longer responds."""
-        self._go(call, speed, turn)
+        self._set_speeds(call, speed, turn)
 
     @drives("move %distance m", "footprints", "moves %distance m", unit="m", moved=True)
     def move(self, call: Call, distance: Distance = 0.5) -> Mapping[str, object]:
         """Move straight ahead, or backwards if the distance is negative."""
         left = abs(distance)
-        made = self._roll(call, distance, lambda moved: {"moved": moved, "to_go": _left(left, moved)})
+        made = self._drive_straight(
+            call, distance, lambda moved: {"moved": moved, "to_go": _remaining(left, moved)}
+        )
         return {"moved": round(made, 3)}
 
     @drives("turn %angle °", "rotate-ccw", "turns %angle °", unit="deg")
     def turn(self, call: Call, angle: Annotated[float, Range(-360, 360, 5, "deg", "angle")] = 90.0) -> None:
         """Turn on the spot; positive angles turn left."""
-        self._spin(call, angle, lambda turned: {"to_go": _left(abs(angle), turned)})
+        self._turn_on_spot(call, angle, lambda turned: {"to_go": _remaining(abs(angle), turned)})
 
     @drives("go to x %x m y %y m", "map-pin", "goes to %x, %y m", unit="m", title="go to")
     def go_to(self, call: Call, x: Distance = 0.0, y: Distance = 0.0) -> None:
         """Turn to a position and move there in a straight line. The robot doesn't avoid obstacles."""
         here_x, here_y, facing = self.wheels.pose()
         away = math.hypot(x - here_x, y - here_y)
-        if away < FAR_ENOUGH_M:
+        if away < MIN_DISTANCE_M:
             return
         turn = math.degrees(math.atan2(y - here_y, x - here_x)) - facing
-        self._spin(call, (turn + 180.0) % 360.0 - 180.0, lambda _: {"to_go": round(away, 2)})
-        self._roll(call, away, lambda moved: {"to_go": _left(away, moved)})
+        self._turn_on_spot(call, (turn + 180.0) % 360.0 - 180.0, lambda _: {"to_go": round(away, 2)})
+        self._drive_straight(call, away, lambda moved: {"to_go": _remaining(away, moved)})
 
     @action(
         "light %colour",
@@ -161,7 +163,7 @@ class DiffDrive:
         with self._steering:  # running actions are canceled and don't steer any more
             self.wheels.drive(0.0, 0.0)
         waited = threading.Event()
-        for _turn in range(round(STAND_STILL_S / 0.005)):
+        for _turn in range(round(STANDSTILL_TIMEOUT_S / 0.005)):
             if self.wheels.still():
                 return
             waited.wait(0.005)
@@ -169,7 +171,7 @@ class DiffDrive:
 
     # ---- steering ---------------------------------------------------------------------------------
 
-    def _go(self, call: Call, speed: float, turn_speed: float) -> None:
+    def _set_speeds(self, call: Call, speed: float, turn_speed: float) -> None:
         with self._steering:
             if call.canceled:
                 raise Canceled
@@ -183,30 +185,32 @@ class DiffDrive:
         """Return a function that returns the metres driven since now, computed from the position."""
         start_x, start_y, _ = self.wheels.pose()
 
-        def made() -> float:
+        def driven_m() -> float:
             x, y, _ = self.wheels.pose()
             return math.hypot(x - start_x, y - start_y)
 
-        return made
+        return driven_m
 
-    def _roll(self, call: Call, distance: float, told: Callable[[float], dict[str, object]]) -> float:
+    def _drive_straight(
+        self, call: Call, distance: float, told: Callable[[float], dict[str, object]]
+    ) -> float:
         made = self.odometer()
 
         def steer(left: float) -> None:
             speed = min(SPEED, max(SLOWEST, math.sqrt(2 * SLOW_DOWN * left)))
-            self._go(call, math.copysign(speed, distance), 0.0)
+            self._set_speeds(call, math.copysign(speed, distance), 0.0)
 
-        def tell(moved: float) -> None:
+        def send_feedback(moved: float) -> None:
             call.feedback(**told(round(moved, 2)))
 
-        self._steer(call, abs(distance), ARRIVED_M, made, steer, tell)
+        self._steer(call, abs(distance), ARRIVED_M, made, steer, send_feedback)
         return made()
 
-    def _spin(self, call: Call, angle: float, told: Callable[[float], dict[str, object]]) -> None:
+    def _turn_on_spot(self, call: Call, angle: float, told: Callable[[float], dict[str, object]]) -> None:
         last = [self.wheels.pose()[2]]
         turned = [0.0]
 
-        def made() -> float:
+        def turned_deg() -> float:
             now = self.wheels.pose()[2]
             turned[0] += (now - last[0] + 180.0) % 360.0 - 180.0
             last[0] = now
@@ -214,12 +218,12 @@ class DiffDrive:
 
         def steer(left: float) -> None:
             speed = min(TURN_SPEED, max(SLOWEST_TURN, math.sqrt(2 * TURN_SLOW_DOWN * left)))
-            self._go(call, 0.0, math.copysign(speed, angle))
+            self._set_speeds(call, 0.0, math.copysign(speed, angle))
 
-        def tell(done: float) -> None:
+        def send_feedback(done: float) -> None:
             call.feedback(**told(round(done, 1)))
 
-        self._steer(call, abs(angle), ARRIVED_DEG, made, steer, tell)
+        self._steer(call, abs(angle), ARRIVED_DEG, turned_deg, steer, send_feedback)
 
     def _steer(
         self,
@@ -236,19 +240,19 @@ class DiffDrive:
                 if steps and self.wheels.bumped() and self.wheels.still():
                     raise Failed(_("{action}: something is in the way").format(action=call.action))
                 steer(left)
-                if steps % FEEDBACK_STEPS == 0:
+                if steps % FEEDBACK_PERIOD_STEPS == 0:
                     tell(made())
                 steps += 1
-                call.wait(STEP_S)
+                call.wait(STEP_INTERVAL_S)
         finally:
             self._brake()
 
 
-def _left(amount: float, done: float) -> float:
+def _remaining(amount: float, done: float) -> float:
     return round(max(0.0, amount - done), 2)
 
 
-class Pattern(DiffDrive):
+class DiffDriveTemplate(DiffDrive):
     """Robot without a base, for the description only; drivers replace it by their own class."""
 
     def __init__(self, link: Link) -> None:
@@ -262,7 +266,7 @@ class Pattern(DiffDrive):
 DIFFDRIVE = Kind(
     model="diffdrive",
     title="Differential-drive robot with a camera",
-    body=Pattern,
+    body=DiffDriveTemplate,
     kinds=("mobile",),
     driver="python",
     description="Two wheels, a camera, a distance sensor and a bumper.",

@@ -8,9 +8,9 @@ import uuid
 from collections.abc import Callable, Mapping
 
 from nep.errors import NepError
-from nep.system.log_rarely import SurvivedErrors
+from nep.system.log_rarely import SuppressedErrors
 
-ALIVE_S = 0.2
+HEARTBEAT_INTERVAL_S = 0.2
 _log = logging.getLogger(__name__)
 
 Publish = Callable[[Mapping[str, object]], object]
@@ -31,9 +31,9 @@ class Heartbeat:
         self._changed = threading.Event()
         self._closing = False
         self._thread: threading.Thread | None = None
-        self._errors = SurvivedErrors(_log, thread)
+        self._errors = SuppressedErrors(_log, thread)
 
-    def beat(self, robot: str, publish: Publish) -> None:
+    def start(self, robot: str, publish: Publish) -> None:
         """Send heartbeats to a robot until `rest`; ``publish`` publishes on its command topic."""
         with self._lock:
             self._robots[robot] = publish
@@ -64,7 +64,7 @@ class Heartbeat:
             for publish in robots:
                 with self._errors:  # the other robots must still get theirs
                     self._publish(publish)
-            self._changed.wait(ALIVE_S if robots else None)
+            self._changed.wait(HEARTBEAT_INTERVAL_S if robots else None)
 
     def _publish(self, publish: Publish) -> None:
         alive = {"id": uuid.uuid4().hex, "op": "alive", "from": self._sender, "action": "", "input": {}}

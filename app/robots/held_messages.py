@@ -23,11 +23,11 @@ class HeldMessages:
     def __bool__(self) -> bool:
         return bool(self._messages)
 
-    def holds(self, publisher: int | None) -> bool:
+    def has_messages_of(self, publisher: int | None) -> bool:
         """Return True if messages of this publisher are stored."""
         return publisher in self._messages
 
-    def put(self, message: Message) -> None:
+    def add(self, message: Message) -> None:
         """Store a message."""
         held = self._messages.get(message.publisher)
         if held is None:

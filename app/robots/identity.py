@@ -18,18 +18,18 @@ from app.robots.description.model import Robot, RobotTopics
 from nep.i18n import _, lazy
 from nep.messages.message import Message
 from nep.programs.robots.moving import DESCRIPTION_TYPE as DESCRIPTION_TYPE
-from nep.programs.robots.moving import RIZE_COMMANDS, RobotControls
+from nep.programs.robots.moving import RIZE_COMMAND_TOPIC, RobotControls
 from nep.protocol.graph_view import GraphView
-from nep.text import bounded_str, harmless
+from nep.text import bounded_str, strip_controls
 
 GATEWAY = "gateway"
-SHARED = frozenset({RIZE_COMMANDS, "action_state"})
+SHARED_TOPICS = frozenset({RIZE_COMMAND_TOPIC, "action_state"})
 """Topics that all robots of RIZE share (`app.robots.rize`)."""
 MAX_SENDERS = 20_000
-WORDS_MOST = 200
-MAY_MOVE = lazy("{robot} may still move: {why}")
-ERROR_MOST = 1000
-_NATIVE = frozenset({"native", GATEWAY})
+MAX_STOP_ERROR_LENGTH = 200
+MAY_MOVE_MESSAGE = lazy("{robot} may still move: {why}")
+MAX_ERROR_LENGTH = 1000
+_NATIVE_GENERATIONS = frozenset({"native", GATEWAY})
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Identity:
     pid: int | None = None
 
     @property
-    def words(self) -> str:
+    def display_name(self) -> str:
         """Display name, such as "“rover driver” on lab-2"."""
         name = f"“{self.node or self.node_id}”"
         return _("{program} on {host}").format(program=name, host=self.host) if self.host else name
@@ -54,7 +54,7 @@ def identity_of(view: GraphView, node_id: str) -> Identity:
     return Identity(node_id) if node is None else Identity(node_id, node.name, node.host, node.pid)
 
 
-def publishing(view: GraphView, topic: str) -> tuple[str, ...]:
+def publisher_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
     """Return the ids of the nodes that publish a topic, in order of registration.
 
     Programs of the original NEP are represented by the gateway, whose node publishes their messages.
@@ -64,7 +64,7 @@ def publishing(view: GraphView, topic: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(id for id in found if _is_native(view, id)))
 
 
-def hearing(view: GraphView, topic: str) -> tuple[str, ...]:
+def subscriber_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
     """Return the ids of the nodes that subscribe to a topic.
 
     Programs of the original NEP are listed instead of their gateway.
@@ -77,16 +77,16 @@ def hearing(view: GraphView, topic: str) -> tuple[str, ...]:
 
 def _is_native(view: GraphView, node_id: str) -> bool:
     node = view.nodes.get(node_id)
-    return node is None or node.generation in _NATIVE
+    return node is None or node.generation in _NATIVE_GENERATIONS
 
 
-def first_to_announce(view: GraphView, topic: str) -> Identity | None:
+def first_announcer(view: GraphView, topic: str) -> Identity | None:
     """Return the node that first announced a robot on its description topic, or None."""
-    found = publishing(view, topic)
+    found = publisher_nodes(view, topic)
     return identity_of(view, found[0]) if found else None
 
 
-def wrong_topic(robot: Robot, topic: str) -> str | None:
+def description_topic_problem(robot: Robot, topic: str) -> str | None:
     """Return why a description is invalid on this topic, or None if it is valid.
 
     A robot may only be announced on ``/NAME/description`` with its own name; otherwise a program could
@@ -100,7 +100,7 @@ def wrong_topic(robot: Robot, topic: str) -> str | None:
     )
 
 
-def reserved(robot: Robot) -> tuple[str, ...]:
+def reserved_topics(robot: Robot) -> tuple[str, ...]:
     """Return the topics that move a robot or carry its replies. No other robot may use them."""
     topics = robot.topics
     return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
@@ -122,45 +122,45 @@ def program_of(key: str) -> str:
     return f"program-{hashlib.sha256(key.encode('utf-8', 'replace')).hexdigest()[:16]}"
 
 
-def is_home(robot_name: str, topic: str) -> bool:
+def is_own_topic(robot_name: str, topic: str) -> bool:
     """Return True if a topic belongs to a robot with this name: ``/NAME/...``."""
     return topic.startswith(topic_of(robot_name, ""))
 
 
-def said(error: object) -> str:
+def safe_error_text(error: object) -> str:
     """Return a robot's error as text that is safe to show, with limited length."""
-    return harmless(bounded_str(error or "", ERROR_MOST), lines=True)
+    return strip_controls(bounded_str(error or "", MAX_ERROR_LENGTH), lines=True)
 
 
-def said_of_stop(name: str, error: object) -> str:
+def stop_error_text(name: str, error: object) -> str:
     """Return the error of a failed stop in the robot's words: "Arm may still move: the brake is stuck"."""
     words = "".join(
         sign if sign.isprintable() else " "
-        for sign in bounded_str(error or _("the stop command failed"), ERROR_MOST)
+        for sign in bounded_str(error or _("the stop command failed"), MAX_ERROR_LENGTH)
     )
-    words = " ".join(words[:WORDS_MOST].split()).rstrip(".")
-    return words if may_move(name, words) else _(MAY_MOVE).format(robot=name, why=words)
+    words = " ".join(words[:MAX_STOP_ERROR_LENGTH].split()).rstrip(".")
+    return words if is_may_move_error(name, words) else _(MAY_MOVE_MESSAGE).format(robot=name, why=words)
 
 
-def may_move(name: str, words: str) -> bool:
+def is_may_move_error(name: str, words: str) -> bool:
     """Return True if an error says that the robot may still move, in the current language or in English."""
     return any(
         words.startswith(sentence.partition("{why}")[0].rstrip(": ").format(robot=name))
-        for sentence in (MAY_MOVE, _(MAY_MOVE))
+        for sentence in (MAY_MOVE_MESSAGE, _(MAY_MOVE_MESSAGE))
     )
 
 
-def foreign_topic(robot: Robot, others: Iterable[Robot]) -> str | None:
+def topic_conflict(robot: Robot, others: Iterable[Robot]) -> str | None:
     """Return why a robot can't use its topics, because they belong to another robot; None if it can.
 
     ``/NAME/...`` belongs to the robot with that name; other topics belong to the first robot that uses them.
     """
     known = [other for other in others if other.name != robot.name]
-    for topic in set(reserved(robot)) - SHARED:
-        if is_home(robot.name, topic):
+    for topic in set(reserved_topics(robot)) - SHARED_TOPICS:
+        if is_own_topic(robot.name, topic):
             continue
         for other in known:
-            if is_home(other.name, topic) or topic in reserved(other):
+            if is_own_topic(other.name, topic) or topic in reserved_topics(other):
                 return _("{robot} claims {topic}, which belongs to {other}").format(
                     robot=robot.name, topic=topic, other=other.name
                 )
@@ -178,7 +178,7 @@ class Senders:
         self._lock = threading.Lock()
         self._nodes: dict[int, str] = {}
 
-    def learn(self, view: GraphView, topics: Iterable[str]) -> None:
+    def update(self, view: GraphView, topics: Iterable[str]) -> None:
         """Add the publishers of these topics."""
         with self._lock:
             for topic in topics:
@@ -198,7 +198,7 @@ class Senders:
 class RobotProcesses(Protocol):
     """Access to the processes of robots."""
 
-    def is_ours(self, identity: Identity) -> bool:
+    def is_started_by_studio(self, identity: Identity) -> bool:
         """Return True if this program is a virtual robot started by Studio."""
 
     def has_ended(self, identity: Identity) -> bool:
@@ -208,7 +208,7 @@ class RobotProcesses(Protocol):
 class AllVirtual:
     """Accepts the claim of every robot to be virtual; for tests."""
 
-    def is_ours(self, identity: Identity) -> bool:  # noqa: ARG002
+    def is_started_by_studio(self, identity: Identity) -> bool:  # noqa: ARG002
         """Return True."""
         return True
 

@@ -33,10 +33,10 @@ from __future__ import annotations
 from app.robots.driver.call import Call, Canceled, Clock, Failed, Link, MonotonicClock
 from app.robots.driver.declare import Kind, action, detections, event, picture, safe_stop, sensor
 from app.robots.driver.driver import Driver
-from app.robots.driver.process import main, tell_briefly
+from app.robots.driver.process import install_exception_hook, main
 from app.robots.driver.schema import Advanced, Colour, Image, Range, Suggested, Text, Title, Words
 
-tell_briefly()
+install_exception_hook()
 
 __all__ = [
     "Advanced", "Call", "Canceled", "Clock", "Colour", "Driver", "Failed", "Image", "Kind", "Link",

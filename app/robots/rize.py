@@ -14,23 +14,23 @@ from functools import lru_cache
 from app import resources
 from app.errors import RobotInputError
 from app.robots.description.description import parse
-from app.robots.description.inputs import pretty_number
-from app.robots.description.json_access import as_part, names, part, text
+from app.robots.description.inputs import format_number
+from app.robots.description.json_access import as_object, names, object_member, text
 from app.robots.description.model import Robot
 from nep.i18n import _, lazy
-from nep.programs.robots.moving import RIZE_COMMANDS
+from nep.programs.robots.moving import RIZE_COMMAND_TOPIC
 from nep.text import bounded_str
 
-COMMANDS, ANSWERS, EVENTS = RIZE_COMMANDS, "action_state", "rize_event"
+COMMANDS, ANSWERS, EVENTS = RIZE_COMMAND_TOPIC, "action_state", "rize_event"
 _STATES = {"success": "succeeded", "failure": "failed"}
-_FAILED = lazy("{robot} could not {action}")
+_FAILED_MESSAGE = lazy("{robot} could not {action}")
 
 
 @lru_cache(maxsize=1)
 def thing_model() -> Mapping[str, object]:
     """Return the Thing Model of all robots of RIZE."""
     found = json.loads(resources.path("robots", "rize.tm.jsonld").read_text(encoding="utf-8"))
-    return as_part(found)
+    return as_object(found)
 
 
 def robot(name: str) -> Robot:
@@ -40,7 +40,7 @@ def robot(name: str) -> Robot:
 
 def ready(message: object) -> str | None:
     """Return the name of the robot if a message on ``rize_event`` announces one, else None."""
-    said = as_part(message)
+    said = as_object(message)
     return text(said.get("name")) if said.get("robot") == "ready" else None
 
 
@@ -77,7 +77,7 @@ def to_command(robot: Robot, action: str, given: Mapping[str, object], command_i
 
 
 def _primitive(robot: Robot, action: str, given: Mapping[str, object]) -> dict[str, object]:
-    hint = part(part(part(robot.source, "actions"), action), "rb:rize")
+    hint = object_member(object_member(object_member(robot.source, "actions"), action), "rb:rize")
     options = {name: given[name] for name in names(hint.get("options")) if name in given}
     return {
         "primitive": text(hint.get("primitive")) or action,
@@ -88,21 +88,21 @@ def _primitive(robot: Robot, action: str, given: Mapping[str, object]) -> dict[s
 
 def _as_text(value: object) -> str:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return pretty_number(value)
+        return format_number(value)
     return str(value)
 
 
-def from_answer(message: object) -> dict[str, object] | None:
+def from_reply(message: object) -> dict[str, object] | None:
     """Convert a message of ``action_state`` to the form of ``robot/answer``; None if it is not final."""
-    said = as_part(message)
+    said = as_object(message)
     state = _STATES.get(bounded_str(said.get("state")))
     wanted = text(said.get("id"))
     if state is None or wanted is None:
         return None
     primitives = said.get("primitives")
-    first = as_part(primitives[0] if isinstance(primitives, list) and primitives else primitives)
+    first = as_object(primitives[0] if isinstance(primitives, list) and primitives else primitives)
     action = bounded_str(first.get("primitive") or "")
-    error = _(_FAILED).format(
+    error = _(_FAILED_MESSAGE).format(
         robot=bounded_str(said.get("robots") or _("the robot")), action=action or _("perform it")
     )
     return {

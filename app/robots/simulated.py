@@ -13,13 +13,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Literal, TypeAlias
 
-from app.robots.description.json_access import number_of
+from app.robots.description.json_access import to_number
 from app.robots.driver.call import Call, Canceled, Failed
 from app.robots.driver.common_actions import drives, moves
 from app.robots.driver.declare import Kind, action, safe_stop
 from app.robots.driver.process import main as drive
 from app.robots.driver.schema import Colour, Range, Suggested, Text, Title, Words
-from app.robots.virtual.acting import FEEDBACK_S, Acting
+from app.robots.virtual.acting import FEEDBACK_INTERVAL_S, SimulatedActions
 from app.robots.virtual.body import START_PITCH
 from app.robots.virtual.room import Room
 from app.robots.virtual.sounds import SOUNDS, Notes, SoundName
@@ -39,23 +39,23 @@ Target: TypeAlias = Annotated[
 
 
 def _rize_turn(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
-    degrees = number_of(options.get("degrees"))
+    degrees = to_number(options.get("degrees"))
     return {"direction": given} | ({} if degrees is None else {"angle": degrees})
 
 
 def _rize_walk(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
-    metres = number_of(options.get("meters"))
+    metres = to_number(options.get("meters"))
     sign = {"forwards": 1.0, "backwards": -1.0}[given]
     return {"distance": sign * (0.5 if metres is None else metres)}
 
 
 def _rize_light(given: str, options: Mapping[str, object]) -> Mapping[str, object]:
-    parts = [number_of(options.get(name)) for name in "RGB"]
+    parts = [to_number(options.get(name)) for name in "RGB"]
     colour = "".join(f"{min(255, max(0, int(part or 0))):02x}" for part in parts)
     return {"where": "eyes" if given == "eyes" else "both", "colour": f"#{colour}"}
 
 
-class VirtualPepper(Acting):
+class VirtualPepper(SimulatedActions):
     """Virtual humanoid on wheels with head, arms, voice and lights."""
 
     # ---- speech -----------------------------------------------------------------------------------
@@ -85,14 +85,14 @@ class VirtualPepper(Acting):
             speech = body.speak(text)
         try:
             call.feedback(word=speech.word)
-            while not call.until(lambda: speech.done, for_s=FEEDBACK_S):
+            while not call.until(lambda: speech.done, for_s=FEEDBACK_INTERVAL_S):
                 call.feedback(word=speech.word)
         except Canceled:
             with self._simulation.changed:
                 if not speech.done:
-                    self._simulation.body.hush()
+                    self._simulation.body.stop_audio()
             raise
-        return {"seconds": round(speech.seconds, 2)}
+        return {"seconds": round(speech.duration_s, 2)}
 
     @action(
         "play sound %sound",
@@ -130,11 +130,11 @@ class VirtualPepper(Acting):
             body.volume = volume
             sound = body.play(title, notes)
 
-        def end() -> None:
+        def stop_sound() -> None:
             if not sound.done:
-                self._simulation.body.hush()
+                self._simulation.body.stop_audio()
 
-        self._until(call, lambda: sound.done, end)
+        self._wait_until(call, lambda: sound.done, stop_sound)
 
     # ---- movement ---------------------------------------------------------------------------------
 
@@ -155,7 +155,7 @@ class VirtualPepper(Acting):
     ) -> None:
         """Turn on the spot."""
         signed = angle if direction == "left" else -angle
-        self._roll(call, lambda body: body.turn(signed, speed))
+        self._run_motion(call, lambda body: body.turn(signed, speed))
 
     @drives(
         "walk %distance m",
@@ -172,8 +172,8 @@ class VirtualPepper(Acting):
         speed: Annotated[float, Range(0.05, 0.35, 0.05, "m/s")] = 0.3,
     ) -> None:
         """Walk straight ahead, or backwards if the distance is negative."""
-        motion = self._roll(call, lambda body: body.walk(distance, speed))
-        if motion.blocked:
+        motion = self._run_motion(call, lambda body: body.walk(distance, speed))
+        if motion.is_blocked:
             raise Failed(
                 _("walk: something is in the way after {metres} m").format(
                     metres=number(abs(motion.moved), ".2f")
@@ -184,7 +184,7 @@ class VirtualPepper(Acting):
     def look_at(self, call: Call, target: Target = "face") -> None:
         """Turn the head in a direction, or to the face or ball in the picture."""
         with self._simulation.changed:
-            yaw, pitch = self._direction_of(target)
+            yaw, pitch = self._head_angles_to(target)
         self._turn_head(call, yaw, pitch)
 
     @moves(
@@ -209,14 +209,16 @@ class VirtualPepper(Acting):
         """Wave one hand."""
         with self._simulation.changed:
             wave = self._simulation.body.wave(hand)
-        self._until(call, lambda: wave.done, wave.halt)
+        self._wait_until(call, lambda: wave.done, wave.halt)
 
     @moves("stand straight", "person-standing", "stands straight", "arms", "head", timeout_s=10)
     def stand(self, call: Call) -> None:
         """Lower the arms and look straight ahead."""
         with self._simulation.changed:
             self._simulation.body.stand()
-        self._until(call, lambda: self._simulation.body.joints_still, self._simulation.body.hold_joints)
+        self._wait_until(
+            call, lambda: self._simulation.body.are_joints_at_target, self._simulation.body.hold_joints
+        )
 
     # ---- face and lights --------------------------------------------------------------------------
 
@@ -276,7 +278,7 @@ class VirtualPepper(Acting):
         """Brake, hold the joints and be silent; returns when nothing moves any more."""
         with self._simulation.changed:
             self._simulation.body.halt()
-        if not self._simulation.wait_for(lambda: self._simulation.body.still, timeout_s=2.0):
+        if not self._simulation.wait_for(lambda: self._simulation.body.is_still, timeout_s=2.0):
             raise Failed(_("the virtual robot keeps moving"))
 
 
@@ -291,13 +293,13 @@ ROBOT = Kind(
 )
 
 
-def room_of(seed: int | None) -> Room:
+def create_room(seed: int | None) -> Room:
     """Return the default room; with a seed, ball and person are at random but reproducible places."""
     if seed is None:
         return Room()
     places = random.Random(seed)  # noqa: S311 - furniture, not secrets
-    room = Room().moved("ball", places.uniform(1.2, 2.6), places.uniform(-1.4, -0.5))
-    return room.moved("person", places.uniform(0.8, 1.6), places.uniform(-0.3, 0.6))
+    room = Room().with_moved("ball", places.uniform(1.2, 2.6), places.uniform(-1.4, -0.5))
+    return room.with_moved("person", places.uniform(0.8, 1.6), places.uniform(-0.3, 0.6))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -305,7 +307,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seed", type=int, default=None)
     chosen, others = parser.parse_known_args(arguments)
-    body = type("VirtualPepper", (VirtualPepper,), {"start_room": room_of(chosen.seed)})
+    body = type("VirtualPepper", (VirtualPepper,), {"start_room": create_room(chosen.seed)})
     return drive(replace(ROBOT, body=body), others)
 
 

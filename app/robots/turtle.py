@@ -13,15 +13,15 @@ from dataclasses import replace
 
 import cv2
 
-from app.robots.description.json_access import finite
+from app.robots.description.json_access import finite_float
 from app.robots.diffdrive import DIFFDRIVE, DiffDrive
 from app.robots.driver.call import Clock, Link, MonotonicClock
 from app.robots.driver.process import main as drive
 from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens
-from app.robots.virtual.room import Other
+from app.robots.virtual.room import OtherRobot
 from app.robots.virtual.shared_room import SharedRoom
-from app.robots.virtual.simulation import ITSELF, Beat, may_happen, surroundings, told_event
+from app.robots.virtual.simulation import ROBOT_ITSELF, Ticker, is_valid_event, parse_event, room_state
 from app.robots.virtual.vision import colours_in
 from app.robots.virtual.wheels import HEIGHT, RADIUS, WheelBody
 
@@ -43,14 +43,14 @@ class VirtualWheels:
         self._ended = threading.Event()
         self._camera = Camera(self.body.room)
         self._seen: set[str] = set()
-        like = Other(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
+        like = OtherRobot(link.name, 0.0, 0.0, 0.0, RADIUS, HEIGHT, "turtle")
         self._shared = SharedRoom(link, clock, self.body, self._lock, like)
         self._stepped_s = clock.now()
         self._threads = [
             threading.Thread(target=self._run_body, name=f"{link.name} wheels", daemon=True),
             threading.Thread(target=self._run_camera, name=f"{link.name} camera", daemon=True),
         ]
-        link.on_world(self.act)
+        link.on_world(self.apply_change)
 
     def start(self) -> None:
         """Start both threads."""
@@ -70,20 +70,20 @@ class VirtualWheels:
         with self._lock:
             return self.body.x, self.body.y, self.body.theta_deg
 
-    def driven(self) -> float:
+    def driven_m(self) -> float:
         """Return the metres rolled so far; being carried by the user doesn't count."""
         with self._lock:
-            return self.body.driven
+            return self.body.driven_m
 
     def still(self) -> bool:
         """Return True if the base is not moving."""
         with self._lock:
             self._advance_locked()  # don't wait for the next step of the body thread
-            return self.body.still
+            return self.body.is_still
 
     def bumped(self) -> str:
         """Return the side at which the base touches something, or ""."""
-        return self.body.bumped
+        return self.body.pressed_bumper
 
     def light(self, colour: str) -> None:
         """Set the colour of the light."""
@@ -102,12 +102,12 @@ class VirtualWheels:
     def _run_body(self) -> None:
         with self._lock:
             self._stepped_s = self._clock.now()
-        for step, _ in enumerate(Beat(self._clock, self._ended, 1 / BODY_HZ)):
+        for step, _ in enumerate(Ticker(self._clock, self._ended, 1 / BODY_HZ)):
             with self._lock:
                 self._advance_locked()
-                happenings = list(self.body.happenings)
-                self.body.happenings.clear()
-                state, distance = self._drawable(), self.body.distance
+                happenings = list(self.body.events)
+                self.body.events.clear()
+                state, distance = self._drawing_state(), self.body.distance
             for happening in happenings:
                 self._link.happen(happening.event, **happening.data)
             if step % _STATE_PERIOD_STEPS == 0:
@@ -123,12 +123,12 @@ class VirtualWheels:
     def _advance_locked(self) -> None:
         # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
-        self._shared.take_over()
+        self._shared.update_body()
         self.body.step(min(max(0.0, now - self._stepped_s), _MAX_STEP_S))
-        self._shared.follow()
+        self._shared.update_map()
         self._stepped_s = now
 
-    def _drawable(self) -> dict[str, object]:
+    def _drawing_state(self) -> dict[str, object]:
         body = self.body
         return {
             "figure": "turtle",
@@ -136,15 +136,15 @@ class VirtualWheels:
             "y": round(body.y, 3),
             "theta_deg": round(body.theta_deg, 1),
             "eyes": body.light,
-            "moving": not body.still,
-            "bumped": body.bumped,
+            "moving": not body.is_still,
+            "bumped": body.pressed_bumper,
             "radius": RADIUS,
-            "held": body.held,
-            **surroundings(body.room),
+            "held": body.is_lifted,
+            **room_state(body.room),
         }
 
     def _run_camera(self) -> None:
-        for count, _ in enumerate(Beat(self._clock, self._ended, 1 / CAMERA_HZ)):
+        for count, _ in enumerate(Ticker(self._clock, self._ended, 1 / CAMERA_HZ)):
             is_watched = self._link.watchers("camera") > 0
             if not is_watched and count % 3:
                 continue
@@ -159,25 +159,25 @@ class VirtualWheels:
                 self._link.happen("colour", name=name, x=found[name].x, area=found[name].area)
             self._seen = set(found)
 
-    def act(self, change: Mapping[str, object]) -> None:
+    def apply_change(self, change: Mapping[str, object]) -> None:
         """Apply a change of the world by the user: move, hold, reset, start, or a simulated event."""
-        moved, x, y = change.get("move"), finite(change.get("x")), finite(change.get("y"))
+        moved, x, y = change.get("move"), finite_float(change.get("x")), finite_float(change.get("y"))
         with self._lock:
             if isinstance(change.get("hold"), bool):
-                self.body.hold(held=change["hold"] is True)
+                self.body.set_lifted(held=change["hold"] is True)
             if isinstance(moved, str) and x is not None and y is not None:
-                if moved == ITSELF:
+                if moved == ROBOT_ITSELF:
                     self.body.carry(x, y)
                 else:
                     self._shared.move(moved, x, y)
             if change.get("reset") is True:
-                self.body.reset(self._shared.put_back())
+                self.body.reset(self._shared.restore_start())
             if "start" in change:
-                self._shared.to_start(change["start"])
+                self._shared.return_to_start(change["start"])
         if isinstance(change.get("happen"), str):
-            event, given = told_event(change)
+            event, given = parse_event(change)
             data = {**({"x": 0.0, "area": 0.1} if event == "colour" else {}), **given}
-            if not may_happen(self._link, event, data):
+            if not is_valid_event(self._link, event, data):
                 return
             if event == "bump":
                 with self._lock:
@@ -197,8 +197,8 @@ class VirtualTurtle(DiffDrive):
 
     def odometer(self) -> Callable[[], float]:
         """Return a function that returns the metres rolled since now; being carried doesn't count."""
-        began = self._wheels.driven()
-        return lambda: self._wheels.driven() - began
+        began = self._wheels.driven_m()
+        return lambda: self._wheels.driven_m() - began
 
 
 ROBOT = replace(

@@ -20,11 +20,11 @@ from PySide6.QtWidgets import QApplication
 
 from app import resources
 from app.core.alerts import Alerts
-from app.core.documents.journal import left_behind, of_newer
-from app.core.documents.versions import bring_here
+from app.core.documents.journal import newer_work_names, unsaved_work
+from app.core.documents.versions import move_old_versions
 from app.core.reports import studio_versions
-from app.core.reports.crash_reports import CrashLog, CrashReports, offer
-from app.core.reports.not_installed import missing_libraries, tell_missing
+from app.core.reports.crash_reports import CrashLog, CrashReports, show_crash_alert
+from app.core.reports.not_installed import alert_missing, missing_libraries
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.file_lock import FileLock
@@ -34,7 +34,7 @@ from app.ui.self_drive import SelfDrive
 from app.ui.shell.bars.logo import LogoEngine
 from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
-from app.ui.shell.window_state import WindowState, fitting
+from app.ui.shell.window_state import WindowState, initial_size
 from app.ui.speaker import QtSpeaker
 from app.ui.startup import graphics, interpreter, portal, qt_log, sandbox, single_instance
 from app.ui.startup.deferred import DeferredSteps
@@ -42,14 +42,14 @@ from app.ui.startup.file_open import Application, IncomingFiles
 from app.ui.startup.single_instance import StartRequest
 from app.ui.theme import fonts
 from app.ui.theme.theme import MODES, Theme
-from nep.i18n import ENGLISH, _, language, listed
+from nep.i18n import ENGLISH, _, format_list, language
 
 LOG_INTERVAL_MS = 500
 RESTART = -1
 """Result of `run` when the user requested a restart."""
 FIRST_START_KEY = "begun"  # key of the setting that marks the first start as done
 WEB_VIEW = "app.ui.blockly.view"
-SOON = (
+PRELOADED_MODULES = (
     "app.ui.shell.dialogs.command_palette",
     "app.ui.shell.dialogs.settings",
     "app.ui.shell.dialogs.shortcuts",
@@ -68,15 +68,15 @@ class Options:
     theme: str | None = None
     self_drive: Path | None = None
     new_window: bool = False
-    drive: Callable[[MainWindow], SelfDrive] | None = None
+    make_driver: Callable[[MainWindow], SelfDrive] | None = None
     """Creates a driver of the window, used from before it is shown until it closes."""
     web: bool = True
     """Load the block editor's web page; False avoids loading the web engine."""
 
     @property
-    def alone(self) -> bool:
+    def is_standalone(self) -> bool:
         """True if the window neither receives start requests of other processes nor saves its tabs."""
-        return self.new_window or self.self_drive is not None or self.drive is not None
+        return self.new_window or self.self_drive is not None or self.make_driver is not None
 
 
 def make_application() -> QApplication:
@@ -85,7 +85,7 @@ def make_application() -> QApplication:
     if isinstance(existing, QApplication):
         return existing
     interpreter.shorten_switch_interval()
-    graphics.draw_by_software(os.environ, sys.platform)
+    graphics.use_software_renderer(os.environ, sys.platform)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_ShareOpenGLContexts)
     QCoreApplication.setAttribute(Qt.ApplicationAttribute.AA_DontShowIconsInMenus)
     application = Application(sys.argv[:1])
@@ -112,15 +112,15 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
     return translator
 
 
-def steps_after(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
+def deferred_steps(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
     """Return the startup steps for the time after the first paint.
 
     They create panels, import modules and load the block editor.
     """
     panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
-    modules = (partial(importlib.import_module, name) for name in SOON)
+    modules = (partial(importlib.import_module, name) for name in PRELOADED_MODULES)
     view = (partial(import_web_view, window.session.alerts),) if web else ()
-    return [*panels, *modules, *view, *window.steps_ahead()]
+    return [*panels, *modules, *view, *window.preload_steps()]
 
 
 def import_web_view(alerts: Alerts) -> None:
@@ -131,7 +131,7 @@ def import_web_view(alerts: Alerts) -> None:
         missing = missing_libraries(error)
         if missing is None:
             raise
-        tell_missing(alerts, missing)
+        alert_missing(alerts, missing)
         sys.stderr.write(f"nep-studio: {missing.title} {missing.remedy}\n")
 
 
@@ -145,51 +145,51 @@ def make_window(session: Session, options: Options) -> MainWindow:
         theme.set_mode(chosen)
     window = MainWindow(session, theme, PanelRegistry(), read_examples(resources.folder() / "examples"))
     window.setWindowIcon(QIcon(LogoEngine(theme)))
-    if not window.state.place(window):
-        window.resize(fitting(window.size(), window.screen().availableSize()))
-    if not options.alone:
-        window.commands.behaviours.come_back(left_behind(), window.banner.offer)
-        tell_of_what_was_found(session)
+    if not window.state.restore_geometry(window):
+        window.resize(initial_size(window.size(), window.screen().availableSize()))
+    if not options.is_standalone:
+        window.commands.behaviours.restore_tabs(unsaved_work(), window.banner.offer)
+        raise_startup_alerts(session)
     return window
 
 
-def tell_of_what_was_found(session: Session) -> None:
+def raise_startup_alerts(session: Session) -> None:
     """Raise alerts for stored files that can't be used: settings, and unsaved work of a newer version."""
     if session.settings.notice:
-        session.alerts.put("settings:notice", "warn", session.settings.notice)
-    names = of_newer()
+        session.alerts.raise_alert("settings:notice", "warn", session.settings.notice)
+    names = newer_work_names()
     if names:
-        session.alerts.put(
+        session.alerts.raise_alert(
             "journal:newer",
             "warn",
             _("A newer version of NEP Studio has unsaved work here: {names}.").format(
-                names=listed([f"“{name}”" for name in names])
+                names=format_list([f"“{name}”" for name in names])
             ),
             _("Start that version to restore it."),
         )
 
 
-def tell_of_crashes(session: Session, this_run: StudioRun) -> None:
+def report_crashes(session: Session, this_run: StudioRun) -> None:
     """Log earlier runs that crashed. Offer a problem report once for those since the last start."""
     reports = CrashReports()
     for crash in this_run.left():
         reports.add(crash)
-    offer(session.alerts, reports)
+    show_crash_alert(session.alerts, reports)
 
 
-def keep_version(window: MainWindow, now_s: float) -> None:
+def save_version(window: MainWindow, now_s: float) -> None:
     """Save a changed version in the settings, where problem reports read it."""
     settings = window.session.settings
-    kept = studio_versions.with_this_version(settings.all(), now_s, is_first=settings.are_new)
+    kept = studio_versions.add_this_version(settings.all(), now_s, is_first=settings.are_new)
     if kept is not None:
-        window.state.keep(studio_versions.KEY, kept)
+        window.state.save(studio_versions.KEY, kept)
 
 
-def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
+def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
     """Close the window on SIGINT, SIGTERM and SIGHUP."""
 
     def close(_number: int, _frame: FrameType | None) -> None:
-        this_run.expect_end()
+        this_run.expect_exit()
         QTimer.singleShot(0, window.close)
 
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
@@ -200,26 +200,26 @@ def close_when_asked(window: MainWindow, this_run: StudioRun) -> None:
     application = QApplication.instance()
     if isinstance(application, QApplication):
         application.commitDataRequest.connect(
-            lambda _manager: this_run.expect_end(), Qt.ConnectionType.DirectConnection
+            lambda _manager: this_run.expect_exit(), Qt.ConnectionType.DirectConnection
         )
 
 
-def open_asked(window: MainWindow, asked: StartRequest) -> None:
+def handle_start_request(window: MainWindow, asked: StartRequest) -> None:
     """Execute a start request of this process or of one that was started later."""
     if asked.files:
         window.commands.files.open_all(asked.files)
     elif asked.demo:
-        window.commands.behaviours.demo()
+        window.commands.behaviours.start_demo()
     if window.isVisible():
         window.setWindowState(window.windowState() & ~Qt.WindowState.WindowMinimized)
         window.raise_()
         window.activateWindow()
 
 
-def layout_left(window: MainWindow) -> str:
+def last_layout(window: MainWindow) -> str:
     """Return the name of the last layout, or "" for the start page if that layout has no content."""
     last = window.state.layout
-    there = {"developer": True, "behaviour": any(not each.blank for each in window.session.documents)}
+    there = {"developer": True, "behaviour": any(not each.is_blank for each in window.session.documents)}
     return last if there.get(last, False) else ""
 
 
@@ -231,38 +231,38 @@ def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
     """
     if not window.session.settings.are_new:
         return
-    window.state.keep(FIRST_START_KEY, True)
-    if not asked and not window.banner.offers and all(each.blank for each in window.session.documents):
+    window.state.save(FIRST_START_KEY, True)
+    if not asked and not window.banner.has_offer and all(each.is_blank for each in window.session.documents):
         window.start.offer_first_steps()
         window.start.focus_first()
 
 
-def first_steps(window: MainWindow, options: Options) -> list[Callable[[], object]]:
+def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], object]]:
     """Show the first page and return the steps that complete it after the first paint."""
-    left = "" if options.alone else layout_left(window)
+    left = "" if options.is_standalone else last_layout(window)
     asked = bool(options.files or options.demo)
     if options.self_drive is not None:
-        window.begin()
+        window.start_session()
         # The self-drive starts the demonstration itself.
-        open_asked(window, StartRequest(options.files, demo=False))
+        handle_start_request(window, StartRequest(options.files, demo=False))
         return []
     offer_first_steps(window, asked=asked)
     if not asked and not left:
-        return [window.begin]
+        return [window.start_session]
 
     def show() -> None:
         if asked:
-            open_asked(window, StartRequest(options.files, options.demo))
+            handle_start_request(window, StartRequest(options.files, options.demo))
         else:
             window.commands.view.show_layout(left)
         if window.bench is None:  # the file can't be opened, which an alert explains
             window.show_start()
 
-    window.expect("behaviour" if asked else left)
-    return [window.begin, show]
+    window.show_placeholder("behaviour" if asked else left)
+    return [window.start_session, show]
 
 
-def why_not(environ: Mapping[str, str], platform: str, user: int) -> str:
+def startup_problem(environ: Mapping[str, str], platform: str, user: int) -> str:
     """Return the reason why no window can be opened, with the remedy; "" if one can.
 
     Args:
@@ -291,20 +291,20 @@ def run(options: Options) -> int:
     Returns:
         Exit code 0, 2 if no window can be opened, or `RESTART`.
     """
-    bring_here()
-    meeting_place = single_instance.place(home())
+    move_old_versions()
+    meeting_place = single_instance.socket_name(home())
     turn = FileLock(home() / "starting")
-    if not options.alone and single_instance.found(
+    if not options.is_standalone and single_instance.pass_to_running(
         meeting_place, StartRequest(options.files, options.demo), turn
     ):
         return 0
-    refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
+    refused = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:
         sys.stderr.write(f"nep-studio: {refused}\n")
         return 2
-    log = qt_log.listen()
+    log = qt_log.install_handlers()
     qt_log.quiet_chromium(os.environ)
-    trial = sandbox.begin_trial(os.environ, sys.platform)
+    trial = sandbox.start_trial(os.environ, sys.platform)
     portal.use_portal(os.environ, sys.platform)
     logging.getLogger().addHandler(CrashLog(CrashReports()))
     application = make_application()
@@ -315,7 +315,7 @@ def run(options: Options) -> int:
 def _show(
     application: QApplication,
     options: Options,
-    log: qt_log.Log,
+    log: qt_log.ConsoleHandler,
     this_run: StudioRun,
     single: tuple[str, FileLock],
     trial: sandbox.SandboxTrial | None,
@@ -325,34 +325,36 @@ def _show(
     window = make_window(session, options)
     application.setQuitOnLastWindowClosed(False)
     window.on_shut = lambda: QTimer.singleShot(0, application.quit)
-    window.can_restart = not options.alone  # other windows don't restore their tabs
-    close_when_asked(window, this_run)
+    window.can_restart = not options.is_standalone  # other windows don't restore their tabs
+    close_on_signals(window, this_run)
     hearing = QTimer(window)
     hearing.timeout.connect(lambda: log.drain(session.console.add))
     hearing.start(LOG_INTERVAL_MS)
     speaker = session.voices.speaker = QtSpeaker()
-    soon = DeferredSteps(window, steps_after(window, web=options.web))
-    driver = options.drive(window) if options.drive is not None else None
+    soon = DeferredSteps(window, deferred_steps(window, web=options.web))
+    driver = options.make_driver(window) if options.make_driver is not None else None
     window.show()
     window.activateWindow()  # without a window manager the window would get no focus
-    first = first_steps(window, options)
+    first = show_first_page(window, options)
     if options.self_drive is None:
-        first.append(partial(tell_of_crashes, session, this_run))
-    if not options.alone:
+        first.append(partial(report_crashes, session, this_run))
+    if not options.is_standalone:
         meeting_place, turn = single
-        first.append(partial(keep_version, window, time.time()))
+        first.append(partial(save_version, window, time.time()))
         first.append(
-            lambda: single_instance.SingleInstanceServer(meeting_place, partial(open_asked, window), window)
+            lambda: single_instance.SingleInstanceServer(
+                meeting_place, partial(handle_start_request, window), window
+            )
         )
         first.append(turn.release)
         first.append(partial(session.last_robots.start, session.launcher))
-    soon.put_first(first)
+    soon.prepend(first)
     IncomingFiles(window, window.commands.files.open_all)
     if isinstance(application, Application):
         application.open_files_with(window.commands.files.open_all)
     if driver is None and options.self_drive is not None:
         driver = SelfDrive(window, options.self_drive)
-    sandbox.fit_sandbox(os.environ, trial)  # requires the event loop, which creates the page
+    sandbox.configure_sandbox(os.environ, trial)  # requires the event loop, which creates the page
     code = application.exec()
     speaker.close()
     if driver is not None and not driver.well:

@@ -10,13 +10,13 @@ from contextlib import contextmanager
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
 
-_LIBRARIES = "LD_LIBRARY_PATH"
-_ORIGINAL = f"{_LIBRARIES}_ORIG"
-_FREEZERS = "_PYI_"
+_LIBRARY_PATH = "LD_LIBRARY_PATH"
+_ORIGINAL_LIBRARY_PATH = f"{_LIBRARY_PATH}_ORIG"
+_FREEZER_PREFIX = "_PYI_"
 
 
 @contextmanager
-def outside(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[None]:
+def original_environment(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[None]:
     """Temporarily restore the environment that was in place before the frozen Studio changed it.
 
     The loader of a frozen Studio sets the library path to its bundled libraries. Another program that
@@ -25,21 +25,21 @@ def outside(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[N
     kept = {
         name: value
         for name, value in environ.items()
-        if is_frozen and (name in {_LIBRARIES, _ORIGINAL} or name.startswith(_FREEZERS))
+        if is_frozen and (name in {_LIBRARY_PATH, _ORIGINAL_LIBRARY_PATH} or name.startswith(_FREEZER_PREFIX))
     }
     for name in kept:
         del environ[name]
-    if _ORIGINAL in kept:
-        environ[_LIBRARIES] = kept[_ORIGINAL]
+    if _ORIGINAL_LIBRARY_PATH in kept:
+        environ[_LIBRARY_PATH] = kept[_ORIGINAL_LIBRARY_PATH]
     try:
         yield
     finally:
         if kept:
-            environ.pop(_LIBRARIES, None)
+            environ.pop(_LIBRARY_PATH, None)
             environ.update(kept)
 
 
-def open_outside(url: QUrl) -> bool:
+def open_externally(url: QUrl) -> bool:
     """Open a folder or web page in the system's default program; return False on failure."""
-    with outside(os.environ, is_frozen=bool(getattr(sys, "frozen", False))):
+    with original_environment(os.environ, is_frozen=bool(getattr(sys, "frozen", False))):
         return QDesktopServices.openUrl(url)

@@ -16,8 +16,8 @@ from types import FunctionType
 from PySide6.QtCore import QModelIndex, QObject, QRectF, QSize, Qt
 from PySide6.QtGui import QPixmap
 
-NOTHING: Callable[[], object] = type(None)
-ANSWERS: dict[str, Callable[[], object]] = {
+RETURN_NONE: Callable[[], object] = type(None)
+NEUTRAL_RESULTS: dict[str, Callable[[], object]] = {
     "event": bool,
     "eventFilter": bool,
     "viewportEvent": bool,
@@ -28,43 +28,43 @@ ANSWERS: dict[str, Callable[[], object]] = {
     "minimumSizeHint": QSize,
     "heightForWidth": lambda: -1,
     "hasHeightForWidth": bool,
-    "showPopup": NOTHING,
-    "scrollContentsBy": NOTHING,
-    "highlightBlock": NOTHING,
+    "showPopup": RETURN_NONE,
+    "scrollContentsBy": RETURN_NONE,
+    "highlightBlock": RETURN_NONE,
     # block editor page; the override of interceptRequest itself blocks requests it can't judge
     "acceptNavigationRequest": bool,
-    "javaScriptConsoleMessage": NOTHING,
-    "interceptRequest": NOTHING,
-    "requestStarted": NOTHING,
+    "javaScriptConsoleMessage": RETURN_NONE,
+    "interceptRequest": RETURN_NONE,
+    "requestStarted": RETURN_NONE,
     # texts; a failed image is empty
-    "loadResource": NOTHING,
+    "loadResource": RETURN_NONE,
     # delegates and views
-    "paint": NOTHING,
+    "paint": RETURN_NONE,
     "pixmap": QPixmap,
     "scaledPixmap": QPixmap,
-    "paintSection": NOTHING,
+    "paintSection": RETURN_NONE,
     "boundingRect": QRectF,
-    "drawRow": NOTHING,
-    "drawBranches": NOTHING,
-    "dataChanged": NOTHING,
-    "addItem": NOTHING,
+    "drawRow": RETURN_NONE,
+    "drawBranches": RETURN_NONE,
+    "dataChanged": RETURN_NONE,
+    "addItem": RETURN_NONE,
     "count": int,
-    "itemAt": NOTHING,
-    "takeAt": NOTHING,
+    "itemAt": RETURN_NONE,
+    "takeAt": RETURN_NONE,
     "minimumSize": QSize,
-    "setGeometry": NOTHING,
+    "setGeometry": RETURN_NONE,
     "expandingDirections": lambda: Qt.Orientation(0),
     "rowCount": int,
     "columnCount": int,
-    "data": NOTHING,
-    "headerData": NOTHING,
+    "data": RETURN_NONE,
+    "headerData": RETURN_NONE,
     "setData": bool,
     "index": QModelIndex,
     "parent": QModelIndex,
     "flags": lambda: Qt.ItemFlag.NoItemFlags,
     "hasChildren": bool,
     "canFetchMore": bool,
-    "fetchMore": NOTHING,
+    "fetchMore": RETURN_NONE,
 }
 """Factories of the neutral return value of a failed override, by method name.
 
@@ -75,17 +75,17 @@ Event handlers (``...Event``) return None.
 def guard(cls: type) -> type:
     """Guard the overrides defined in a class, in place, and return the class."""
     for name, made in list(vars(cls).items()):
-        answer = ANSWERS.get(name, NOTHING if name.endswith("Event") else None)
-        if answer is not None and isinstance(made, FunctionType) and _is_of_qt(cls, name):
-            setattr(cls, name, guarded(made, answer))
+        answer = NEUTRAL_RESULTS.get(name, RETURN_NONE if name.endswith("Event") else None)
+        if answer is not None and isinstance(made, FunctionType) and _is_qt_override(cls, name):
+            setattr(cls, name, guard_function(made, answer))
     return cls
 
 
-def _is_of_qt(cls: type, name: str) -> bool:
+def _is_qt_override(cls: type, name: str) -> bool:
     return any(name in vars(base) for base in cls.__mro__ if base.__module__.startswith("PySide6."))
 
 
-def guarded(made: Callable[..., object], answer: Callable[[], object]) -> Callable[..., object]:
+def guard_function(made: Callable[..., object], answer: Callable[[], object]) -> Callable[..., object]:
     """Return a wrapper that reports exceptions of a function and then returns ``answer()``."""
 
     @functools.wraps(made)
@@ -103,8 +103,8 @@ def guarded(made: Callable[..., object], answer: Callable[[], object]) -> Callab
 def guard_all() -> None:
     """Guard all QObject subclasses defined after this call, including those of plug-ins."""
 
-    def begin(cls: type, /, **more: object) -> None:
+    def init_subclass(cls: type, /, **more: object) -> None:
         super(QObject, cls).__init_subclass__(**more)  # type: ignore[misc]  # cls is below QObject
         guard(cls)
 
-    QObject.__init_subclass__ = classmethod(begin)  # type: ignore[assignment, method-assign]  # ADR 0018
+    QObject.__init_subclass__ = classmethod(init_subclass)  # type: ignore[assignment, method-assign]  # ADR 0018

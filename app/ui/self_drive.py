@@ -38,43 +38,43 @@ class Step:
         name: Name of the step in the report.
     """
 
-    what: str
-    do: Callable[[], object]
-    seen: Callable[[], bool]
+    expected: str
+    action: Callable[[], object]
+    is_visible: Callable[[], bool]
     within_s: float = 20.0
     picture: str = ""
     settle_s: float = SETTLE_S
-    wrong: Callable[[], str] = lambda: ""
-    said: Callable[[], str] = lambda: ""
+    failure_reason: Callable[[], str] = lambda: ""
+    details: Callable[[], str] = lambda: ""
     name: str = ""
 
 
 class Listener(Protocol):
     """Receiver of the progress of the steps."""
 
-    def begun(self, step: Step) -> None:
+    def step_started(self, step: Step) -> None:
         """Called when a step has started."""
 
-    def seen(self, step: Step) -> None:
+    def step_finished(self, step: Step) -> None:
         """Called when the result of a step is visible and its screenshot is saved."""
 
-    def ended(self, well: bool, words: str) -> None:
+    def run_finished(self, well: bool, words: str) -> None:
         """Called at the end, before the window closes.
 
         ``well`` is True if all steps succeeded; otherwise ``words`` describe the failure.
         """
 
 
-class SaysEnd:
+class ResultPrinter:
     """Listener that prints the result of the run."""
 
-    def begun(self, step: Step) -> None:
+    def step_started(self, step: Step) -> None:
         """Print nothing for single steps."""
 
-    def seen(self, step: Step) -> None:
+    def step_finished(self, step: Step) -> None:
         """Print nothing for single steps."""
 
-    def ended(self, well: bool, words: str) -> None:
+    def run_finished(self, well: bool, words: str) -> None:
         """Print the result to stdout, or a failure to stderr."""
         (sys.stdout if well else sys.stderr).write(words + "\n")
 
@@ -94,7 +94,7 @@ class SelfDrive(QObject):
         # of a failed step.
         super().__init__(window)
         self._window, self._commands, self._folder = window, window.commands, folder
-        self._listener = listener if listener is not None else SaysEnd()
+        self._listener = listener if listener is not None else ResultPrinter()
         self._failed_picture = failed_picture
         self.well = False
         self.pictures: list[Path] = []
@@ -107,46 +107,48 @@ class SelfDrive(QObject):
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._check)
-        self._next()
+        self._start_next_step()
         self._timer.start()
 
     def _plan(self) -> list[Step]:
         window, session = self._window, self._window.session
         run = self._commands.run
 
-        def robot_there() -> bool:
+        def has_robot() -> bool:
             return any(link.state in {"ready", "busy"} for link in session.fleet.links)
 
         def state(*names: str) -> Callable[[], bool]:
             return lambda: session.runs.view().state in names
 
-        def glows() -> bool:
+        def is_block_highlighted() -> bool:
             return session.runs.view().state == "running" and bool(session.runs.running_blocks)
 
-        def inspected() -> bool:
-            return any(topic.watched and topic.newest is not None for topic in session.topics)
+        def has_inspected_topic() -> bool:
+            return any(topic.is_watched and topic.newest is not None for topic in session.topics)
 
         return [
-            Step("the start page", self._first, window.isVisible, picture="start-light"),
+            Step("the start page", self._show_start_page, window.isVisible, picture="start-light"),
             Step("its dark colours", lambda: run("theme.dark"), window.isVisible, picture="start-dark"),
-            Step("the virtual robot", self._begin, robot_there, 40, settle_s=2.5),
-            Step("the program runs", lambda: run("run.run"), glows, 30, "behaviour-light", 1.5),
+            Step("the virtual robot", self._start_demo, has_robot, 40, settle_s=2.5),
+            Step(
+                "the program runs", lambda: run("run.run"), is_block_highlighted, 30, "behaviour-light", 1.5
+            ),
             Step("dark while it runs", lambda: run("theme.dark"), lambda: True, 5, "behaviour-dark"),
             Step("every robot stopped", lambda: run("run.stop"), state("proven"), 5, "stopped-dark"),
             Step("the topics", lambda: run("layout.developer"), self._has_topics, 20),
-            Step("a message", self._inspect, inspected, 20, "developer-dark", 2.5),
+            Step("a message", self._inspect, has_inspected_topic, 20, "developer-dark", 2.5),
             Step("light again", lambda: run("theme.light"), lambda: True, 5, "developer-light"),
             Step("the stopped program", lambda: run("layout.behaviour"), lambda: True, 5, "stopped-light"),
             Step("its actions", lambda: run("panel:robots"), lambda: True, 5, "robots-light"),
         ]
 
-    def _first(self) -> None:
+    def _show_start_page(self) -> None:
         self._commands.run("theme.light")
         self._window.show_start()
 
-    def _begin(self) -> None:
+    def _start_demo(self) -> None:
         self._commands.run("theme.light")
-        self._commands.behaviours.demo()
+        self._commands.behaviours.start_demo()
 
     def _has_topics(self) -> bool:
         return len(self._window.session.topics) > 3
@@ -160,18 +162,18 @@ class SelfDrive(QObject):
         if poses:
             self._commands.run(f"inspect:{poses[0]}")
 
-    def _next(self) -> None:
+    def _start_next_step(self) -> None:
         self._step = next(self._steps, None)
         self._seen_at = None
         self._began = time.monotonic()
         if self._step is None:
-            self._end(True, f"the main job was done; {len(self.pictures)} pictures are in {self._folder}")
+            self._finish(True, f"the main job was done; {len(self.pictures)} pictures are in {self._folder}")
             return
-        self._listener.begun(self._step)
+        self._listener.step_started(self._step)
         try:
-            self._step.do()
+            self._step.action()
         except Exception as error:
-            self._miss(self._step, f"{type(error).__name__}: {error}")
+            self._fail(self._step, f"{type(error).__name__}: {error}")
             raise
 
     def _check(self) -> None:
@@ -179,32 +181,34 @@ class SelfDrive(QObject):
         if step is None:
             return
         try:
-            self._look_for(step, time.monotonic())
+            self._check_step(step, time.monotonic())
         except Exception as error:
-            self._miss(step, f"{type(error).__name__}: {error}")
+            self._fail(step, f"{type(error).__name__}: {error}")
             raise
 
-    def _look_for(self, step: Step, now: float) -> None:
-        if self._seen_at is None and step.seen():
+    def _check_step(self, step: Step, now: float) -> None:
+        if self._seen_at is None and step.is_visible():
             self._seen_at = now
         if self._seen_at is not None:
             if now - self._seen_at >= step.settle_s:
                 self._grab(step.picture)
-                self._listener.seen(step)
-                self._next()
-        elif wrong := step.wrong():
-            self._miss(step, wrong)
+                self._listener.step_finished(step)
+                self._start_next_step()
+        elif wrong := step.failure_reason():
+            self._fail(step, wrong)
         elif now - self._began > step.within_s:
-            self._miss(step, "")
+            self._fail(step, "")
 
-    def _miss(self, step: Step, why: str) -> None:
+    def _fail(self, step: Step, why: str) -> None:
         self._grab(self._failed_picture)
         if why:
-            words = _("step failed: {what}: {why}").format(what=step.what, why=why)
+            words = _("step failed: {what}: {why}").format(what=step.expected, why=why)
         else:
             seconds = number(step.within_s, "g")
-            words = _("step not completed within {seconds} s: {what}").format(seconds=seconds, what=step.what)
-        self._end(False, words)
+            words = _("step not completed within {seconds} s: {what}").format(
+                seconds=seconds, what=step.expected
+            )
+        self._finish(False, words)
 
     def _grab(self, name: str) -> None:
         if not name:
@@ -215,12 +219,12 @@ class SelfDrive(QObject):
         else:
             sys.stderr.write(f"the picture {path} can't be written\n")
 
-    def _end(self, well: bool, words: str) -> None:
+    def _finish(self, well: bool, words: str) -> None:
         self.well = well
         self._timer.stop()
         self._step = None
         try:
-            self._listener.ended(well, words)
+            self._listener.run_finished(well, words)
         finally:  # the window must close even if the listener fails
             for widget in QApplication.topLevelWidgets():
                 if widget is self._window:

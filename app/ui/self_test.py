@@ -20,13 +20,13 @@ from app.core.robots.robot_link import RobotLink
 from app.core.self_test import SelfTest, bounds
 from app.core.self_test.surroundings import PICTURE
 from app.core.session import Session
-from app.ui.application import Options, run, why_not
+from app.ui.application import Options, run, startup_problem
 from app.ui.self_drive import SelfDrive, Step
 from app.ui.shell.main_window import MainWindow
 from nep.i18n import _
 
 ROBOT = "Pepper"
-STATE = f"/{ROBOT}/state"
+STATE_TOPIC = f"/{ROBOT}/state"
 JOINT_PREFIXES = ("theta_deg", "head_", "arm_", "elbow_")
 """Prefixes of joint names in the robot's state."""
 SETTLE_S = 1.0
@@ -74,14 +74,16 @@ class WindowSteps:
         self._rest: Mapping[str, object] = {}
         self._spoken = self._moved = ""
         self._stopped_after: object = None
-        FirstPaint(window, self._paint_seen)
+        FirstPaint(window, self._on_painted)
 
     def all(self) -> list[Step]:
         """Return the steps in order."""
         made = [
             self._step("window", _("the window"), lambda: None, lambda: self._painted),
-            self._step("master", _("the master"), lambda: None, self._has_master, self._master_wrong),
-            self._step("robot", _("the virtual robot"), self._begin, self._has_robot, self._robot_wrong),
+            self._step("master", _("the master"), lambda: None, self._has_master, self._master_problem),
+            self._step(
+                "robot", _("the virtual robot"), self._start_robot, self._has_robot, self._robot_problem
+            ),
             self._step("behaviour", _("the program of the greeting"), lambda: None, self._has_program),
         ]
         if self._web:
@@ -90,14 +92,16 @@ class WindowSteps:
             )
         return [
             *made,
-            self._step("run", _("the program runs"), self._run, self._runs, self._run_wrong),
-            self._step("moves", _("the robot speaks and moves"), lambda: None, self._moves, self._run_wrong),
+            self._step("run", _("the program runs"), self._run, self._is_running, self._run_problem),
+            self._step(
+                "moves", _("the robot speaks and moves"), lambda: None, self._has_moved, self._run_problem
+            ),
             self._step("stop", _("the robot confirms that it has stopped"), self._stop, self._has_stopped),
             Step(
                 _("a screenshot of the window"),
                 lambda: None,
                 lambda: True,
-                bounds.STEP_S["picture"],
+                bounds.STEP_TIMEOUTS_S["picture"],
                 PICTURE.removesuffix(".png"),
                 SETTLE_S,
                 name="picture",
@@ -116,14 +120,14 @@ class WindowSteps:
             words,
             do,
             seen,
-            bounds.STEP_S[name],
+            bounds.STEP_TIMEOUTS_S[name],
             settle_s=0.0,
-            wrong=wrong,
+            failure_reason=wrong,
             name=name,
-            said=partial(self._said, name),
+            details=partial(self._details, name),
         )
 
-    def _said(self, name: str) -> str:
+    def _details(self, name: str) -> str:
         # Details for the report.
         session = self._session
         link = session.fleet.link(ROBOT)
@@ -131,7 +135,7 @@ class WindowSteps:
             case "master":
                 return session.master.address
             case "robot":
-                return link.state_words if link is not None else ""
+                return link.state_label if link is not None else ""
             case "behaviour":
                 return session.document.name
             case "editor":
@@ -144,22 +148,22 @@ class WindowSteps:
                 return session.runs.view().result or ""
         return ""
 
-    def _paint_seen(self) -> None:
+    def _on_painted(self) -> None:
         self._painted = True
         self._test.report.mark("first_paint")
 
     def _has_master(self) -> bool:
-        return self._session.master.kind == "connected" and self._session.launcher.started_master
+        return self._session.master.kind == "connected" and self._session.launcher.has_started_master
 
-    def _master_wrong(self) -> str:
-        return self._alert("companion:master")
+    def _master_problem(self) -> str:
+        return self._alert_text("companion:master")
 
-    def _begin(self) -> None:
+    def _start_robot(self) -> None:
         if self._web:
-            self._window.commands.behaviours.demo()
+            self._window.commands.behaviours.start_demo()
             return
         self._session.launcher.start_virtual_robot(ROBOT)
-        self._session.documents.example(self._window.examples[0].path)
+        self._session.documents.open_example(self._window.examples[0].path)
         self._window.show_layout("developer")
         self._window.open_panel("robot")
 
@@ -170,24 +174,24 @@ class WindowSteps:
     def _has_robot(self) -> bool:
         if not self._watched and self._link() is not None:
             self._watched = True
-            self._session.watch(STATE)  # watched until the session ends
+            self._session.watch(STATE_TOPIC)  # watched until the session ends
         return bool(self._state())
 
-    def _robot_wrong(self) -> str:
-        return self._alert(f"companion:{ROBOT}")
+    def _robot_problem(self) -> str:
+        return self._alert_text(f"companion:{ROBOT}")
 
     def _has_program(self) -> bool:
-        program = self._session.document.newest()
+        program = self._session.document.newest_program()
         return program is not None and ROBOT in program.robots and program.starts > 0 and not program.errors
 
     def _has_blocks(self) -> bool:
         editor = self._window.editor()
         if not self._asked and isinstance(editor, SupportsPictures):
             self._asked = True
-            editor.picture("svg", True, self._drew)
+            editor.picture("svg", True, self._on_drawing)
         return bool(self._drawn)
 
-    def _drew(self, drawing: bytes) -> None:
+    def _on_drawing(self, drawing: bytes) -> None:
         self._asked, self._drawn = False, drawing
         if drawing:
             self._test.report.mark("editor_ready")
@@ -196,15 +200,15 @@ class WindowSteps:
         self._rest = self._state()
         self._window.commands.run("run.run")
 
-    def _runs(self) -> bool:
+    def _is_running(self) -> bool:
         runs = self._session.runs
         return runs.view().state == "running" and bool(runs.running_blocks)
 
-    def _run_wrong(self) -> str:
+    def _run_problem(self) -> str:
         errors = self._session.runs.block_errors
-        return next(iter(errors.values()), "") or self._alert("program")
+        return next(iter(errors.values()), "") or self._alert_text("program")
 
-    def _moves(self) -> bool:
+    def _has_moved(self) -> bool:
         state = self._state()
         turned = (
             name for name in state if name.startswith(JOINT_PREFIXES) and state[name] != self._rest.get(name)
@@ -216,52 +220,52 @@ class WindowSteps:
         return bool(self._spoken and self._moved)
 
     def _stop(self) -> None:
-        self._stopped_after = self._newest()
+        self._stopped_after = self._newest_message()
         self._window.commands.run("run.stop")
 
     def _has_stopped(self) -> bool:
         view, state = self._session.runs.view(), self._state()
         still = state.get("moving") is False and not state.get("speech")
         proven = view.state == "proven" and bool(view.result) and view.result_status == "ok"
-        return proven and still and self._newest() is not self._stopped_after
+        return proven and still and self._newest_message() is not self._stopped_after
 
-    def _newest(self) -> object:
-        topic = self._session.topics.get(STATE)
+    def _newest_message(self) -> object:
+        topic = self._session.topics.get(STATE_TOPIC)
         return topic.newest if topic is not None else None
 
     def _state(self) -> Mapping[str, object]:
         # The last state published by the robot.
-        topic = self._session.topics.get(STATE)
+        topic = self._session.topics.get(STATE_TOPIC)
         payload = topic.newest.payload if topic is not None and topic.newest is not None else None
         return payload if isinstance(payload, Mapping) else {}
 
-    def _alert(self, id: str) -> str:
+    def _alert_text(self, id: str) -> str:
         found = next((each for each in self._session.alerts.active if each.id == id), None)
         return f"{found.title} {found.detail}".strip() if found is not None else ""
 
 
-class Told:
+class SelfTestListener:
     """Listener that reports the steps to the self-test."""
 
     def __init__(self, test: SelfTest, session: Session) -> None:
         self._test, self._session = test, session
 
-    def begun(self, step: Step) -> None:
+    def step_started(self, step: Step) -> None:
         """Start the time limit of the step."""
-        self._test.begin(step.name, step.what)
+        self._test.start_step(step.name, step.expected)
 
-    def seen(self, step: Step) -> None:
+    def step_finished(self, step: Step) -> None:
         """Report the step as passed, or as failed if its screenshot is empty."""
         if not step.picture:
-            self._test.record_success(step.said())
+            self._test.record_success(step.details())
             return
-        shown = colours(QImage(str(self._test.place.path(PICTURE))))
+        shown = colour_count(QImage(str(self._test.place.path(PICTURE))))
         if shown < MIN_COLOURS:
             self._test.fail(_("the screenshot of the window has only {count} colours").format(count=shown))
         else:
             self._test.record_success(_("{count} colours").format(count=shown))
 
-    def ended(self, well: bool, words: str) -> None:
+    def run_finished(self, well: bool, words: str) -> None:
         """Report the failure, if any. Closing the window is then measured as the last step."""
         complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
         self._test.report.add_computer(
@@ -271,34 +275,34 @@ class Told:
         )
         if not well:
             self._test.fail(words)
-        self._test.begin("close", _("the window closes; the robot and the program stop"))
+        self._test.start_step("close", _("the window closes; the robot and the program stop"))
 
 
-def colours(picture: QImage) -> int:
+def colour_count(picture: QImage) -> int:
     """Return the number of colours in a sample of pixels; 0 for an empty image."""
     return len(
         {picture.pixel(x, y) for x in range(0, picture.width(), 7) for y in range(0, picture.height(), 7)}
     )
 
 
-def show_steps(test: SelfTest, *, web: bool) -> int:
+def run_window_steps(test: SelfTest, *, web: bool) -> int:
     """Show the window and run the steps in it; ``web`` loads the page of the block editor.
 
     Returns:
         The exit code of the window.
     """
-    refused = why_not(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
+    refused = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:
         test.fail(refused)
         return 0
 
-    def drive(window: MainWindow) -> SelfDrive:
+    def make_driver(window: MainWindow) -> SelfDrive:
         test.record_success(f"Qt {qVersion()}")
         test.report.add_computer(
             qt=qVersion(), pyside=PySide6.__version__, screen=QGuiApplication.platformName()
         )
         steps = WindowSteps(window, test, web=web).all()
-        told, picture = Told(test, window.session), PICTURE.removesuffix(".png")
+        told, picture = SelfTestListener(test, window.session), PICTURE.removesuffix(".png")
         return SelfDrive(window, test.place.folder, steps, told, picture)
 
-    return run(Options(drive=drive, web=web))
+    return run(Options(make_driver=make_driver, web=web))

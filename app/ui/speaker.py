@@ -48,13 +48,13 @@ ADVICE = {
 MAX_TONES = 4
 RATE_HZ, FADE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_TIMEOUT_S = 0.5
-TRIAL_S = 20.0
+TRIAL_TIMEOUT_S = 20.0
 """Timeout in s of the test process. An engine that takes longer would block this process too."""
-Order: TypeAlias = tuple[str, tuple[Any, ...], int]
+Request: TypeAlias = tuple[str, tuple[Any, ...], int]
 _log = logging.getLogger(__name__)
 
 
-def no_voice(language: str) -> str:
+def no_voice_message(language: str) -> str:
     """Return the message shown when no voice for a language is installed."""
     name = _(LANGUAGES[language]) if language in LANGUAGES else QLocale(language).nativeLanguageName()
     return _("This computer has no voice for {language}.").format(language=name or language)
@@ -77,7 +77,7 @@ def try_voice() -> int:
     """
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         # ends the process even if its parent is gone
-        faulthandler.dump_traceback_later(TRIAL_S, exit=True, file=nowhere)
+        faulthandler.dump_traceback_later(TRIAL_TIMEOUT_S, exit=True, file=nowhere)
         return _make_voice()
 
 
@@ -96,7 +96,7 @@ def _make_voice() -> int:
     return 0
 
 
-def outlives_trial(command: Sequence[str] = ()) -> bool:
+def passes_trial(command: Sequence[str] = ()) -> bool:
     """Return True if the test process could create a speech engine. A faulty engine would crash Studio.
 
     ``command`` runs the test, by default this module. Blocks for up to `TRIAL_S`.
@@ -107,7 +107,7 @@ def outlives_trial(command: Sequence[str] = ()) -> bool:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            timeout=TRIAL_S,
+            timeout=TRIAL_TIMEOUT_S,
             creationflags=NO_CONSOLE,
             check=False,
         )
@@ -119,7 +119,7 @@ def outlives_trial(command: Sequence[str] = ()) -> bool:
     return done.returncode == 0
 
 
-def voice_words(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
+def voice_text(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
     """Describe the state of the speech output: that it works, or the error and what to install.
 
     Args:
@@ -176,20 +176,20 @@ class QtEngine:
         self._ended: Callable[[], None] | None = None
         self._sinks: list[tuple[QAudioSink, QBuffer]] = []
 
-    def _found_voice(self) -> QTextToSpeech | None:
+    def _get_voice(self) -> QTextToSpeech | None:
         if not self._voice_tried:
             self._voice_tried = True
-            if has_voice_engine() and outlives_trial():
+            if has_voice_engine() and passes_trial():
                 from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy)
 
                 try:
                     self._voice = QTextToSpeech()
-                    self._voice.stateChanged.connect(self._changed)
+                    self._voice.stateChanged.connect(self._on_state_changed)
                 except RuntimeError as error:
                     _log.info("no speech output: %s", error)
         return self._voice
 
-    def _changed(self) -> None:
+    def _on_state_changed(self) -> None:
         voice = self._voice
         if voice is None or self._ended is None:
             return
@@ -199,17 +199,17 @@ class QtEngine:
 
     def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
         """Start to speak, if there is a voice for the language."""
-        voice = self._found_voice()
+        voice = self._get_voice()
         locales = voice.availableLocales() if voice is not None else []
         locale = next((each for each in locales if each.name().split("_")[0] == language), None)
         if voice is None or locale is None:
-            return no_voice(language)
+            return no_voice_message(language)
         self.stop_voice()
         voice.setLocale(locale)
         voice.setVolume(volume)
         voice.say(words)
         if voice.state() == voice.State.Error:
-            return no_voice(language)
+            return no_voice_message(language)
         self._ended = ended
         return ""
 
@@ -250,14 +250,14 @@ class QtEngine:
         self._sinks.clear()
 
 
-class _Desk(QObject):
+class _SpeechWorker(QObject):
     """Executes requests in the engine's thread. Requests from before a stop are skipped."""
 
     woken = Signal()
     ended = Signal(int)
-    told = Signal(str, str)  # kind of output; error sentence or ""
+    reported = Signal(str, str)  # kind of output; error sentence or ""
 
-    def __init__(self, make: Callable[[], Engine], orders: deque[Order], speaker: QtSpeaker) -> None:
+    def __init__(self, make: Callable[[], Engine], orders: deque[Request], speaker: QtSpeaker) -> None:
         super().__init__()
         self._make, self._orders, self._speaker = make, orders, speaker
         self._engine: Engine | None = None
@@ -273,8 +273,8 @@ class _Desk(QObject):
                 self.loop.quit()
             elif what == "stop":
                 self._silence(str(given[0]))
-            elif self._speaker.counts(what, turn):
-                self._carry_out(what, given, turn)
+            elif self._speaker.is_valid(what, turn):
+                self._execute(what, given, turn)
 
     def _silence(self, which: str) -> None:
         if self._engine is not None:
@@ -283,13 +283,13 @@ class _Desk(QObject):
             if which != "voice":
                 self._engine.stop_tones()
 
-    def _carry_out(self, what: str, given: tuple[Any, ...], turn: int) -> None:
+    def _execute(self, what: str, given: tuple[Any, ...], turn: int) -> None:
         problem = _(NO_SOUND)
         first, *others = given
         try:
             if self._engine is None:
                 self._engine = self._make()
-            if not self._speaker.counts(what, turn):  # Stop was called in the meantime
+            if not self._speaker.is_valid(what, turn):  # Stop was called in the meantime
                 return
             if what == "say":
                 language, volume = others
@@ -298,7 +298,7 @@ class _Desk(QObject):
                 problem = self._engine.play(first, *others)
         except Exception:  # noqa: BLE001 - an engine of the system may raise anything; continue without sound
             _log.warning("speech or audio output failed", exc_info=True)
-        self.told.emit(what, problem)
+        self.reported.emit(what, problem)
         if problem and what == "say":
             self.ended.emit(turn)
 
@@ -310,8 +310,8 @@ class QtSpeaker(QObject):
         # `make` creates the engine, in its thread, on first use.
         super().__init__(parent)
         self._make = make
-        self._orders: deque[Order] = deque()
-        self._desk: _Desk | None = None
+        self._orders: deque[Request] = deque()
+        self._desk: _SpeechWorker | None = None
         self._thread: threading.Thread | None = None
         self._turns: dict[str, int] = {"say": 0, "play": 0}
         self._busy = False
@@ -319,7 +319,7 @@ class QtSpeaker(QObject):
         self._closed = False
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """True while a text is spoken or waits to be spoken."""
         return self._busy
 
@@ -328,7 +328,7 @@ class QtSpeaker(QObject):
         """Error sentence of the last output, or ""."""
         return self._problems.get("say", "") or self._problems.get("play", "")
 
-    def counts(self, what: str, turn: int) -> bool:
+    def is_valid(self, what: str, turn: int) -> bool:
         """Return True if a request is valid, and False if a stop has cancelled it. Thread-safe."""
         return not self._closed and turn >= self._turns[what]
 
@@ -336,12 +336,12 @@ class QtSpeaker(QObject):
         """Queue a text to be spoken."""
         self._turns["say"] += 1
         self._busy = True
-        self._order("say", words, language, volume)
+        self._enqueue("say", words, language, volume)
 
     def play(self, notes: Notes, volume: float) -> None:
         """Queue tones to be played; an empty sequence stops the tones."""
         if notes:
-            self._order("play", tuple(notes), volume)
+            self._enqueue("play", tuple(notes), volume)
         else:
             self._stop("tones")
 
@@ -360,40 +360,40 @@ class QtSpeaker(QObject):
         if which != "voice":
             self._turns["play"] += 1
         if self._thread is not None:
-            self._order("stop", which)
+            self._enqueue("stop", which)
 
     def close(self) -> None:
         """Stop the thread. If the audio system blocks the thread, it is abandoned."""
         self.stop()
         if self._thread is not None:
-            self._order("end")
+            self._enqueue("end")
             self._thread.join(JOIN_TIMEOUT_S)
         self._closed = True
 
-    def _order(self, what: str, *given: object) -> None:
+    def _enqueue(self, what: str, *given: object) -> None:
         if self._closed:
             return
         self._orders.append((what, given, self._turns.get(what, 0)))
         if self._thread is None:
-            self._thread = threading.Thread(target=self._live, name="robots' voice", daemon=True)
+            self._thread = threading.Thread(target=self._run_thread, name="robots' voice", daemon=True)
             self._thread.start()
         elif self._desk is not None:
             self._desk.woken.emit()
 
-    def _live(self) -> None:
-        desk = _Desk(self._make, self._orders, self)
-        desk.ended.connect(self._has_ended, Qt.ConnectionType.QueuedConnection)
-        desk.told.connect(self._has_told, Qt.ConnectionType.QueuedConnection)
+    def _run_thread(self) -> None:
+        desk = _SpeechWorker(self._make, self._orders, self)
+        desk.ended.connect(self._on_ended, Qt.ConnectionType.QueuedConnection)
+        desk.reported.connect(self._on_reported, Qt.ConnectionType.QueuedConnection)
         self._desk = desk
         desk.woken.emit()
         desk.loop.exec()
         self._desk = None
 
-    def _has_ended(self, turn: int) -> None:
+    def _on_ended(self, turn: int) -> None:
         if turn == self._turns["say"]:
             self._busy = False
 
-    def _has_told(self, what: str, problem: str) -> None:
+    def _on_reported(self, what: str, problem: str) -> None:
         self._problems[what] = problem
 
 

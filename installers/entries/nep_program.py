@@ -6,9 +6,9 @@ os.environ["OPENCV_VIDEOIO_PRIORITY_FFMPEG"] = (
     "0"  # packages don't contain it: installers/linux/film_libraries.py
 )
 
-from nep.system.frozen_code import hold_code
+from nep.system.frozen_code import keep_archive_open
 
-hold_code()  # before any late import
+keep_archive_open()  # before any late import
 
 from nep.cli import main
 

@@ -8,9 +8,9 @@ os.environ["OPENCV_VIDEOIO_PRIORITY_FFMPEG"] = (
 
 import sys
 
-from nep.system.frozen_code import hold_code
+from nep.system.frozen_code import keep_archive_open
 
-hold_code()  # before any late import
+keep_archive_open()  # before any late import
 
 from app.__main__ import main
 

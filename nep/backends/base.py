@@ -19,14 +19,14 @@ from nep.errors import PluginsMissingError, UnknownBackendError
 from nep.messages.codecs import Codec, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
-from nep.messages.queue import MAX_BYTES, MAX_MESSAGES, Keep
+from nep.messages.queue import MAX_BYTES, MAX_MESSAGES, QueuePolicy
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord
 from nep.system.addresses import master_address
-from nep.system.descriptors import check_room
+from nep.system.descriptors import check_free_descriptors
 from nep.system.plugins import discover, discover_own
 
-HANDSHAKE_S = 0.5
+HANDSHAKE_TIMEOUT_S = 0.5
 """Maximum time in seconds that a new publisher or subscriber waits for the handshake with its peers."""
 
 Sink = Callable[[Sequence[Message]], None]
@@ -88,7 +88,7 @@ class SubscriberSpec:
     msg_type: str
     configuration: Configuration
     wait_s: float | None
-    keep: Keep = "all"
+    keep: QueuePolicy = "all"
     max_messages: int = MAX_MESSAGES
     max_bytes: int = MAX_BYTES
     sink: Sink | None = None
@@ -97,14 +97,14 @@ class SubscriberSpec:
     is_pattern: bool = False
 
 
-class Wakes(Protocol):
+class Wakeable(Protocol):
     """Object that can be woken, such as a `nep.system.wakeup.Waker`."""
 
     def wake(self) -> None:
         """Wake the waiting thread. Callable from any thread, also with locks held; doesn't block."""
 
 
-class QuickPublish(NamedTuple):
+class PublishHooks(NamedTuple):
     """Arguments of `PublishesQuickly.quick_publish`.
 
     Attributes:
@@ -116,10 +116,10 @@ class QuickPublish(NamedTuple):
     """
 
     owner: Closable
-    kind: type | None
-    ordinary: Callable[[Any], bytes]
-    look: Callable[[Any], object] | None
-    slowly: Callable[..., object]
+    raw_type: type | None
+    encode: Callable[[Any], bytes]
+    on_null: Callable[[Any], object] | None
+    fallback: Callable[..., object]
 
 
 class Closable(Protocol):
@@ -129,10 +129,10 @@ class Closable(Protocol):
 
 
 @runtime_checkable
-class PublishesQuickly(Protocol):
+class SupportsQuickPublish(Protocol):
     """Optional interface of a `PublisherTransport`: a fast path for publishing."""
 
-    def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
+    def quick_publish(self, asked: PublishHooks) -> Callable[..., None]:
         """Return a publish function with minimal call overhead. It never blocks."""
 
 
@@ -144,7 +144,7 @@ class PublisherTransport(Protocol):
         """Number of connected subscribers."""
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if any subscriber is connected, including those that `subscribers` can't count."""
 
     @property
@@ -161,7 +161,7 @@ class PublisherTransport(Protocol):
     def report(self, problem: str) -> None:
         """Report the reason why payloads can't be encoded, as an alert in the graph; "" clears the alert."""
 
-    def lend(self, size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, size_bytes: int) -> memoryview | None:
         """Return writable shared memory for a payload, or None if no subscriber shares memory."""
 
     def send(self, encoded: Encoded) -> None:
@@ -172,7 +172,7 @@ class PublisherTransport(Protocol):
 
 
 @runtime_checkable
-class KnowsSubscribers(Protocol):
+class SupportsSubscriberIds(Protocol):
     """Optional interface of a `PublisherTransport` that can identify its subscribers."""
 
     @property
@@ -181,7 +181,7 @@ class KnowsSubscribers(Protocol):
 
 
 @runtime_checkable
-class GivesPayloads(Protocol):
+class SupportsPayloads(Protocol):
     """Optional interface of a `SubscriberTransport`: decoded payloads without `Message` objects.
 
     While `payloads` is not empty, call `restore` before taking from `ready`.
@@ -212,14 +212,14 @@ class SubscriberTransport(Protocol):
         -1 if there is none: then only the waker signals messages.
         """
 
-    def enter_wait(self, waker: Wakes) -> bool:
+    def enter_wait(self, waker: Wakeable) -> bool:
         """Prepare to wait; return False if input is available or the subscriber is closed.
 
         Until `leave_wait`, `waker` is woken by events that `fd` doesn't show, including `close`. Call
         `leave_wait` soon after waking: until then messages may not be read from the network.
         """
 
-    def leave_wait(self, waker: Wakes) -> None:
+    def leave_wait(self, waker: Wakeable) -> None:
         """End the wait that `enter_wait` prepared."""
 
     @property
@@ -260,7 +260,7 @@ class SubscriberTransport(Protocol):
 class Transport(Protocol):
     """Connection of one node to the other nodes."""
 
-    def publisher(self, spec: PublisherSpec) -> PublisherTransport:
+    def create_publisher(self, spec: PublisherSpec) -> PublisherTransport:
         """Create a publisher. Its first message reaches every subscriber that is already registered.
 
         Raises:
@@ -269,7 +269,7 @@ class Transport(Protocol):
             RequestRefusedError: The master rejected the registration.
         """
 
-    def subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
+    def create_subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
         """Create a subscriber. It receives all messages published from now on. Raises as `publisher` does."""
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
@@ -326,7 +326,7 @@ class Backend:
     is_in_process: bool = False
 
 
-def backend_named(name: str) -> Backend:
+def find_backend(name: str) -> Backend:
     """Return the back end with this name or alias.
 
     Third-party entry points are searched only if no built-in back end matches, because the search takes
@@ -339,16 +339,16 @@ def backend_named(name: str) -> Backend:
     try:
         own = discover_own("nep.backends", "BACKEND", Backend)
     except PluginsMissingError:
-        check_room(1, "a node")  # listing a folder without a free descriptor finds no files
+        check_free_descriptors(1, "a node")  # listing a folder without a free descriptor finds no files
         raise
-    backend = _named(name.lower(), own.values())
+    backend = _find_by_name(name.lower(), own.values())
     if backend is None:
         known = discover("nep.backends", "BACKEND", Backend)
-        backend = _named(name.lower(), known.values())
+        backend = _find_by_name(name.lower(), known.values())
         if backend is None:
             raise UnknownBackendError(name, sorted(known))
     return backend
 
 
-def _named(name: str, backends: Iterable[Backend]) -> Backend | None:
+def _find_by_name(name: str, backends: Iterable[Backend]) -> Backend | None:
     return next((each for each in backends if name in {each.name, *each.aliases}), None)

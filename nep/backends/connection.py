@@ -51,14 +51,14 @@ Configuration = Hybrid | Direct
 """Connection of a publisher, subscriber, server or client. The default is the node's own master."""
 
 
-def for_messages(configuration: Configuration) -> Configuration:
+def require_topic_support(configuration: Configuration) -> Configuration:
     """Return `configuration` if topics can use it. Raises `NepError` if it only supports calls."""
     if isinstance(configuration, Direct) and configuration.wire == "tcp":
         raise NepError(_("plain TCP supports only service calls; omit wire='tcp' for a topic"))
     return configuration
 
 
-def checked_mode(mode: str) -> Mode:
+def validate_mode(mode: str) -> Mode:
     """Validate a mode and return it. Raises `NepError` with the valid modes."""
     try:
         return _MODES[mode]
@@ -70,7 +70,7 @@ def checked_mode(mode: str) -> Mode:
         ) from None
 
 
-def checked_port(port: str | int) -> int:
+def parse_port(port: str | int) -> int:
     """Parse a port number from 1 to 65535. Raises `NepError`."""
     text = str(port)
     if not text.isascii() or not text.isdigit() or len(text) > 5 or not 1 <= int(text) <= 65535:

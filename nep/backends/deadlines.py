@@ -8,7 +8,7 @@ import time
 from typing import Protocol
 
 
-class Expiring(Protocol):
+class ExpiringClient(Protocol):
     """Client whose pending calls have deadlines."""
 
     def expire(self, now: float) -> float:
@@ -21,12 +21,12 @@ class Deadlines:
     def __init__(self, node_name: str) -> None:
         self._name = f"nep-calls-{node_name}"
         self._changed = threading.Condition(threading.Lock())
-        self._clients: tuple[Expiring, ...] = ()
+        self._clients: tuple[ExpiringClient, ...] = ()
         self._due = math.inf
         self._is_closing = False
         self._thread: threading.Thread | None = None
 
-    def watch(self, client: Expiring) -> None:
+    def add_client(self, client: ExpiringClient) -> None:
         """Add a client and start the thread if necessary."""
         with self._changed:
             self._clients = (*self._clients, client)
@@ -34,7 +34,7 @@ class Deadlines:
                 self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
                 self._thread.start()
 
-    def forget(self, client: Expiring) -> None:
+    def remove_client(self, client: ExpiringClient) -> None:
         """Remove a closed client."""
         with self._changed:
             self._clients = tuple(each for each in self._clients if each is not client)

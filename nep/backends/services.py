@@ -16,7 +16,7 @@ from nep.backends.connection import Configuration
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.codecs import Codec
-from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Reply, failure
+from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Reply, error_reply
 
 _logger = logging.getLogger("nep")
 CALLS_MAX = 1000
@@ -106,7 +106,7 @@ class IncomingCall:
     data: bytes | memoryview
     codec: int
     deadline: float | None
-    answer: Callable[[Reply], bool]
+    reply: Callable[[Reply], bool]
 
     @property
     def is_late(self) -> bool:
@@ -191,7 +191,7 @@ Outcome = Reply | NepError
 
 
 @contextmanager
-def woken_by(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterator[bool]:
+def wake_on_call(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterator[bool]:
     """Register `wake` with all `calls` within the context; yield False if a call is already queued."""
     entered: list[CallQueue] = []
     try:
@@ -213,11 +213,11 @@ class OpenCall(Protocol):
         """Number of the call in its client."""
 
 
-class CallUnderWay(OpenCall, Protocol):
+class InFlightCall(OpenCall, Protocol):
     """Call in flight, as stored in a client."""
 
     @property
-    def then(self) -> Callable[[Outcome], None]:
+    def callback(self) -> Callable[[Outcome], None]:
         """Callback for the outcome."""
 
     @property
@@ -225,7 +225,7 @@ class CallUnderWay(OpenCall, Protocol):
         """Size of the request in bytes."""
 
 
-C = TypeVar("C", bound=CallUnderWay)
+C = TypeVar("C", bound=InFlightCall)
 
 
 class ClientCalls(Generic[C]):
@@ -245,7 +245,7 @@ class ClientCalls(Generic[C]):
     def _run_callback(self, call: C, outcome: Outcome) -> None:
         # Call without the lock: the callback may use the client.
         try:
-            call.then(outcome)
+            call.callback(outcome)
         except Exception:  # a failing callback must not affect other calls
             _logger.exception("result callback for '%s' raised", self.spec.service)
 
@@ -255,7 +255,7 @@ class ClientCalls(Generic[C]):
         self._bytes -= call.size
         return True
 
-    def forget(self, call: OpenCall) -> None:
+    def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
             known = self._calls.get(call.number)
@@ -311,7 +311,7 @@ class ClientTransport(Protocol):
     def is_closed(self) -> bool:
         """True after `close`, or after the transport was closed."""
 
-    def begin(
+    def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
     ) -> OpenCall:
         """Send a call as soon as a server is connected.
@@ -326,7 +326,7 @@ class ClientTransport(Protocol):
             NepError: Too many calls or bytes are in flight.
         """
 
-    def forget(self, call: OpenCall) -> None:
+    def cancel(self, call: OpenCall) -> None:
         """Cancel a call; `then` isn't called."""
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
@@ -354,7 +354,7 @@ class SurveyTransport(Protocol):
     def is_closed(self) -> bool:
         """True after `close`, or after the transport was closed."""
 
-    def begin_all(
+    def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
     ) -> Sequence[OpenCall]:
         """Send a request to all connected respondents; `then` is called with the outcome of each.
@@ -362,7 +362,7 @@ class SurveyTransport(Protocol):
         Arguments and errors as in `ClientTransport.begin`.
         """
 
-    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel several calls; `then` isn't called for them."""
 
     def close(self) -> None:
@@ -375,13 +375,13 @@ class SurveyTransport(Protocol):
 class ServiceTransport(Protocol):
     """Transport of a node that supports services."""
 
-    def server(self, spec: ServerSpec) -> ServerTransport:
+    def create_server(self, spec: ServerSpec) -> ServerTransport:
         """Create a server. Raises as `Transport.publisher` does."""
 
-    def client(self, spec: ClientSpec) -> ClientTransport:
+    def create_client(self, spec: ClientSpec) -> ClientTransport:
         """Create a client. Raises as `Transport.subscriber` does."""
 
-    def survey(self, spec: ClientSpec) -> SurveyTransport:
+    def create_surveyor(self, spec: ClientSpec) -> SurveyTransport:
         """Create a surveyor; all servers of `spec.service` are its respondents. Raises as `client` does."""
 
 
@@ -395,7 +395,7 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
         size: Bytes of the new call.
     """
     if size > PAYLOAD_MAX_BYTES:
-        raise NepError(_("the call cannot be sent: {reason}").format(reason=too_large(size)))
+        raise NepError(_("the call cannot be sent: {reason}").format(reason=size_error_text(size)))
     if count >= CALLS_MAX or (used and used + size > CALLS_MAX_BYTES):
         raise NepError(
             _("{count} calls of '{service}' are in flight; wait for their replies first").format(
@@ -404,24 +404,24 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
         )
 
 
-def fitting(reply: Reply) -> Reply:
+def limit_reply_size(reply: Reply) -> Reply:
     """Return `reply`, or an error reply if it exceeds the size limit."""
     if len(reply.data) <= PAYLOAD_MAX_BYTES:
         return reply
-    return failure(CallKind.ERROR, "EncodeError", too_large(len(reply.data)))
+    return error_reply(CallKind.ERROR, "EncodeError", size_error_text(len(reply.data)))
 
 
-def refusal(service: str, *, is_closed: bool) -> Reply:
+def rejection_reply(service: str, *, is_closed: bool) -> Reply:
     """Return the reply that rejects a call: the server is closed, or its queue is full."""
     reason = (
         _("'{service}' is closing")
         if is_closed
         else _("'{service}' has too many pending calls; try again later")
     )
-    return failure(CallKind.REFUSED, "", reason.format(service=service))
+    return error_reply(CallKind.REFUSED, "", reason.format(service=service))
 
 
-def too_large(size: int) -> str:
+def size_error_text(size: int) -> str:
     """Return the error message for a payload of `size` bytes."""
     return _("it has {size} bytes, but calls allow at most {most}; publish large data on a topic").format(
         size=size, most=PAYLOAD_MAX_BYTES

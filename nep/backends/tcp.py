@@ -21,39 +21,39 @@ from nep.protocol.graph_view import GraphView
 class TcpTransport(ZeromqTransport):
     """Transport for direct servers and clients on the "tcp" wire; everything else raises `NepError`."""
 
-    def publisher(self, spec: PublisherSpec) -> NoReturn:
+    def create_publisher(self, spec: PublisherSpec) -> NoReturn:
         """Raise `NepError`: topics aren't supported."""
-        raise _no_topics(spec.topic)
+        raise _unsupported_error(spec.topic)
 
-    def subscriber(self, spec: SubscriberSpec) -> NoReturn:
+    def create_subscriber(self, spec: SubscriberSpec) -> NoReturn:
         """Raise `NepError`: topics aren't supported."""
-        raise _no_topics(spec.topic)
+        raise _unsupported_error(spec.topic)
 
-    def survey(self, spec: ClientSpec) -> NoReturn:
+    def create_surveyor(self, spec: ClientSpec) -> NoReturn:
         """Raise `NepError`: surveys aren't supported."""
-        raise _no_topics(spec.service)
+        raise _unsupported_error(spec.service)
 
-    def server(self, spec: ServerSpec) -> ServerTransport:
+    def create_server(self, spec: ServerSpec) -> ServerTransport:
         """Create a server. Raises `NepError` without a direct address."""
-        return super().server(replace(spec, configuration=_over_tcp(spec.configuration)))
+        return super().create_server(replace(spec, configuration=_require_direct(spec.configuration)))
 
-    def client(self, spec: ClientSpec) -> ClientTransport:
+    def create_client(self, spec: ClientSpec) -> ClientTransport:
         """Create a client. Raises `NepError` without a direct address."""
-        return super().client(replace(spec, configuration=_over_tcp(spec.configuration)))
+        return super().create_client(replace(spec, configuration=_require_direct(spec.configuration)))
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002
         """Raise `NepError`: plain TCP has no master."""
         raise NepError(_("plain TCP has no master, so there is no list of nodes"))
 
 
-def _over_tcp(configuration: Configuration) -> Direct:
+def _require_direct(configuration: Configuration) -> Direct:
     if not isinstance(configuration, Direct):
         reason = _("plain TCP has no master; set the address on both sides with 'node.direct(ip, port)'")
         raise NepError(reason)
     return replace(configuration, wire="tcp")
 
 
-def _no_topics(name: str) -> NepError:
+def _unsupported_error(name: str) -> NepError:
     reason = _("plain TCP supports only servers and clients; use a node with 'zeromq' for '{name}'")
     return NepError(reason.format(name=name))
 

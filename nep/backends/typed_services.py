@@ -22,16 +22,16 @@ from typing import Any, NamedTuple, Protocol
 
 from nep.errors import DecodeError, WireError
 from nep.i18n import _
-from nep.messages.codecs import CODECS, Codec, codec_numbered
+from nep.messages.codecs import CODECS, Codec, codec_by_number
 from nep.protocol.service_wire import CallKind, Reply
 
 CALL_REQUEST = "uint16 codec\nuint32 timeout_ms\nuint8[] data"
-CALL_ANSWER = "uint8 kind\nuint16 codec\nuint8[] data"
+CALL_RESPONSE = "uint8 kind\nuint16 codec\nuint8[] data"
 _KINDS = (CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED)
 _TIMEOUT_MAX_MS = 2**32 - 1
 
 
-class AskedCall(NamedTuple):
+class DecodedCall(NamedTuple):
     """Decoded request for a nep server.
 
     Attributes:
@@ -68,24 +68,24 @@ class TypedService:
 
     name: str
     request: CallBody
-    answer: CallBody
+    response: CallBody
     is_nep: bool = False
 
     # ---- for clients
 
-    def body_of_call(self, codec: Codec, data: bytes | memoryview, timeout_s: float | None) -> bytes:
+    def encode_call(self, codec: Codec, data: bytes | memoryview, timeout_s: float | None) -> bytes:
         """Convert an encoded request to a request body. Raises `EncodeError`, `DecodeError`."""
         if not self.is_nep:
             return self.request.encode(codec.decode(data, {}))
         limit_ms = 0 if timeout_s is None else max(1, min(_TIMEOUT_MAX_MS, round(timeout_s * 1000)))
         return self.request.encode({"codec": codec.number, "timeout_ms": limit_ms, "data": bytes(data)})
 
-    def reply_in(self, body: bytes, codec: Codec) -> Reply:
+    def decode_reply(self, body: bytes, codec: Codec) -> Reply:
         """Convert a response body to a reply.
 
         Raises `DecodeError`, or `EncodeError` if `codec` can't encode the response.
         """
-        answer = self.answer.decode(body)
+        answer = self.response.decode(body)
         if not self.is_nep:
             return Reply(CallKind.ANSWER, codec.encode(answer).data, codec.number)
         kind, number, data = answer["kind"], answer["codec"], answer["data"]
@@ -96,7 +96,7 @@ class TypedService:
 
     # ---- for servers
 
-    def call_in(self, body: bytes) -> AskedCall:
+    def decode_call(self, body: bytes) -> DecodedCall:
         """Parse a request body. Raises `DecodeError`.
 
         Requests of ROS types are converted to msgpack, which supports bytes and NaN.
@@ -104,13 +104,13 @@ class TypedService:
         request = self.request.decode(body)
         if not self.is_nep:
             codec = CODECS["msgpack"]
-            return AskedCall(codec.encode(request).data, codec.number, None)
+            return DecodedCall(codec.encode(request).data, codec.number, None)
         number, limit_ms, data = request["codec"], request["timeout_ms"], request["data"]
         if not isinstance(number, int) or not isinstance(limit_ms, int) or not isinstance(data, bytes):
             raise WireError(_("it is not a service call"), len(body))
-        return AskedCall(data, number, limit_ms / 1000 if limit_ms else None)
+        return DecodedCall(data, number, limit_ms / 1000 if limit_ms else None)
 
-    def body_of_reply(self, reply: Reply) -> bytes:
+    def encode_reply(self, reply: Reply) -> bytes:
         """Convert a reply to a response body.
 
         Raises:
@@ -119,8 +119,8 @@ class TypedService:
         """
         if self.is_nep:
             kind, data = int(reply.kind), bytes(reply.data)
-            return self.answer.encode({"kind": kind, "codec": reply.codec, "data": data})
-        codec = codec_numbered(reply.codec)
+            return self.response.encode({"kind": kind, "codec": reply.codec, "data": data})
+        codec = codec_by_number(reply.codec)
         if codec is None or reply.kind != CallKind.ANSWER:
             raise DecodeError(self.name, len(reply.data), _("it is not a service reply"))
-        return self.answer.encode(codec.decode(reply.data, {}))
+        return self.response.encode(codec.decode(reply.data, {}))

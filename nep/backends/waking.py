@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from abc import ABC, abstractmethod
 
-from nep.backends.base import Wakes
+from nep.backends.base import Wakeable
 
 
 class WakingSubscriber(ABC):
@@ -15,14 +15,14 @@ class WakingSubscriber(ABC):
 
     def __init__(self, changed: threading.Condition) -> None:
         self._changed = changed
-        self._waiting: tuple[Wakes, ...] = ()
+        self._waiting: tuple[Wakeable, ...] = ()
 
     @property
     @abstractmethod
     def has_input(self) -> bool:
         """True if input is available or the subscriber is closed. Call with `changed` held."""
 
-    def enter_wait(self, waker: Wakes) -> bool:
+    def enter_wait(self, waker: Wakeable) -> bool:
         """Register `waker`; return False if input is available or the subscriber is closed."""
         with self._changed:
             if self.has_input:
@@ -30,7 +30,7 @@ class WakingSubscriber(ABC):
             self._waiting = (*self._waiting, waker)
             return True
 
-    def leave_wait(self, waker: Wakes) -> None:
+    def leave_wait(self, waker: Wakeable) -> None:
         """Unregister `waker`."""
         with self._changed:
             self._waiting = tuple(each for each in self._waiting if each is not waker)

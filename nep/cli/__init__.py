@@ -9,7 +9,7 @@ import sys
 
 __all__ = ["main"]
 
-INTERRUPTED = 130
+INTERRUPTED_EXIT_CODE = 130
 """Exit code of a program stopped by Ctrl+C."""
 
 
@@ -18,27 +18,27 @@ def main() -> None:
     try:
         from nep.cli import interrupts  # noqa: PLC0415 - imported here so that Ctrl+C during the import is handled
 
-        interrupts.end_at_once()
+        interrupts.exit_on_interrupt()
         code = _run()
     except KeyboardInterrupt:
-        code = INTERRUPTED
+        code = INTERRUPTED_EXIT_CODE
     sys.exit(code)
 
 
 def _run() -> int:
     from nep.cli import interrupts  # noqa: PLC0415 - see `main`
-    from nep.i18n import begin  # noqa: PLC0415
+    from nep.i18n import set_initial_language  # noqa: PLC0415
     from nep.system.streams import buffer_output, close_streams, prepare_streams  # noqa: PLC0415
 
     prepare_streams()
     buffer_output()
-    begin()  # before importing modules that translate their help texts at import
+    set_initial_language()  # before importing modules that translate their help texts at import
     try:
         from nep.cli.app import run  # noqa: PLC0415 - typer and ZeroMQ are slow to import
 
-        interrupts.ask_first()
-        interrupts.leave_when_told(interrupts.TERMINATED)
+        interrupts.raise_on_interrupt()
+        interrupts.exit_on_termination(interrupts.TERMINATED_EXIT_CODE)
         return run()
     finally:
-        interrupts.end_at_once()
+        interrupts.exit_on_interrupt()
         close_streams()

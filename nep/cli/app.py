@@ -12,13 +12,13 @@ import typer
 from typer.main import get_command, get_group
 from typer.models import CommandInfo
 
-from nep.cli.screen import say_error, write
+from nep.cli.screen import print_error_message, write
 from nep.cli.typer_words import TranslatedCommand, TranslatedGroup
 from nep.errors import NepError
 from nep.i18n import _
 from nep.system.addresses import MASTER_VARIABLE, master_address
 from nep.system.lazy_import import lazy_module
-from nep.system.streams import output_problem, words_given
+from nep.system.streams import command_line_arguments, output_problem
 from nep.version import __version__
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class _LazyCommands(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - typer's types are not public
         if name not in self._built:
-            self._built[name] = get_group(_built_command(name)).commands[name]
+            self._built[name] = get_group(_build_command(name)).commands[name]
         return self._built[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -134,7 +134,7 @@ def common(
 
 
 @cache
-def _built_command(name: str) -> typer.Typer:
+def _build_command(name: str) -> typer.Typer:
     group, found = typer.Typer(rich_markup_mode="rich", pretty_exceptions_enable=False), _COMMANDS[name]()
     if isinstance(found, typer.Typer):
         group.add_typer(found, name=name)
@@ -149,7 +149,7 @@ def _built_command(name: str) -> typer.Typer:
 def docstrings() -> Iterator[tuple[CommandInfo, str]]:
     """Yield each command with its help in English, which is the docstring of the command's function."""
     for name in _COMMANDS:
-        yield from _docstrings(_built_command(name))
+        yield from _docstrings(_build_command(name))
 
 
 def _docstrings(group: typer.Typer) -> Iterator[tuple[CommandInfo, str]]:
@@ -170,7 +170,7 @@ def run() -> int:
     try:
         code = _exit_code()
     except NepError as error:
-        say_error(str(error))
+        print_error_message(str(error))
         code = 1
     except OSError as error:
         if output_problem(error) is None:
@@ -178,18 +178,18 @@ def run() -> int:
         raised, code = error, 1
     problem = output_problem(raised)
     if problem:
-        say_error(_("can't write the output: {problem}").format(problem=problem))
+        print_error_message(_("can't write the output: {problem}").format(problem=problem))
     return code if problem is None else code or 1
 
 
 @cache
-def _built() -> Callable[[list[str]], object]:
+def _root_command() -> Callable[[list[str]], object]:
     return get_command(app)
 
 
 def _exit_code() -> int:
     try:
-        _built()(words_given())
+        _root_command()(command_line_arguments())
     except SystemExit as exit_:
         return exit_.code if isinstance(exit_.code, int) else 0 if exit_.code is None else 1
     return 0

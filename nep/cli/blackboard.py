@@ -10,10 +10,10 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
-from nep.cli.options import JsonOption, MasterOption, checked_time
+from nep.cli.options import JsonOption, MasterOption, check_duration
 from nep.cli.screen import UNKNOWN, TextColumn, duration, print_status, show_json, show_table
 from nep.cli.typer_words import TranslatedGroup
-from nep.cli.values import presented
+from nep.cli.values import format_payload
 from nep.errors import NepError, NoServerError, RequestRefusedError, ServiceError
 from nep.i18n import _, lazy
 from nep.nodes.node import Node
@@ -33,9 +33,9 @@ _DEFAULT_TOPIC = "/blackboard"
 """Topic on which RIZE programs publish perceptions."""
 _DEFAULT_NAME = "blackboard"
 _TIMEOUT_S = 5.0
-_RUN = "run"
+_RUN_COMMAND = "run"
 _COLUMNS = (
-    TextColumn(lazy("key"), style="bold", is_whole=True),
+    TextColumn(lazy("key"), style="bold", is_folded_last=True),
     TextColumn(lazy("value"), style="green"),
     TextColumn(lazy("age"), "right"),
     TextColumn(lazy("by")),
@@ -44,7 +44,7 @@ _COLUMNS = (
 )
 
 
-def _checked_lifetime(lifetime_s: float | None) -> float | None:
+def _check_lifetime(lifetime_s: float | None) -> float | None:
     if lifetime_s is not None and not lifetime_s > 0.0:  # rejects NaN, too
         raise typer.BadParameter(
             _("{given:g} is not a valid lifetime; use a number of seconds greater than 0").format(
@@ -60,7 +60,7 @@ class _DefaultRunGroup(TranslatedGroup):
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - see `TranslatedGroup`
         """Insert the subcommand `run` if the first word is not a subcommand."""
         if not args or (args[0] not in self.commands and args[0] not in ctx.help_option_names):
-            args = [_RUN, *args]
+            args = [_RUN_COMMAND, *args]
         return super().parse_args(ctx, args)
 
 
@@ -79,7 +79,7 @@ _NameOption = Annotated[
 ]
 
 
-@app.command(_RUN)
+@app.command(_RUN_COMMAND)
 def run(
     topics: Annotated[
         list[str] | None,
@@ -101,7 +101,7 @@ def run(
             metavar=_("SECONDS"),
             help=_("Delete values that have not been updated for this long (default: never)."),
             show_default=False,
-            callback=_checked_lifetime,
+            callback=_check_lifetime,
         ),
     ] = None,
     max_keys: Annotated[
@@ -115,7 +115,7 @@ def run(
     Changes are published on /blackboard/changes. The services are blackboard/get, blackboard/set and
     blackboard/keys.
     """
-    interrupts.leave_when_told()
+    interrupts.exit_on_termination()
     with (
         Node(name.strip("/").replace("/", "-"), master=master) as node,
         boards.Blackboard(node, max_keys=boards.MAX_KEYS if max_keys is None else max_keys) as board,
@@ -147,7 +147,7 @@ def show(
                 seconds=_TIMEOUT_S
             ),
             show_default=False,
-            callback=checked_time,
+            callback=check_duration,
         ),
     ] = _TIMEOUT_S,
     master: MasterOption = None,
@@ -155,11 +155,11 @@ def show(
 ) -> None:
     """Print the values of a blackboard with their ages, by publisher time stamp or arrival."""
     with Node(f"nep-blackboard-show-{os.getpid()}", master=master) as node:
-        client = node.new_client(servers.service_of(name, "get"), timeout_s=timeout_s)
+        client = node.new_client(servers.service_name(name, "get"), timeout_s=timeout_s)
         try:
             answer = client.call({"pattern": pattern})
         except NoServerError as error:
-            raise _no_blackboard(name) from error
+            raise _no_blackboard_error(name) from error
         except ServiceError as error:
             raise RequestRefusedError(error.reason) from error
     entries = _entries(answer)
@@ -180,7 +180,7 @@ def _topic_and_key(word: str) -> tuple[str, str | None]:
     return (topic, key) if equals and "/" not in key else (word, None)
 
 
-def _no_blackboard(name: str) -> NepError:
+def _no_blackboard_error(name: str) -> NepError:
     return NepError(
         _("no blackboard '{name}' is running; start one with 'nep blackboard'").format(name=escaped(name))
     )
@@ -197,7 +197,7 @@ def _row(entry: Mapping[str, object]) -> tuple[str, ...]:
     age_s = entry.get("age_s")
     return (
         quotable(entry.get("key")),
-        presented(entry.get("value"), whole=False),
+        format_payload(entry.get("value"), whole=False),
         _age(age_s) if isinstance(age_s, int | float) else UNKNOWN,
         {"stamp": _("stamp"), "arrival": _("arrival")}.get(quotable(entry.get("age_by")), UNKNOWN),
         quotable(entry.get("source") or UNKNOWN),

@@ -24,10 +24,14 @@ from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.masters.rates import Meter
 from nep.programs.bridges.bridge import Bridge, check_installed
-from nep.programs.bridges.configuration import BridgeConfiguration, direction_named, join_line
+from nep.programs.bridges.configuration import (
+    BridgeConfiguration,
+    configuration_from_arguments,
+    parse_direction,
+)
 from nep.programs.bridges.route import Route, RouteCounts
 from nep.programs.bridges.toml_file import EXAMPLE, read_configuration
-from nep.programs.robots.guard import refusal_words
+from nep.programs.robots.guard import refusal_text
 from nep.programs.robots.moving import MovingTopics
 from nep.text import escaped, shortened
 
@@ -39,10 +43,10 @@ _WAIT_SLICE_S = 0.1
 _ROBOT_DISCOVERY_S = 1.5
 _CELL_WIDTH = 10
 _MAX_NAME_WIDTH = 60
-_MAX_NOTES = 100
+_MAX_WARNINGS = 100
 _MIN_COLUMNS = 6
 """Number of leading columns that are shown even if all their values are 0."""
-_HEADS = (
+_HEADINGS = (
     lazy("rate"),
     lazy("received"),
     lazy("sent"),
@@ -54,7 +58,7 @@ _HEADS = (
     lazy("returned"),
 )
 
-WhatArgument = Annotated[
+FileOrEndsArgument = Annotated[
     list[str] | None,
     typer.Argument(
         help=_("A TOML file, or the two ends of one topic, such as zeromq:/chatter ros:/chatter."),
@@ -85,7 +89,7 @@ CountOption = Annotated[
 
 
 def bridge(
-    what: WhatArgument = None,
+    what: FileOrEndsArgument = None,
     direction: DirectionOption = "both",
     rate_hz: RateOption = None,
     check: CheckOption = False,
@@ -105,15 +109,19 @@ def bridge(
         write(EXAMPLE)
         return
     configuration = _configuration(what or [], direction, rate_hz)
-    _check_reach(configuration)
+    _check_not_in_process(configuration)
     if check:
         check_installed(configuration)
         _show_configuration(configuration)
         return
-    interrupts.leave_when_told()
+    interrupts.exit_on_termination()
     allowed = allow_moving or ()
     _check_types(configuration, allowed)
-    with _warnings() as notes, Bridge(configuration, allow_moving=allowed) as running, _published(running):
+    with (
+        _print_warnings() as notes,
+        Bridge(configuration, allow_moving=allowed) as running,
+        _publish_log(running),
+    ):
         for refusal in running.refusals(_ROBOT_DISCOVERY_S):
             raise typer.BadParameter(refusal)
         report = _report_for(running, notes, as_json=as_json)
@@ -132,8 +140,10 @@ def _configuration(what: Sequence[str], direction: str, rate_hz: float | None) -
                 _("{given:g} is not a valid rate; use messages per second, such as 10").format(given=rate_hz),
                 param_hint="--rate",
             )
-        way = direction_named(direction)
-        return join_line(*what, name=str(os.getpid()), direction=way, max_rate_hz=rate_hz or 0.0)
+        way = parse_direction(direction)
+        return configuration_from_arguments(
+            *what, name=str(os.getpid()), direction=way, max_rate_hz=rate_hz or 0.0
+        )
     if len(what) != 1:
         raise NepError(
             _("specify a file or two ends, such as 'zeromq:/chatter ros:/chatter'; --example prints a file")
@@ -150,7 +160,7 @@ def _configuration(what: Sequence[str], direction: str, rate_hz: float | None) -
     return read_configuration(path)
 
 
-def _check_reach(configuration: BridgeConfiguration) -> None:
+def _check_not_in_process(configuration: BridgeConfiguration) -> None:
     for side in (configuration.a, configuration.b):
         if side.backend.is_in_process:
             raise NepError(
@@ -166,7 +176,7 @@ def _check_types(configuration: BridgeConfiguration, allowed: Sequence[str]) -> 
     for topic in configuration.topics:
         for origin in topic.origins:
             end = topic.b if origin == "a" else topic.a
-            refusal = refusal_words(end.name, MovingTopics().moved_by(end.name, end.msg_type), allowed)
+            refusal = refusal_text(end.name, MovingTopics().robots_moved_by(end.name, end.msg_type), allowed)
             if refusal and not topic.is_pattern:
                 raise typer.BadParameter(refusal)
 
@@ -185,7 +195,7 @@ def _show_configuration(configuration: BridgeConfiguration) -> None:
 # ---- warnings above the table
 
 
-class _Notes(logging.Handler):
+class _WarningHandler(logging.Handler):
     """Log handler that prints the library's warnings, or buffers them while a live table is shown."""
 
     def __init__(self) -> None:
@@ -204,8 +214,8 @@ class _Notes(logging.Handler):
 
 
 @contextmanager
-def _warnings() -> Iterator[_Notes]:
-    notes, logger = _Notes(), logging.getLogger("nep")
+def _print_warnings() -> Iterator[_WarningHandler]:
+    notes, logger = _WarningHandler(), logging.getLogger("nep")
     logger.addHandler(notes)
     try:
         yield notes
@@ -214,7 +224,7 @@ def _warnings() -> Iterator[_Notes]:
 
 
 @contextmanager
-def _published(running: Bridge) -> Iterator[None]:
+def _publish_log(running: Bridge) -> Iterator[None]:
     logger = logging.getLogger("nep")
     handlers = [side.node.log_handler for side in running.sides.values()]
     for each in handlers:
@@ -233,7 +243,7 @@ class _Row(NamedTuple):
     """Row of the report: name of a route, its counts in the order of `_HEADS`, and its problem."""
 
     name: str
-    figures: tuple[str, ...]
+    cells: tuple[str, ...]
     problem: str
 
 
@@ -246,12 +256,12 @@ class _Report:
         names = [running.configuration.side(side).backend.name for side in ("a", "b")]
         self._sides: Mapping[str, str] = dict(zip("ab", names if names[0] != names[1] else "ab", strict=True))
 
-    def begin(self) -> None: ...
+    def start(self) -> None: ...
 
     def show(self) -> None:
         raise NotImplementedError
 
-    def end(self) -> None:
+    def stop(self) -> None:
         self.show()
 
     def rows(self) -> list[_Row]:
@@ -280,7 +290,7 @@ def _problem(route: Route, counts: RouteCounts) -> str:
         return _("the bridge '{name}' forwards this topic, too; stop one of the two").format(
             name=escaped(route.rival)
         )
-    return escaped(route.trouble or counts.problem)
+    return escaped(route.connection_problem or counts.problem)
 
 
 class _JsonReport(_Report):
@@ -311,12 +321,12 @@ class _PlainReport(_Report):
         lines = []
         if width > self._width:
             self._width = width
-            lines.append(self._line(_("topic"), [_(head) for head in _HEADS]))
+            lines.append(self._line(_("topic"), [_(head) for head in _HEADINGS]))
         for row in rows:
-            counts = row.figures[1:]
+            counts = row.cells[1:]
             if self._shown.get(row.name) != counts:
                 self._shown[row.name] = counts
-                lines.append(self._line(row.name, row.figures))
+                lines.append(self._line(row.name, row.cells))
         if lines:
             write("".join(f"{line}\n" for line in lines))
 
@@ -329,7 +339,7 @@ class _PlainReport(_Report):
 class _LiveReport(_Report):
     """Report as a table that is redrawn in place; warnings are printed above the table."""
 
-    def __init__(self, running: Bridge, notes: _Notes) -> None:
+    def __init__(self, running: Bridge, notes: _WarningHandler) -> None:
         from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
 
         super().__init__(running)
@@ -338,9 +348,9 @@ class _LiveReport(_Report):
         out.soft_wrap = False
         self._live = Live(console=out, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
 
-    def begin(self) -> None:
+    def start(self) -> None:
         self._live.start()
-        self._notes.buffered = deque(maxlen=_MAX_NOTES)
+        self._notes.buffered = deque(maxlen=_MAX_WARNINGS)
         self.show()
 
     def show(self) -> None:
@@ -350,7 +360,7 @@ class _LiveReport(_Report):
             self._live.console.print(Text(escaped(note), "yellow"))
         self._live.update(self._table(), refresh=True)
 
-    def end(self) -> None:
+    def stop(self) -> None:
         try:
             self.show()
         finally:
@@ -368,22 +378,22 @@ class _LiveReport(_Report):
         rows, left = rows[:max_rows], len(rows) - max_rows
         used = [
             at
-            for at in range(len(_HEADS))
-            if at < _MIN_COLUMNS or any(row.figures[at] != "0" for row in rows)
+            for at in range(len(_HEADINGS))
+            if at < _MIN_COLUMNS or any(row.cells[at] != "0" for row in rows)
         ]
         table = Table(box=box.SIMPLE_HEAD, header_style="dim", pad_edge=False, show_edge=False)
         table.add_column(_("topic"), style="bold", overflow="fold")  # only the name is folded, never numbers
         for at in used:
-            table.add_column(_(_HEADS[at]), justify="right", no_wrap=True)
+            table.add_column(_(_HEADINGS[at]), justify="right", no_wrap=True)
         for row in rows:
-            table.add_row(Text(shortened(row.name, _MAX_NAME_WIDTH)), *(row.figures[at] for at in used))
+            table.add_row(Text(shortened(row.name, _MAX_NAME_WIDTH)), *(row.cells[at] for at in used))
         below = [Text(f"! {row.name}: {row.problem}", "yellow", no_wrap=True) for row in rows if row.problem]
         if left > 0:
             below.append(Text(_("and {count} more topics").format(count=left), "dim"))
         return Group(table, *below[: max(1, max_rows - len(rows) + 1)])
 
 
-def _report_for(running: Bridge, notes: _Notes, *, as_json: bool) -> _Report:
+def _report_for(running: Bridge, notes: _WarningHandler, *, as_json: bool) -> _Report:
     if as_json:
         return _JsonReport(running)
     return _LiveReport(running, notes) if sys.stdout.isatty() else _PlainReport(running)
@@ -392,7 +402,7 @@ def _report_for(running: Bridge, notes: _Notes, *, as_json: bool) -> _Report:
 def _run(report: _Report, count: int) -> None:
     never, started = threading.Event(), time.monotonic()
     try:
-        report.begin()
+        report.start()
         for number in itertools.count(1):
             while (left := started + number * _REPORT_PERIOD_S - time.monotonic()) > 0:
                 never.wait(min(left, _WAIT_SLICE_S))  # in slices: Ctrl+C does not interrupt a wait on Windows
@@ -400,4 +410,4 @@ def _run(report: _Report, count: int) -> None:
                 return
             report.show()
     finally:
-        report.end()
+        report.stop()

@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 else:  # imported on use, to keep the other commands fast
     doctors = lazy_module("nep.programs.doctor")
 
-MissedArgument = Annotated[
+SilentTopicArgument = Annotated[
     str, typer.Argument(help=_("Topic whose messages don't arrive."), metavar=_("TOPIC"), show_default=False)
 ]
 
 _STYLES = {"error": "bold red", "warning": "bold yellow", "info": "dim", "ok": "green"}
-_SIGNS = dict(zip(_STYLES, "✗!·✓", strict=True))
-_PLAIN_SIGNS = dict(zip(_STYLES, "x!-+", strict=True))
+_SYMBOLS = dict(zip(_STYLES, "✗!·✓", strict=True))
+_ASCII_SYMBOLS = dict(zip(_STYLES, "x!-+", strict=True))
 """ASCII signs, for output whose encoding lacks the Unicode signs (often on Windows)."""
 
 
-def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: MissedArgument = "") -> None:
+def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: SilentTopicArgument = "") -> None:
     """Check why programs can't find each other, and print how to fix it.
 
     With a topic, also check why its messages don't arrive: a misspelled name, a publisher that sends nothing,
@@ -39,16 +39,16 @@ def doctor(master: MasterOption = None, as_json: JsonOption = False, topic: Miss
     if as_json:
         show_json(doctors.to_plain(found))
     else:
-        _show(found)
-    raise typer.Exit(doctors.worst(found))
+        _show_findings(found)
+    raise typer.Exit(doctors.exit_code(found))
 
 
-def _show(found: tuple[doctors.Finding, ...]) -> None:
+def _show_findings(found: tuple[doctors.Finding, ...]) -> None:
     from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
     out = console()
     is_unicode = (out.encoding or "").lower().startswith("utf")
-    signs, arrow = (_SIGNS, "→") if is_unicode else (_PLAIN_SIGNS, "->")
+    signs, arrow = (_SYMBOLS, "→") if is_unicode else (_ASCII_SYMBOLS, "->")
     for each in found:
         out.print(Text.assemble((f"{signs[each.severity]} ", _STYLES[each.severity]), escaped(each.sentence)))
         if each.fix:

@@ -14,17 +14,17 @@ from typing import Annotated
 
 import typer
 
-from nep.cli.complete import complete_more, complete_topic
+from nep.cli.complete import complete_field_or_topic, complete_topic
 from nep.cli.message_filter import MessageFilter
-from nep.cli.network import BackendOption, node_for
+from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.screen import UNKNOWN, cells, console, json_painter, print_status, show_json, size, write
-from nep.cli.table_file import Fields, Table
+from nep.cli.screen import UNKNOWN, cells, console, json_highlighter, print_status, show_json, size, write
+from nep.cli.table_file import CsvWriter, FieldExtractor
 from nep.cli.topic_patterns import TopicPatterns, is_pattern
-from nep.cli.topic_wait import TopicWait
-from nep.cli.values import cleaned, json_of, presented
+from nep.cli.topic_wait import TopicMonitor
+from nep.cli.values import cleaned, format_payload, json_of
 from nep.errors import DecodeError, WaitTimeoutError
-from nep.i18n import _, listed, ngettext
+from nep.i18n import _, format_list, ngettext
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
@@ -48,13 +48,13 @@ TopicArgument = Annotated[
         autocompletion=complete_topic,
     ),
 ]
-MoreArgument = Annotated[
+TopicsOrFieldsArgument = Annotated[
     list[str] | None,
     typer.Argument(
         metavar=_("TOPIC|FIELD"),
         help=_("More topics, or the fields to print, such as pose.x or joints\\[3]."),
         show_default=False,
-        autocompletion=complete_more,
+        autocompletion=complete_field_or_topic,
     ),
 ]
 CountOption = Annotated[
@@ -79,7 +79,7 @@ FullOption = Annotated[
 
 def echo(
     topic: TopicArgument,
-    more: MoreArgument = None,
+    more: TopicsOrFieldsArgument = None,
     count: CountOption = 0,
     timeout_s: TimeoutOption = None,
     master: MasterOption = None,
@@ -103,22 +103,22 @@ def echo(
     if as_csv and as_json:
         raise typer.BadParameter(_("--csv and --json can't be combined; choose one"))
     condition = None if expression is None else MessageFilter(expression)
-    with node_for("echo", master, backend) as node:
+    with open_command_node("echo", master, backend) as node:
         graph = node.graph()
         topics, fields = topics_and_fields(topic, more or (), graph)
         if as_csv and not fields:
             raise typer.BadParameter(
                 _("specify the fields: nep topic echo {topic} pose.x pose.y --csv").format(topic=topic)
             )
-        picked = Fields(fields)
+        picked = FieldExtractor(fields)
         names_topic = len(topics) > 1 or (is_pattern(topic) and topic not in graph.topics)
-        show: Callable[[Message], object] = Lines(picked, names_topic=names_topic, whole=full)
+        show: Callable[[Message], object] = MessagePrinter(picked, names_topic=names_topic, whole=full)
         if as_json:
             show = partial(show_record, fields=picked)
         elif as_csv:
-            show = Table(picked, names_topic=names_topic)
+            show = CsvWriter(picked, names_topic=names_topic)
         with closing(_messages(node, topics, graph, timeout_s)) as messages:
-            passing = (each for each in messages if condition is None or _passes(condition, each))
+            passing = (each for each in messages if condition is None or _matches(condition, each))
             try:
                 for message in itertools.islice(passing, count or None):
                     show(message)
@@ -132,7 +132,7 @@ def _messages(
     # Yields messages as `_receive_all` does, after subscribing to topics and patterns.
     exact = [each for each in topics if each in graph.topics or not is_pattern(each)]
     patterns = TopicPatterns(node, [each for each in topics if each not in exact], exact)
-    waiting = TopicWait(node, exact)
+    waiting = TopicMonitor(node, exact)
     waiting.update(graph)
     subscribers: list[Subscriber] = []
     with ExitStack() as opened:
@@ -141,7 +141,7 @@ def _messages(
             for name, msg_type in topics:
                 subscribers.append(opened.enter_context(node.new_sub(name, msg_type)))
 
-        subscribe([(each, waiting.msg_type(each)) for each in exact] + patterns.new_in(graph))
+        subscribe([(each, waiting.msg_type(each)) for each in exact] + patterns.new_topics(graph))
         yield from _receive_all(subscribers, timeout_s, waiting, patterns, subscribe)
 
 
@@ -165,7 +165,7 @@ def topics_and_fields(topic: str, more: Sequence[str], graph: GraphView) -> tupl
 def _receive_all(
     subscribers: Sequence[Subscriber],
     timeout_s: float | None,
-    waiting: TopicWait,
+    waiting: TopicMonitor,
     patterns: TopicPatterns,
     subscribe_new: Callable[[Sequence[tuple[str, str]]], None],
 ) -> Iterator[Message]:
@@ -199,7 +199,7 @@ def _receive_all(
             yield from received
             waiting.mark_received({message.topic for message in received})
         elif timeout_s is not None and now - last >= timeout_s:
-            names = listed(
+            names = format_list(
                 [f"'{each}'" for each in (*(sub.topic for sub in subscribers), *patterns.patterns)], "or"
             )
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
@@ -207,14 +207,14 @@ def _receive_all(
             waiting.poll()
 
 
-def _passes(condition: MessageFilter, message: Message) -> bool:
+def _matches(condition: MessageFilter, message: Message) -> bool:
     try:
         return condition.matches(dict(message.extension) if message.codec == "image" else message.payload)
     except DecodeError:
         return False
 
 
-def show_record(message: Message, fields: Fields | None = None) -> None:
+def show_record(message: Message, fields: FieldExtractor | None = None) -> None:
     """Print a message as a line of JSON. Values of `fields`, if given, replace the payload."""
     record: dict[str, object] = {
         "topic": message.topic,
@@ -226,10 +226,10 @@ def show_record(message: Message, fields: Fields | None = None) -> None:
         "size_bytes": message.size_bytes,
     }
     if fields is not None and fields.names:
-        values = fields.of(message)
+        values = fields.extract(message)
         if values is None:
             return
-        record["fields"] = fields.plain(values)
+        record["fields"] = fields.as_dict(values)
     elif message.codec == "image":
         record["payload"] = dict(message.extension)
     else:
@@ -241,11 +241,11 @@ def show_record(message: Message, fields: Fields | None = None) -> None:
     show_json(record)
 
 
-class Lines:
+class MessagePrinter:
     """Printer of messages for people: time, sequence number, topic and payload, coloured on a terminal."""
 
     def __init__(
-        self, fields: Fields | None = None, *, names_topic: bool = False, whole: bool = False
+        self, fields: FieldExtractor | None = None, *, names_topic: bool = False, whole: bool = False
     ) -> None:
         """Initialize the printer.
 
@@ -257,7 +257,7 @@ class Lines:
         self._fields = fields
         self._names_topic = names_topic
         self._console = console()
-        self._paint = json_painter() if self._console.is_terminal else None
+        self._paint = json_highlighter() if self._console.is_terminal else None
         self._whole = whole or self._paint is None
 
     def __call__(self, message: Message) -> None:
@@ -267,10 +267,10 @@ class Lines:
             head += f"  {escaped(message.topic)}"
         room = self._console.width - cells(head) - 2
         if self._fields is not None and self._fields.names:
-            values = self._fields.of(message)
+            values = self._fields.extract(message)
             if values is None:
                 return
-            body = presented(self._fields.plain(values), whole=self._whole)
+            body = format_payload(self._fields.as_dict(values), whole=self._whole)
         else:
             body = _body(message, room, whole=self._whole)
         if self._paint is None or len(body) > _MAX_COLOURED_CHARACTERS:
@@ -310,11 +310,13 @@ def _body(message: Message, room: int, *, whole: bool) -> str:
         return f"{size(len(payload))}: {_hexadecimal(payload)}"
     # re-encoding decoded JSON is 100 times faster than formatting each value
     is_exact = whole and message.codec == "json" and not _has_nan(message.data)
-    line = json_of(payload).decode() if is_exact else presented(payload, whole=whole)
+    line = json_of(payload).decode() if is_exact else format_payload(payload, whole=whole)
     if len(line) <= room and cells(line) <= room:
         return line
     laid_out = (
-        json_of(payload, indent=True).decode() if is_exact else presented(payload, whole=whole, indent=True)
+        json_of(payload, indent=True).decode()
+        if is_exact
+        else format_payload(payload, whole=whole, indent=True)
     )
     return "\n" + textwrap.indent(laid_out, "  ")
 

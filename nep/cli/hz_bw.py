@@ -13,13 +13,13 @@ from typing import Annotated
 import typer
 
 from nep.cli.complete import complete_topic
-from nep.cli.network import BackendOption, node_for
+from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
-from nep.cli.rate_window import AgeWindow, Bandwidth, Delay, Frequency, RateWindow, ReplayFilter
+from nep.cli.rate_window import Bandwidth, Delay, Frequency, LatchedFilter, LatencyWindow, RateWindow
 from nep.cli.screen import UNKNOWN, cells, padded, print_status, rate, show_json, size, write
-from nep.cli.topic_wait import TopicWait
+from nep.cli.topic_wait import TopicMonitor
 from nep.errors import WaitTimeoutError
-from nep.i18n import _, lazy, listed
+from nep.i18n import _, format_list, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
@@ -54,7 +54,7 @@ WindowOption = Annotated[
 CountOption = Annotated[
     int, typer.Option("--count", "-n", min=0, metavar="N", help=_("Exit after N reports (0: never)."))
 ]
-Figures = Mapping[str, object]
+Stats = Mapping[str, object]
 
 
 def hz(
@@ -143,8 +143,8 @@ class _Report:
         as_json: bool,
     ) -> None:
         # Raises `BadTopicError`, `WaitTimeoutError`.
-        with ExitStack() as opened, node_for("measure", master, backend) as node:
-            waiting = TopicWait(node, list(self._windows))
+        with ExitStack() as opened, open_command_node("measure", master, backend) as node:
+            waiting = TopicMonitor(node, list(self._windows))
             waiting.update(node.graph())
             for topic in self._windows:
                 subscription = self._subscribe(node, topic, waiting.msg_type(topic))
@@ -165,7 +165,7 @@ class _Report:
     def _wait(self, node: Node, seconds: float) -> None:  # noqa: ARG002 - the sink runs in the node's thread
         self._never.wait(seconds)
 
-    def _check_silence(self, waiting: TopicWait, timeout_s: float | None) -> None:
+    def _check_silence(self, waiting: TopicMonitor, timeout_s: float | None) -> None:
         # Reports topics without publishers. Raises `WaitTimeoutError` if no topic received a message in time.
         totals = {topic: window.total for topic, window in self._windows.items()}
         received = {topic for topic, total in totals.items() if total != self._totals.get(topic, 0)}
@@ -174,18 +174,18 @@ class _Report:
             self._totals, self._last_received_at = totals, now
             waiting.mark_received(received)
         if timeout_s is not None and now - self._last_received_at >= timeout_s:
-            names = listed([repr(topic) for topic in totals], "or")
+            names = format_list([repr(topic) for topic in totals], "or")
             raise WaitTimeoutError(_("a message on {names}").format(names=names), timeout_s)
         if len(received) < len(totals):
             waiting.poll()
 
     def _subscribe(self, node: Node, topic: str, msg_type: str) -> Subscriber:
-        window, replays = self._windows[topic], ReplayFilter(time.monotonic())
+        window, replays = self._windows[topic], LatchedFilter(time.monotonic())
 
         def on_messages(messages: Sequence[Message]) -> None:
             now = time.monotonic()
             for message in messages:
-                if replays.is_replay(message, now):
+                if replays.predates_subscription(message, now):
                     continue
                 stamp_s = None if message.stamp_ns is None else message.stamp_ns / 1e9
                 window.add(now, stamp_s, message.size_bytes)
@@ -201,7 +201,7 @@ class _Report:
     def _show_json(self, topic: str) -> None:
         found, _ = self._figures(self._windows[topic], time.monotonic())
         window = self._windows[topic]
-        figures: Figures = asdict(found) if found else {"messages": 0}
+        figures: Stats = asdict(found) if found else {"messages": 0}
         lost = self._subscribers[topic].lost
         show_json(
             {"topic": topic, "stamp_ns": time.time_ns(), **figures, "total": window.total, "lost": lost}
@@ -224,7 +224,7 @@ class _DelayReport(_Report):
             lazy("lost"),
         )
         super().__init__(topics, window_s, heads, self._delay_cells)
-        self._ages = {topic: AgeWindow(window_s) for topic in topics}
+        self._ages = {topic: LatencyWindow(window_s) for topic in topics}
         self._windows = self._ages
         self._unstamped: set[str] = set()
         self._uncompared: dict[str, int] = {}
@@ -235,7 +235,7 @@ class _DelayReport(_Report):
 
         def on_messages(message: Message) -> None:
             age_s, uncertainty_s = message.latency_s, message.latency_uncertainty_s
-            window.add_age(time.monotonic(), age_s, message.size_bytes, uncertainty_s)
+            window.add_latency(time.monotonic(), age_s, message.size_bytes, uncertainty_s)
             if age_s is None and topic not in self._unstamped:
                 self._unstamped.add(topic)
                 print_status(
@@ -250,14 +250,14 @@ class _DelayReport(_Report):
         node.spin(seconds)
 
     def _delay_cells(self, window: RateWindow, now: float) -> tuple[Delay | None, Sequence[str]]:
-        found = window.delay(now) if isinstance(window, AgeWindow) else None
+        found = window.delay(now) if isinstance(window, LatencyWindow) else None
         if found is None:
             return None, (UNKNOWN,) * 4
         uncertainty_s = found.uncertainty_s
-        ages = [age(each, uncertainty_s) for each in (found.mean_s, found.min_s, found.max_s)]
+        ages = [format_latency(each, uncertainty_s) for each in (found.mean_s, found.min_s, found.max_s)]
         if uncertainty_s and found.mean_s >= 0:
-            ages[0] += f" ± {gap(uncertainty_s)}"
-        return found, (*ages, gap(found.std_s))
+            ages[0] += f" ± {format_duration(uncertainty_s)}"
+        return found, (*ages, format_duration(found.std_s))
 
     def _line(self, topic: str, figures: Sequence[str]) -> str:
         wide = [
@@ -286,28 +286,31 @@ def _frequency_cells(window: RateWindow, now: float) -> tuple[Frequency | None, 
     found = window.frequency(now)
     if found is None:
         return None, (UNKNOWN,) * 4
-    return found, (rate(found.rate_hz), *(gap(each) for each in (found.min_s, found.max_s, found.std_s)))
+    return found, (
+        rate(found.rate_hz),
+        *(format_duration(each) for each in (found.min_s, found.max_s, found.std_s)),
+    )
 
 
 def _traffic_cells(window: RateWindow, now: float) -> tuple[Bandwidth | None, Sequence[str]]:
-    found = window.traffic(now)
+    found = window.bandwidth(now)
     if found is None:
         return None, (UNKNOWN,) * 4
     sizes = (size(each) for each in (found.mean_bytes, found.min_bytes, found.max_bytes))
     return found, (size(found.bandwidth_Bps, "/s"), *sizes)
 
 
-def age(seconds: float, uncertainty_s: float | None) -> str:
+def format_latency(seconds: float, uncertainty_s: float | None) -> str:
     """Format a latency. A negative latency within the clock uncertainty is shown as an upper bound."""
     if uncertainty_s and -uncertainty_s <= seconds < 0:
-        return _("under {gap}").format(gap=gap(uncertainty_s))
-    return gap(seconds)
+        return _("under {gap}").format(gap=format_duration(uncertainty_s))
+    return format_duration(seconds)
 
 
-def gap(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Format a duration with three significant digits."""
     if seconds < 0:
-        return f"-{gap(-seconds)}"
+        return f"-{format_duration(-seconds)}"
     if seconds >= 1:
         return f"{seconds:.3g} s"
     if seconds >= 1e-3:

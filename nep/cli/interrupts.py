@@ -15,31 +15,31 @@ from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
 
-from nep.cli import INTERRUPTED
+from nep.cli import INTERRUPTED_EXIT_CODE
 
-TERMINATED = 143
+TERMINATED_EXIT_CODE = 143
 """Exit code of a program that was stopped by SIGTERM."""
 
-RETRY_S = 0.02
-GRACE_S = 3.0
+RETRY_DELAY_S = 0.02
+GRACE_PERIOD_S = 3.0
 """Time in seconds that a command has to stop after Ctrl+C; nodes leave the master within 2 s."""
 
 
-def end_at_once() -> None:
+def exit_on_interrupt() -> None:
     """Make Ctrl+C exit at once without a message. For phases in which nothing needs cleanup."""
-    _handle_interrupt(_end)
+    _set_interrupt_handler(_exit_immediately)
 
 
-def ask_first() -> None:
+def raise_on_interrupt() -> None:
     """Make Ctrl+C raise `KeyboardInterrupt`, so that nodes leave the master.
 
     After a second Ctrl+C, or `GRACE_S` after the first, the process exits at once, because the terminal may
     be blocked.
     """
-    _handle_interrupt(_ask)
+    _set_interrupt_handler(_raise_interrupt)
 
 
-def call_first(action: Callable[[], object]) -> None:
+def call_on_signal(action: Callable[[], object]) -> None:
     """Make Ctrl+C, SIGTERM and SIGHUP call `action`, which requests the command to finish.
 
     For commands that must finish cleanly, such as a recording. A second signal exits at once. `action` runs
@@ -47,51 +47,51 @@ def call_first(action: Callable[[], object]) -> None:
     """
 
     def handle(_signal: int, _frame: FrameType | None) -> None:
-        end_at_once()
-        _handle_termination(signal.SIG_DFL)
+        exit_on_interrupt()
+        _set_termination_handler(signal.SIG_DFL)
         action()
 
-    _callers.add(handle)
-    _handle_interrupt(handle)
-    _handle_termination(handle)
+    _installed_handlers.add(handle)
+    _set_interrupt_handler(handle)
+    _set_termination_handler(handle)
 
 
-_callers: set[signal._HANDLER] = set()
+_installed_handlers: set[signal._HANDLER] = set()
 
 
-def leave_when_told(code: int = 0) -> None:
+def exit_on_termination(code: int = 0) -> None:
     """Make SIGTERM and SIGHUP exit with `code` after cleanup; a second signal exits at once.
 
     `docker stop`, systemd, `kill` and `timeout` send SIGTERM; a closing terminal sends SIGHUP.
     """
 
-    def leave(_signal: int, _frame: FrameType | None) -> None:
-        _handle_termination(signal.SIG_DFL)
+    def exit_cleanly(_signal: int, _frame: FrameType | None) -> None:
+        _set_termination_handler(signal.SIG_DFL)
         sys.exit(code)
 
-    _callers.add(leave)
-    _handle_termination(leave)
+    _installed_handlers.add(exit_cleanly)
+    _set_termination_handler(exit_cleanly)
 
 
-def _handle_termination(handler: signal._HANDLER) -> None:
+def _set_termination_handler(handler: signal._HANDLER) -> None:
     # Keeps handlers that the parent has set to ignore (`nohup`).
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) in {signal.SIG_DFL, *_callers}:
+        if number is not None and signal.getsignal(number) in {signal.SIG_DFL, *_installed_handlers}:
             with suppress(ValueError):  # only the main thread may
                 signal.signal(number, handler)
 
 
-def _end(_signal: int, _frame: FrameType | None) -> None:
-    os._exit(INTERRUPTED)
+def _exit_immediately(_signal: int, _frame: FrameType | None) -> None:
+    os._exit(INTERRUPTED_EXIT_CODE)
 
 
-def _ask(_signal: int, frame: FrameType | None) -> None:
+def _raise_interrupt(_signal: int, frame: FrameType | None) -> None:
     if _is_in_finalizer(frame):  # exceptions in __del__ are printed and ignored
         with suppress(RuntimeError):
             _thread.start_new_thread(_retry_interrupt, ())
         return
-    end_at_once()
+    exit_on_interrupt()
     with suppress(RuntimeError):  # no more threads; not Thread, whose locks the interrupted code may hold
         _thread.start_new_thread(_exit_after_grace, ())
     raise KeyboardInterrupt
@@ -106,7 +106,7 @@ def _is_in_finalizer(frame: FrameType | None) -> bool:
 
 
 def _retry_interrupt() -> None:
-    threading.Event().wait(RETRY_S)
+    threading.Event().wait(RETRY_DELAY_S)
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(
             threading.main_thread().ident or 0, signal.SIGINT
@@ -116,12 +116,17 @@ def _retry_interrupt() -> None:
 
 
 def _exit_after_grace() -> None:
-    threading.Event().wait(GRACE_S)
-    os._exit(INTERRUPTED)
+    threading.Event().wait(GRACE_PERIOD_S)
+    os._exit(INTERRUPTED_EXIT_CODE)
 
 
-def _handle_interrupt(handler: signal._HANDLER) -> None:
+def _set_interrupt_handler(handler: signal._HANDLER) -> None:
     # Keeps a handler that the parent set (`nohup`, `&` in a script) or that somebody installed.
-    if signal.getsignal(signal.SIGINT) in {signal.default_int_handler, _end, _ask, *_callers}:
+    if signal.getsignal(signal.SIGINT) in {
+        signal.default_int_handler,
+        _exit_immediately,
+        _raise_interrupt,
+        *_installed_handlers,
+    }:
         with suppress(ValueError):  # signals are handled in the main thread only
             signal.signal(signal.SIGINT, handler)

@@ -12,7 +12,7 @@ import orjson
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault, looks_like_json
-from nep.text import control_in, escaped, quotable
+from nep.text import escaped, first_control, quotable
 
 _MAX_SHOWN_CHARACTERS = 40
 
@@ -45,7 +45,7 @@ def parse_json(
         raise NepError(_not_json_message(text, other_types=other_types))
     raise NepError(
         _invalid_json_message(
-            fault, quotable(file) if file else _shown(text), first_line, other_types=other_types
+            fault, quotable(file) if file else _excerpt(text), first_line, other_types=other_types
         )
     )
 
@@ -71,16 +71,16 @@ def _invalid_json_message(fault: JsonFault, shown: str, first_line: int, *, othe
 
 def _not_json_message(text: str, *, other_types: bool) -> str:
     example = text if len(text) <= _MAX_SHOWN_CHARACTERS else _("some text")
-    quoted = _shell_quoted(json.dumps(example, ensure_ascii=bool(control_in(example))))
+    quoted = _shell_quoted(json.dumps(example, ensure_ascii=bool(first_control(example))))
     message = _("'{text}' is not valid JSON; put strings in quotes, such as {quoted}")
     if other_types:
         message = _(
             "'{text}' is not valid JSON; put strings in quotes, such as {quoted}, or use --type string"
         )
-    return message.format(text=_shown(text), quoted=quoted)
+    return message.format(text=_excerpt(text), quoted=quoted)
 
 
-def _shown(text: str) -> str:
+def _excerpt(text: str) -> str:
     return escaped(text if len(text) <= _MAX_SHOWN_CHARACTERS else f"{text[:_MAX_SHOWN_CHARACTERS]} …")
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli.complete import complete_node
-from nep.cli.network import node_for
+from nep.cli.network import open_command_node
 from nep.cli.options import JsonOption, MasterOption
 from nep.cli.screen import console, print_status, show_json, write
 from nep.cli.values import cleaned
@@ -24,7 +24,7 @@ from nep.nodes.log_handler import (
     LEVELS,
     LOG_TOPIC,
     LOG_TYPE,
-    TEXT_LIMIT,
+    MAX_TEXT_LENGTH,
     LogRecord,
     ShownErrors,
     level_of,
@@ -82,7 +82,7 @@ def log(
             param_hint="--level",
         )
     min_level = LEVELS.index(level_of(level))
-    with node_for("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
+    with open_command_node("log", master) as own, own.new_sub(LOG_TOPIC, LOG_TYPE) as subscriber:
         if not as_json:
             print_status(_("waiting for log records; press Ctrl+C to stop"))
         wanted = (
@@ -114,7 +114,7 @@ def _records(own: Node, subscriber: Subscriber) -> Iterator[LogRecord]:
 
 def _last_errors(message: Message, shown: ShownErrors) -> list[LogRecord]:
     try:
-        return shown.new_in(message.payload)
+        return shown.new_records(message.payload)
     except DecodeError:
         return []
 
@@ -127,13 +127,13 @@ def _show(record: LogRecord) -> None:
     if not out.is_terminal:
         write(f"{stamp}  {record.level:<8}  {escaped(record.node)}{logger}  {cleaned(record.text)}\n")
         return
-    out.print(_painted(stamp, record, logger))
+    out.print(_coloured_line(stamp, record, logger))
 
 
-def _painted(stamp: str, record: LogRecord, logger: str) -> Text:
+def _coloured_line(stamp: str, record: LogRecord, logger: str) -> Text:
     from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
-    style, text = _STYLES.get(record.level, ""), cleaned(shortened(record.text, TEXT_LIMIT))
+    style, text = _STYLES.get(record.level, ""), cleaned(shortened(record.text, MAX_TEXT_LENGTH))
     return Text.assemble(
         (stamp, "dim"), "  ", (f"{record.level:<8}", style), "  ", (escaped(record.node), "bold"),
         (logger, "dim"), "  ", (text, style),

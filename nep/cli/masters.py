@@ -16,8 +16,8 @@ from nep.cli.screen import console, print_status
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
 from nep.masters.master import Attachment, Master, is_running
-from nep.system.addresses import ANY, host_of, is_loopback, master_address, own_addresses
-from nep.system.descriptors import allow_many
+from nep.system.addresses import ANY_HOST, host_of, is_loopback, master_address, own_addresses
+from nep.system.descriptors import raise_open_file_limit
 from nep.system.lazy_import import lazy_module
 from nep.system.terminal import Terminal, log_to
 
@@ -94,14 +94,14 @@ def master(
                     terminal,
                 )
             _show_remote_addresses(running.address, listen or (), terminal)
-            interrupts.leave_when_told()
+            interrupts.exit_on_termination()
             running.wait()
         finally:
             running.close()
 
 
 def _start(address: str, owner_pid: int | None, terminal: Terminal, *, joins_originals: bool) -> Master:
-    allow_many()
+    raise_open_file_limit()
     attachments: list[Attachment] = [AlertPrinter(terminal), AlertLog()]
     if joins_originals:
         attachments.insert(0, attachment.GatewayAttachment())
@@ -114,7 +114,7 @@ def _start(address: str, owner_pid: int | None, terminal: Terminal, *, joins_ori
                     address=address
                 )
             ) from error
-        obstacle = doctor.start_obstacle(address)
+        obstacle = doctor.start_blocker(address)
         if obstacle is None:
             raise
         raise NepError(obstacle.as_error) from error
@@ -145,7 +145,7 @@ def _show_address(address: str, terminal: Terminal, *, joins_originals: bool) ->
 def _show_remote_addresses(address: str, hosts: Sequence[str], terminal: Terminal) -> None:
     out = console(out=terminal)
     port = address.rpartition(":")[2]
-    chosen = [own.host for own in own_addresses()] if ANY in hosts else hosts
+    chosen = [own.host for own in own_addresses()] if ANY_HOST in hosts else hosts
     for host in chosen:
         out.print(
             _("[bold yellow]●[/] other computers connect with [bold]NEP_MASTER={host}:{port}[/]").format(

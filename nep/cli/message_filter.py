@@ -15,7 +15,7 @@ from typing import Any
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.messages.fields import MISSING, Path, pick
+from nep.messages.fields import MISSING, Path, value_at
 from nep.system.syntax import parse_expression
 from nep.text import quotable
 
@@ -96,7 +96,7 @@ def _comparison(terms: Sequence[_Term], tests: Sequence[_Test]) -> _Term:
     return holds
 
 
-def _contained(item: object, container: Any) -> bool:  # noqa: ANN401 - a TypeError means false
+def _is_contained(item: object, container: Any) -> bool:  # noqa: ANN401 - a TypeError means false
     return item in container
 
 
@@ -107,8 +107,8 @@ _OPERATORS: Mapping[type[ast.cmpop], _Test] = {
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
     ast.GtE: operator.ge,
-    ast.In: _contained,
-    ast.NotIn: lambda item, container: not _contained(item, container),
+    ast.In: _is_contained,
+    ast.NotIn: lambda item, container: not _is_contained(item, container),
 }
 
 
@@ -125,7 +125,7 @@ def _term(node: ast.expr) -> _Term:
             return lambda _payload: constants
         case _:
             path = _path(node)
-            return lambda payload: pick(payload, path)
+            return lambda payload: value_at(payload, path)
 
 
 def _constant(node: ast.expr) -> object:

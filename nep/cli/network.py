@@ -13,12 +13,12 @@ from nep.masters.process import view
 from nep.nodes.node import Node
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import MASTER_VARIABLE
-from nep.system.arguments import text
+from nep.system.arguments import check_type_name
 
 
-def _checked_backend(given: str | None) -> str | None:
+def _check_backend(given: str | None) -> str | None:
     try:
-        return None if given is None else text("--backend", given)
+        return None if given is None else check_type_name("--backend", given)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
 
@@ -33,12 +33,12 @@ BackendOption = Annotated[
             "its address."
         ),
         show_default=False,
-        callback=_checked_backend,
+        callback=_check_backend,
     ),
 ]
 
 
-def node_for(command: str, master: str | None, backend: str | None = None) -> Node:
+def open_command_node(command: str, master: str | None, backend: str | None = None) -> Node:
     """Open a node for one run of a topic command. The process id makes its name unique."""
     return open_node(f"nep-topic-{command}", master, backend)
 

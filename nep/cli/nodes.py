@@ -21,7 +21,7 @@ from nep.cli.screen import (
     show_table,
     write,
 )
-from nep.cli.topic_wait import meant
+from nep.cli.topic_wait import suggestion
 from nep.cli.typer_words import TranslatedGroup
 from nep.cli.values import service_type_text
 from nep.errors import NepError
@@ -33,7 +33,7 @@ app: typer.Typer = typer.Typer(
     cls=TranslatedGroup, no_args_is_help=True, help=_("List the running nodes and inspect one.")
 )
 _COLUMNS = (
-    TextColumn(lazy("node"), style="bold", is_whole=True),
+    TextColumn(lazy("node"), style="bold", is_folded_last=True),
     TextColumn(lazy("language")),
     TextColumn(lazy("wire")),
     TextColumn(lazy("pid"), "right"),
@@ -47,7 +47,7 @@ _SERVICE_COLUMNS = (
     TextColumn(lazy("calls"), style="cyan"),
 )
 """Columns that are added if there are services."""
-_WIRES = {
+_WIRE_NAMES = {
     "native": lazy("native"),
     "A": "NEP ≤ 0.5.4.5",
     "B": "NEP 0.5.4.8",
@@ -98,14 +98,14 @@ def info(
     found = [each for each in graph.nodes.values() if node in {each.name, each.id}]
     if not found:
         message = _("no node '{node}'; {meant}'nep node list' shows all nodes")
-        near = meant(node, [each.name for each in graph.nodes.values()])
+        near = suggestion(node, [each.name for each in graph.nodes.values()])
         raise NepError(message.format(node=quotable(node), meant=near))
     found.sort(key=lambda each: each.id)
     if as_json:
         show_json([_record(graph, each) for each in found])
         return
     for number, each in enumerate(found):
-        write(("\n" if number else "") + _described(graph, each))
+        write(("\n" if number else "") + _description(graph, each))
     show_alerts(each for each in graph.alerts if each.id.partition(":")[2] == node)
 
 
@@ -121,7 +121,7 @@ def _record(graph: GraphView, node: NodeInfo) -> dict[str, object]:
     return {**asdict(node), **topics, **services}
 
 
-def _described(graph: GraphView, node: NodeInfo) -> str:
+def _description(graph: GraphView, node: NodeInfo) -> str:
     language, wire, pid, since, cpu = _row(graph, node)[1:6]
     heads = (
         (_("node"), escaped(node.name)),
@@ -157,7 +157,7 @@ def _row(graph: GraphView, node: NodeInfo) -> tuple[str, ...]:
     return (
         escaped(node.name),
         escaped(node.language) or UNKNOWN,
-        escaped(_(wire) if (wire := _WIRES.get(node.generation)) else node.generation),
+        escaped(_(wire) if (wire := _WIRE_NAMES.get(node.generation)) else node.generation),
         str(node.pid) if node.pid is not None else UNKNOWN,
         duration(time.time() - node.since_ns / 1e9) if node.since_ns else UNKNOWN,
         UNKNOWN if node.cpu_ratio is None else f"{100 * node.cpu_ratio:.0f} %",

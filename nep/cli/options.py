@@ -34,7 +34,7 @@ AllowMovingOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help=_("Print JSON."))]
 
 
-def checked_time(given: float | None) -> float | None:
+def check_duration(given: float | None) -> float | None:
     """Validate a duration in seconds, which must not be negative; raise `typer.BadParameter` otherwise."""
     if given is not None and not given >= 0.0:  # rejects NaN, too
         raise typer.BadParameter(
@@ -50,6 +50,6 @@ TimeoutOption = Annotated[
         metavar=_("SECONDS"),
         help=_("Exit with an error if no message arrives for this long."),
         show_default=False,
-        callback=checked_time,
+        callback=check_duration,
     ),
 ]

@@ -19,13 +19,13 @@ from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_json, show_table, write
 from nep.cli.typer_words import TranslatedGroup
-from nep.cli.values import json_of, presented
+from nep.cli.values import format_payload, json_of
 from nep.errors import DecodeError, MasterUnreachable, NepError, WaitTimeoutError, did_you_mean
 from nep.i18n import _, lazy
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
-from nep.patterns.parameters.owned import MSG_TYPE, place_of
+from nep.patterns.parameters.owned import MSG_TYPE, parameters_topic
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
 from nep.system.replace_file import replace_file
 from nep.text import bounded_str, escaped, shortened
@@ -36,7 +36,7 @@ app: typer.Typer = typer.Typer(
     help=_("List, get, set and watch parameters of a running node."),
 )
 _COLUMNS = (
-    TextColumn(lazy("parameter"), style="bold", is_whole=True),
+    TextColumn(lazy("parameter"), style="bold", is_folded_last=True),
     TextColumn(lazy("value"), style="green"),
     TextColumn(lazy("type")),
     TextColumn(lazy("allowed")),
@@ -81,7 +81,7 @@ def get(
     if as_json:
         show_json(value)
     else:
-        write(f"{presented(value, whole=True)}\n")
+        write(f"{format_payload(value, whole=True)}\n")
 
 
 @app.command("set")
@@ -121,13 +121,13 @@ def watch(
     """Print the parameters of a node, and again whenever one changes, until Ctrl+C."""
     with Node(f"nep-param-{os.getpid()}", master=master) as own:
         found = node_with_parameters(own.graph(), node)
-        with own.new_sub(place_of(found), MSG_TYPE) as subscriber:
+        with own.new_sub(parameters_topic(found), MSG_TYPE) as subscriber:
             changes = _changes(_states(own, subscriber, found, timeout_s), name)
             for each, value in itertools.islice(changes, count or None):
                 if as_json:
                     show_json({"name": each, "value": value})
                 else:
-                    write(f"{escaped(each)}: {presented(value, whole=True)}\n")
+                    write(f"{escaped(each)}: {format_payload(value, whole=True)}\n")
 
 
 @app.command("dump")
@@ -248,24 +248,24 @@ def _parse_value(word: str) -> object:
 def _row(parameter: Mapping[str, object]) -> tuple[str, ...]:
     return (
         escaped(str(parameter.get("name"))),
-        presented(parameter.get("value"), whole=False),
+        format_payload(parameter.get("value"), whole=False),
         escaped(str(parameter.get("type"))),
-        _allowed(parameter),
+        _allowed_values(parameter),
         escaped(shortened(str(parameter.get("description") or ""), 200)),
     )
 
 
-def _allowed(parameter: Mapping[str, object]) -> str:
+def _allowed_values(parameter: Mapping[str, object]) -> str:
     if parameter.get("read_only"):
         return _("read only")
     choices = parameter.get("choices")
     if choices:
-        return presented(choices, whole=False)
+        return format_payload(choices, whole=False)
     minimum, maximum = parameter.get("min"), parameter.get("max")
     if minimum is None and maximum is None:
         return UNKNOWN
     return "".join((
-        "" if minimum is None else f"{presented(minimum, whole=True)} ≤ ",
+        "" if minimum is None else f"{format_payload(minimum, whole=True)} ≤ ",
         "…",
-        "" if maximum is None else f" ≤ {presented(maximum, whole=True)}",
+        "" if maximum is None else f" ≤ {format_payload(maximum, whole=True)}",
     ))  # fmt: skip

@@ -10,25 +10,25 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli import interrupts
-from nep.cli.network import node_for
+from nep.cli.network import open_command_node
 from nep.cli.options import AllowMovingOption, MasterOption
 from nep.cli.recording_files import (
     FileArgument,
     FromOption,
     RecordedTopicsArgument,
     ToOption,
-    chosen_topics,
     clock_text,
-    end_with_damage,
-    span_ns,
+    exit_if_damaged,
+    parse_span_ns,
+    selected_topics,
 )
 from nep.cli.screen import console, print_status
 from nep.errors import NepError
-from nep.i18n import _, listed, ngettext, number
+from nep.i18n import _, format_list, ngettext, number
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
-from nep.programs.robots.guard import MotionGuard, refusal_words
+from nep.programs.robots.guard import MotionGuard, refusal_text
 from nep.programs.robots.moving import MovingTopics
 from nep.protocol.wire import check_topic
 from nep.system.lazy_import import lazy_module
@@ -87,47 +87,47 @@ def play(
         chosen = list(recording.topics) if publish_all else named
         if not any(recording.topics[each].message_count for each in chosen):
             reason = _("nothing to play: '{file}' has no messages of these topics").format(file=file)
-            words = damage.damage_words(recording.damage, recording.start_ns)
+            words = damage.corruption_text(recording.corruption, recording.start_ns)
             raise NepError(f"{reason}; {words}" if words else reason)
         if len(chosen) > _MAX_TOPICS:
             template = _("'{file}' has {count} matching topics; choose at most {most}")
             raise NepError(template.format(file=file, count=len(chosen), most=_MAX_TOPICS))
         names = _remapped_names(chosen, remap or ())
         armed = frozenset(named) if arm else frozenset[str]()
-        limits = _MotionLimits(recording, names, frozenset(allow_moving or ()), armed)
+        limits = _MotionPermissions(recording, names, frozenset(allow_moving or ()), armed)
         chosen = limits.filter_allowed(chosen, named)
         try:
             playback = player.Playback(recording, topics=chosen, remap=names)
             playback.speed = speed
-            _select_part(recording, playback, span_ns(recording, from_s, to_s), loop=loop)
+            _select_part(recording, playback, parse_span_ns(recording, from_s, to_s), loop=loop)
         except ValueError as error:
             raise typer.BadParameter(str(error)) from error
-        with node_for("play", master) as node:
+        with open_command_node("play", master) as node:
             limits.guard = MotionGuard(node)
             limits.guard.wait_for_descriptions(_ROBOT_DISCOVERY_S)
             chosen = limits.filter_allowed(chosen, named)
             if not chosen:
                 raise NepError(_("nothing to publish: all chosen topics are blocked"))
-            playback.choose(chosen)
+            playback.select_topics(chosen)
             with _Sender(node, recording, chosen, limits) as sender:
                 _play(recording, playback, sender)
                 template = ngettext("published {count} message", "published {count} messages", sender.count)
                 print_status(template.format(count=sender.count))
-        end_with_damage(recording)
+        exit_if_damaged(recording)
         if limits.was_named_blocked:
             raise typer.Exit(1)
 
 
 def _named_topics(recording: reader.Recording, words: Sequence[str], *, publish_all: bool) -> list[str]:
     if not words and not publish_all:
-        known = listed([f"'{quotable(each)}'" for each in list(recording.topics)[:20]], "and")
+        known = format_list([f"'{quotable(each)}'" for each in list(recording.topics)[:20]], "and")
         raise typer.BadParameter(
             _("specify the topics to publish, or use --all; the recording has {topics}").format(topics=known)
         )
-    return chosen_topics(recording, words)
+    return selected_topics(recording, words)
 
 
-class _MotionLimits:
+class _MotionPermissions:
     """Set of topics that must not be published because they would move robots without permission."""
 
     def __init__(
@@ -163,8 +163,8 @@ class _MotionLimits:
 
     def allows(self, topic: str) -> bool:
         # Reports a topic that becomes blocked once on stderr.
-        if self.guard is not None and self.guard.moving is not self._checked_moving:
-            self._checked_moving = self.guard.moving
+        if self.guard is not None and self.guard.moving_topics is not self._checked_moving:
+            self._checked_moving = self.guard.moving_topics
             self._blocked = self._find_blocked(self._blocked)
         return topic not in self._blocked
 
@@ -184,12 +184,12 @@ class _MotionLimits:
         name = self.names.get(recorded, recorded)
         if recorded in self._armed or recorded in self._allowed:
             return ""
-        live = () if self.guard is None else self.guard.moving.moved_by(name)
-        known = self._recorded.moved_by(recorded, self._topics[recorded].msg_type)
-        known = known or self._recorded.moved_by(name)
+        live = () if self.guard is None else self.guard.moving_topics.robots_moved_by(name)
+        known = self._recorded.robots_moved_by(recorded, self._topics[recorded].msg_type)
+        known = known or self._recorded.robots_moved_by(name)
         # names of connected robots win, unless the guard only knows the topic
         robots = known or live if live in ((), (name,)) else live
-        return refusal_words(name, robots, self._allowed)
+        return refusal_text(name, robots, self._allowed)
 
 
 def _remapped_names(chosen: Sequence[str], remap: Sequence[str]) -> dict[str, str]:
@@ -218,18 +218,18 @@ def _select_part(
     start, end = part
     if start is not None or end is not None:
         playback.loop(start or recording.start_ns, recording.end_ns if end is None else end)
-        playback.begin()
+        playback.rewind()
     if loop:
         playback.loop(*(playback.status().loop or (None, None)))
     else:
-        playback.once()
+        playback.play_once()
 
 
 class _Sender:
     """Publisher of replayed messages, with one publisher per topic and type."""
 
     def __init__(
-        self, node: Node, recording: reader.Recording, chosen: Sequence[str], limits: _MotionLimits
+        self, node: Node, recording: reader.Recording, chosen: Sequence[str], limits: _MotionPermissions
     ) -> None:
         self.limits, names = limits, limits.names
         self._opened = ExitStack()
@@ -275,18 +275,18 @@ class _Sender:
 def _play(recording: reader.Recording, playback: player.Playback, sender: _Sender) -> None:
     ended = threading.Event()
     out = console(stderr=True)
-    interrupts.leave_when_told()
+    interrupts.exit_on_termination()
 
     def wait() -> bool:
         sender.poll_guard()
         return ended.wait(_STATUS_PERIOD_S)
 
     with player.Player(playback, sender.send, on_jump=_ignore_jump, on_end=ended.set) as playing:
-        playing.order(lambda each: each.play())
+        playing.apply(lambda each: each.play())
         if out.is_terminal:
             with out.status("") as shown:
                 while not wait():
-                    shown.update(_line(recording, playing.status))
+                    shown.update(_status_line(recording, playing.status))
         else:
             while not wait():
                 pass
@@ -299,7 +299,7 @@ def _ignore_jump(_messages: Sequence[Message]) -> None:
     ...
 
 
-def _line(recording: reader.Recording, status: player.PlayerStatus) -> str:
+def _status_line(recording: reader.Recording, status: player.PlayerStatus) -> str:
     at = clock_text((status.position_ns - recording.start_ns) / 1e9)
     line = _("{time} of {whole}").format(time=at, whole=clock_text(recording.duration_s))
     true_speed = status.true_speed

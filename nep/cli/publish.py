@@ -18,14 +18,14 @@ import typer
 
 from nep.cli.complete import complete_topic
 from nep.cli.json_input import parse_json, text_of
-from nep.cli.network import BackendOption, node_for
+from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import MasterOption
 from nep.cli.screen import print_status, size
 from nep.errors import EncodeError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.codecs import CODECS, codec_for
 from nep.messages.encoded import Encoded
-from nep.nodes.arguments import text
+from nep.nodes.arguments import check_type_name
 from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import TopicInfo
 from nep.text import escaped
@@ -38,7 +38,7 @@ _TEXT_TYPES = frozenset({"string"})
 _BYTE_TYPES = frozenset({"bytes", "image", "images"})
 
 
-_Payload = Annotated[
+_PayloadArgument = Annotated[
     str,
     typer.Argument(
         metavar=_("MESSAGE"),
@@ -51,9 +51,9 @@ _Payload = Annotated[
 ]
 
 
-def _checked_type(given: str | None) -> str | None:
+def _check_type(given: str | None) -> str | None:
     try:
-        return text("it", given) if given else None
+        return check_type_name("it", given) if given else None
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
 
@@ -66,7 +66,7 @@ _TypeOption = Annotated[
         metavar=_("TYPE"),
         help=_("Message type (default: the topic's, or json)."),
         show_default=False,
-        callback=_checked_type,
+        callback=_check_type,
     ),
 ]
 _RateOption = Annotated[
@@ -114,7 +114,7 @@ _WaitOption = Annotated[
 
 def publish(
     topic: _TopicArgument,
-    payload: _Payload,
+    payload: _PayloadArgument,
     msg_type: _TypeOption = None,
     rate_hz: _RateOption = None,
     count: _CountOption = 0,
@@ -131,11 +131,11 @@ def publish(
         raise typer.BadParameter(
             _("the rate must be greater than 0 and at most 10000 Hz"), param_hint="--rate"
         )
-    with node_for("pub", master, backend) as node:
+    with open_command_node("pub", master, backend) as node:
         known = node.graph().topics.get(topic)
         kind = msg_type or (known.msg_type if known else "json")
-        _warn_of_type(topic, kind, known)
-        value = None if payload == "-" else encoded_of(payload, kind)
+        _warn_about_type(topic, kind, known)
+        value = None if payload == "-" else encode_payload(payload, kind)
         with node.new_pub(topic, kind, latched=latched) as publisher:
             wait_for_subscribers(publisher, wait)
             if payload == "-":
@@ -147,10 +147,10 @@ def publish(
             print_status(template.format(count=publisher.count, topic=topic, kind=kind, people=people))
             if latched:
                 print_status(_("keeping the message for later subscribers; press Ctrl+C to stop"))
-                _wait_for_ever()
+                _wait_forever()
 
 
-def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
+def _warn_about_type(topic: str, kind: str, known: TopicInfo | None) -> None:
     if known is not None and known.publishers and known.msg_type != kind:
         print_status(
             _("'{topic}' is published with the type '{msg_type}', not '{kind}'").format(
@@ -165,15 +165,15 @@ def _warn_of_type(topic: str, kind: str, known: TopicInfo | None) -> None:
         )
 
 
-def encoded_of(text: str, msg_type: str, first_line: int = 1) -> Encoded:
+def encode_payload(text: str, msg_type: str, first_line: int = 1) -> Encoded:
     """Encode the payload in `text`, so that an invalid value fails before publishing.
 
     Arguments and exceptions are those of `value_of`.
     """
-    return codec_for(msg_type).encode(value_of(text, msg_type, first_line))
+    return codec_for(msg_type).encode(parse_payload(text, msg_type, first_line))
 
 
-def value_of(text: str, msg_type: str, first_line: int = 1) -> object:
+def parse_payload(text: str, msg_type: str, first_line: int = 1) -> object:
     """Parse the payload in a text. Raises `NepError`.
 
     Args:
@@ -190,14 +190,14 @@ def value_of(text: str, msg_type: str, first_line: int = 1) -> object:
     if msg_type in _TEXT_TYPES:
         return text
     if msg_type == "bytes":
-        return _encode_typed(text)
+        return _encode_argument(text)
     if msg_type in _BYTE_TYPES:
         raise EncodeError(msg_type, "str", _("specify a JPEG or PNG file, such as @picture.jpg"))
     allow_nan = codec_for(msg_type).name == "msgpack"
     return parse_json(text, file=file, first_line=first_line, allow_nan=allow_nan, other_types=True)
 
 
-def _encode_typed(text: str) -> bytes:
+def _encode_argument(text: str) -> bytes:
     # surrogateescape restores typed bytes that are not UTF-8.
     try:
         return text.encode("utf-8", "surrogateescape")
@@ -231,7 +231,7 @@ def read_file(file: Path, msg_type: str) -> bytes:
 
 
 def _publish_lines(publisher: Publisher, msg_type: str) -> None:
-    for number, line in enumerate(_lines(), 1):
+    for number, line in enumerate(_stdin_lines(), 1):
         data = line.rstrip(b"\r\n")
         if msg_type == "bytes":
             publisher.publish(data)
@@ -244,10 +244,10 @@ def _publish_lines(publisher: Publisher, msg_type: str) -> None:
                 "--type bytes"
             )
             raise NepError(template.format(byte=error.start + 1, line=number)) from error
-        publisher.publish(encoded_of(text, msg_type, number))
+        publisher.publish(encode_payload(text, msg_type, number))
 
 
-def _lines() -> Iterator[bytes]:
+def _stdin_lines() -> Iterator[bytes]:
     try:
         if sys.stdin.isatty():  # the Windows console gives text, not bytes
             yield from (line.encode("utf-8", "surrogateescape") for line in sys.stdin)
@@ -306,7 +306,7 @@ def wait_for_subscribers(publisher: Publisher, count: int) -> None:
         never.wait(_WAIT_SLICE_S)
 
 
-def _wait_for_ever() -> None:
+def _wait_forever() -> None:
     never = threading.Event()
     while not never.wait(0.1):
         pass  # in slices: Ctrl+C does not interrupt a wait on Windows

@@ -83,7 +83,7 @@ class RateWindow:
         deviation = math.sqrt(sum((gap - mean) ** 2 for gap in gaps) / len(gaps))
         return Frequency(1 / mean, min(gaps), max(gaps), deviation, len(moments))
 
-    def traffic(self, now: float) -> Bandwidth | None:
+    def bandwidth(self, now: float) -> Bandwidth | None:
         """Return the bandwidth at the time `now`, or None if the window has fewer than two messages."""
         recent = self._recent(now)
         if len(recent) < 2:
@@ -103,7 +103,7 @@ class RateWindow:
             return list(self._messages)
 
 
-class ReplayFilter:
+class LatchedFilter:
     """Detector of latched messages from before the subscription, which would distort the rate.
 
     Not thread-safe.
@@ -116,7 +116,7 @@ class ReplayFilter:
         self._opened = opened
         self._publishers: set[int | None] = set()
 
-    def is_replay(self, message: Message, now: float) -> bool:
+    def predates_subscription(self, message: Message, now: float) -> bool:
         """Return True if a message was published before the subscription started.
 
         Until the publisher's clock is compared with this computer's clock, the first message of each latched
@@ -134,14 +134,14 @@ class ReplayFilter:
         return is_first if age_s is None or uncertainty_s is None else now - age_s < self._opened
 
 
-class AgeWindow(RateWindow):
+class LatencyWindow(RateWindow):
     """Latencies of one topic's messages in the last `seconds`. Thread-safe."""
 
     def __init__(self, seconds: float) -> None:
         super().__init__(seconds)
         self._uncertainty_s: float | None = None
 
-    def add_age(
+    def add_latency(
         self, arrived: float, age_s: float | None, size_bytes: int, uncertainty_s: float | None = None
     ) -> None:
         """Add a message and its latency.

@@ -14,9 +14,9 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
-from nep.cli.network import node_for
+from nep.cli.network import open_command_node
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.recording_files import TopicsToRecord, clock_text
+from nep.cli.recording_files import TopicsToRecordArgument, clock_text
 from nep.cli.screen import console, print_status, show_json, size
 from nep.errors import RecordingError
 from nep.i18n import _, ngettext
@@ -32,12 +32,12 @@ else:  # imported on use: other commands stay fast and need no extra packages
     writer = lazy_module("nep.recordings.writer")
 
 _STATUS_PERIOD_S = 0.2
-_SIZE = re.compile(r"(\d{1,15}(?:[.,]\d{1,6})?) ?([kMGT]?)B?", re.IGNORECASE)
-_UNITS = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12}
+_SIZE_PATTERN = re.compile(r"(\d{1,15}(?:[.,]\d{1,6})?) ?([kMGT]?)B?", re.IGNORECASE)
+_UNIT_BYTES = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9, "t": 10**12}
 
 
 def record(
-    topics: TopicsToRecord = None,
+    topics: TopicsToRecordArgument = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -102,13 +102,13 @@ def record(
     path = output or Path(datetime.now().astimezone().strftime("recording-%Y-%m-%d-%H-%M-%S.mcap"))
     selection = recorder.TopicSelection(tuple(topics or ()), tuple(excluded or ()))
     ended = threading.Event()
-    with node_for("record", master) as node:
+    with open_command_node("record", master) as node:
         node.graph()  # fail before creating a file if there is no master
         parts = splits.SplitFiles(path, max_bytes) if split and max_bytes is not None else None
         file = writer.RecordingWriter(parts or path, note=note, on_problem=lambda _reason: ended.set())
         try:
             with recorder.Recorder(node, file, selection):
-                interrupts.call_first(ended.set)
+                interrupts.call_on_signal(ended.set)
                 if not as_json:
                     template = _("recording to '{path}'; press Ctrl+C to stop")
                     print_status(template.format(path=path if parts is None else parts.paths[0]))
@@ -147,8 +147,8 @@ def _max_bytes(text: str | None, *, split: bool) -> int | None:
         if split:
             raise typer.BadParameter(_("--split needs a size: --max-size 500MB"), param_hint="--split")
         return None
-    found = _SIZE.fullmatch(text.strip())
-    size_bytes = round(float(found[1].replace(",", ".")) * _UNITS[found[2].lower()]) if found else 0
+    found = _SIZE_PATTERN.fullmatch(text.strip())
+    size_bytes = round(float(found[1].replace(",", ".")) * _UNIT_BYTES[found[2].lower()]) if found else 0
     if not splits.MIN_PART_BYTES <= size_bytes < 2**63:
         raise typer.BadParameter(
             _("'{given}' is not a valid size; use 100kB or more, such as 500MB or 2GB").format(
@@ -180,10 +180,10 @@ def _wait(
         return
     with out.status("") as shown:
         while not has_ended():
-            shown.update(_line(file.status))
+            shown.update(_status_line(file.status))
 
 
-def _line(status: writer.RecordingStatus) -> str:
+def _status_line(status: writer.RecordingStatus) -> str:
     lost = sum(each.lost or 0 for each in status.topics.values())
     return _("{time}  {messages} messages, {size}, {lost} lost, {unkept} write errors").format(
         time=clock_text(status.duration_s),

@@ -52,7 +52,7 @@ ToOption = Annotated[
         show_default=False,
     ),
 ]
-TopicsToRecord = Annotated[
+TopicsToRecordArgument = Annotated[
     list[str] | None,
     typer.Argument(
         metavar=_("TOPIC|PATTERN"),
@@ -63,7 +63,7 @@ TopicsToRecord = Annotated[
 ]
 
 
-def _complete_recorded(ctx: typer.Context, incomplete: str) -> list[str]:
+def _complete_recorded_topic(ctx: typer.Context, incomplete: str) -> list[str]:
     path = ctx.params.get("file")
     if path is None:
         return []
@@ -80,12 +80,12 @@ RecordedTopicsArgument = Annotated[
         metavar=_("TOPIC|PATTERN"),
         help=_("Topics of the recording, or patterns such as '/arm/*'."),
         show_default=False,
-        autocompletion=_complete_recorded,
+        autocompletion=_complete_recorded_topic,
     ),
 ]
 
 
-def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str]:
+def selected_topics(recording: reader.Recording, words: Sequence[str]) -> list[str]:
     """Return the topics selected by names and patterns, in the order of these words.
 
     Raises:
@@ -109,15 +109,15 @@ def chosen_topics(recording: reader.Recording, words: Sequence[str]) -> list[str
     return list(chosen)
 
 
-def end_with_damage(recording: reader.Recording) -> None:
+def exit_if_damaged(recording: reader.Recording) -> None:
     """Print the damage of a recording and exit with code 1; do nothing if the recording is intact."""
-    words = damage.damage_words(recording.damage, recording.start_ns)
+    words = damage.corruption_text(recording.corruption, recording.start_ns)
     if words:
         print_status(words)
         raise typer.Exit(1)
 
 
-def span_ns(
+def parse_span_ns(
     recording: reader.Recording, begin: str | float | None, end: str | float | None
 ) -> tuple[int | None, int | None]:
     """Parse begin and end of a part of a recording; return them in ns since 1970. See `time_ns`.
@@ -125,14 +125,14 @@ def span_ns(
     Raises:
         typer.BadParameter: A time is invalid, or the part is empty.
     """
-    first = None if begin is None else time_ns(str(begin), recording.start_ns, recording.end_ns)
-    last = None if end is None else time_ns(str(end), recording.start_ns, recording.end_ns)
+    first = None if begin is None else parse_time_ns(str(begin), recording.start_ns, recording.end_ns)
+    last = None if end is None else parse_time_ns(str(end), recording.start_ns, recording.end_ns)
     if first is not None and last is not None and first >= last:
         raise typer.BadParameter(_("--to must be later than --from"))
     return first, last
 
 
-def time_ns(text: str, start_ns: int, end_ns: int) -> int:
+def parse_time_ns(text: str, start_ns: int, end_ns: int) -> int:
     """Parse a time within a recording and return it in ns since 1970.
 
     Accepts seconds after the start ("12.5"), a time of day ("15:04:05", "15:04:05.250", "15:04:05Z") or a
@@ -146,7 +146,7 @@ def time_ns(text: str, start_ns: int, end_ns: int) -> int:
     try:
         seconds = float(words)
     except ValueError:
-        return _clock_ns(words, start_ns, end_ns)
+        return _parse_clock_time_ns(words, start_ns, end_ns)
     if not 0.0 <= seconds < 1e9:
         raise typer.BadParameter(
             _("{given:g} is not a valid duration; use a number of seconds, 0 or greater").format(
@@ -156,16 +156,16 @@ def time_ns(text: str, start_ns: int, end_ns: int) -> int:
     return start_ns + int(seconds * 1e9)
 
 
-def _clock_ns(words: str, start_ns: int, end_ns: int) -> int:
+def _parse_clock_time_ns(words: str, start_ns: int, end_ns: int) -> int:
     iso = f"{words[:-1]}+00:00" if words.endswith(("Z", "z")) else words
     try:
         try:
             given = time.fromisoformat(iso)
         except ValueError:
-            return _since_1970(datetime.fromisoformat(iso))
+            return _to_unix_ns(datetime.fromisoformat(iso))
         began = datetime.fromtimestamp(start_ns / 1e9, given.tzinfo)  # local time without a time zone
-        found = _since_1970(datetime.combine(began.date(), given))
-        later = _since_1970(datetime.combine(began.date() + timedelta(days=1), given))
+        found = _to_unix_ns(datetime.combine(began.date(), given))
+        later = _to_unix_ns(datetime.combine(began.date() + timedelta(days=1), given))
     except (ValueError, OverflowError, OSError) as error:
         raise typer.BadParameter(
             _(
@@ -175,7 +175,7 @@ def _clock_ns(words: str, start_ns: int, end_ns: int) -> int:
     return later if found < start_ns and later <= end_ns else found
 
 
-def _since_1970(at: datetime) -> int:
+def _to_unix_ns(at: datetime) -> int:
     # In ns; local time without a time zone. Raises as `datetime.timestamp` does.
     return int(at.replace(microsecond=0).timestamp()) * 1_000_000_000 + at.microsecond * 1000
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli.options import JsonOption
-from nep.cli.recording_files import FileArgument, clock_text, end_with_damage, progress_bar
+from nep.cli.recording_files import FileArgument, clock_text, exit_if_damaged, progress_bar
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, rate, show_json, show_table, size, write
-from nep.i18n import _, lazy, listed, ngettext
+from nep.i18n import _, format_list, lazy, ngettext
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped, quotable
 
@@ -28,7 +28,7 @@ _MAX_VALUES = 20
 _MAX_CHECKED_BYTES = 1_000_000_000
 _OWN_METADATA = frozenset({"nep.recording", "nep.figures"})
 _COLUMNS = (
-    TextColumn(lazy("topic"), style="bold", is_whole=True),
+    TextColumn(lazy("topic"), style="bold", is_folded_last=True),
     TextColumn(lazy("type")),
     TextColumn(lazy("encoding")),
     TextColumn(lazy("schema")),
@@ -40,7 +40,7 @@ _COLUMNS = (
     TextColumn(lazy("write errors"), "right"),
 )
 _ATTACHMENT_COLUMNS = (
-    TextColumn(lazy("attachment"), is_whole=True),
+    TextColumn(lazy("attachment"), is_folded_last=True),
     TextColumn(lazy("type")),
     TextColumn(lazy("size"), "right"),
 )
@@ -59,11 +59,11 @@ def info(
     """
     opened = file_reader.FileReader(file)
     with reader.Recording(file, file=opened) as recording:
-        topic_figures = recording.figures()
+        topic_figures = recording.stats()
         with progress_bar(_("checking")) as progress:
             is_checked = opened.check(progress, None if check_all else _MAX_CHECKED_BYTES)
         if as_json:
-            show_json(_plain(recording, topic_figures))
+            show_json(_to_plain(recording, topic_figures))
         else:
             _show(recording, topic_figures)
             if not is_checked:
@@ -75,23 +75,23 @@ def info(
                 "shown; to repair it: nep recording repair {file}"
             )
             print_status(template.format(file=file))
-        end_with_damage(recording)
+        exit_if_damaged(recording)
 
 
-def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.TopicFigures]) -> None:
+def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.TopicStats]) -> None:
     head = _("{messages} messages in {time}, {size}, from {started}").format(
         messages=recording.message_count,
         time=clock_text(recording.duration_s),
         size=size(recording.size_bytes),
-        started=_day_text(recording.start_ns),
+        started=_timestamp_text(recording.start_ns),
     )
     write(f"{head}\n")
-    if recording.words.get("note"):
-        write(f"{escaped(recording.words['note'])}\n")
-    if recording.words.get("part"):
-        part = quotable(recording.words["part"])
+    if recording.recorder_metadata.get("note"):
+        write(f"{escaped(recording.recorder_metadata['note'])}\n")
+    if recording.recorder_metadata.get("part"):
+        part = quotable(recording.recorder_metadata["part"])
         write(_("file {number} of a recording that was split").format(number=part) + "\n")
-    write(f"{_written_by(recording.facts)}\n")
+    write(f"{_writer_text(recording.facts)}\n")
     topics = list(islice(recording.topics.values(), _MAX_ROWS))
     show_table(_COLUMNS, [_row(recording, each, topic_figures.get(each.name)) for each in topics])
     left_out = len(recording.topics) - len(topics)
@@ -112,7 +112,7 @@ def _show(recording: reader.Recording, topic_figures: Mapping[str, figures.Topic
         write(f"{line}\n")
 
 
-def _written_by(facts: file_reader.FileFacts) -> str:
+def _writer_text(facts: file_reader.FileFacts) -> str:
     kinds = []
     for name, count in sorted(facts.compressions.items()):
         if name == "-":
@@ -124,7 +124,7 @@ def _written_by(facts: file_reader.FileFacts) -> str:
     if facts.profile:
         parts.append(_("profile {profile}").format(profile=quotable(facts.profile)))
     return _("written by {program}; {chunks}").format(
-        program=", ".join(parts), chunks=listed(kinds, "and") if kinds else _("no messages")
+        program=", ".join(parts), chunks=format_list(kinds, "and") if kinds else _("no messages")
     )
 
 
@@ -144,7 +144,7 @@ def _metadata_lines(facts: file_reader.FileFacts) -> Iterator[str]:
         yield template.format(count=count)
 
 
-def _day_text(at_ns: int) -> str:
+def _timestamp_text(at_ns: int) -> str:
     try:
         day = datetime.fromtimestamp(at_ns / 1e9, tz=timezone.utc).astimezone() if at_ns else None
     except (OSError, OverflowError, ValueError):  # out of range: written by another program
@@ -153,7 +153,7 @@ def _day_text(at_ns: int) -> str:
 
 
 def _row(
-    recording: reader.Recording, topic: reader.RecordedTopic, topic_figures: figures.TopicFigures | None
+    recording: reader.Recording, topic: reader.RecordedTopic, topic_figures: figures.TopicStats | None
 ) -> tuple[str, ...]:
     duration = recording.duration_s
     return (
@@ -170,8 +170,8 @@ def _row(
     )
 
 
-def _plain(
-    recording: reader.Recording, topic_figures: Mapping[str, figures.TopicFigures]
+def _to_plain(
+    recording: reader.Recording, topic_figures: Mapping[str, figures.TopicStats]
 ) -> dict[str, object]:
     facts = recording.facts
     return {
@@ -180,7 +180,7 @@ def _plain(
         "end_ns": recording.end_ns,
         "size_bytes": recording.size_bytes,
         "is_complete": recording.is_complete,
-        "words": dict(recording.words),
+        "words": dict(recording.recorder_metadata),
         "library": facts.library,
         "profile": facts.profile,
         "compressions": dict(facts.compressions),
@@ -201,7 +201,7 @@ def _plain(
                 "size_bytes": each.length,
                 "message_count": each.message_count,
             }
-            for each in recording.damage
+            for each in recording.corruption
         ],
         "topics": {
             each.name: {

@@ -15,10 +15,10 @@ from nep.cli.recording_files import (
     FromOption,
     RecordedTopicsArgument,
     ToOption,
-    chosen_topics,
     clock_text,
+    parse_span_ns,
     progress_bar,
-    span_ns,
+    selected_topics,
 )
 from nep.cli.screen import UNKNOWN, print_status, show_json, size
 from nep.cli.typer_words import TranslatedGroup
@@ -77,7 +77,7 @@ def repair(
                 "discarded_bytes": report.discarded_bytes,
                 "lost_s": report.lost_s,
                 "duration_s": report.duration_s,
-                "damaged_places": report.damaged_places,
+                "damaged_places": report.damaged_range_count,
             }
         )
         return
@@ -89,7 +89,7 @@ def repair(
     print_status(
         template.format(count=report.recovered, time=clock_text(report.duration_s), path=report.path)
     )
-    if not report.is_whole:
+    if not report.is_complete:
         lost_count = UNKNOWN if report.discarded is None else str(report.discarded)
         words = _("lost: {messages} messages, {size}, the last {seconds} s")
         print_status(
@@ -140,12 +140,12 @@ def export(
     if not 0.1 <= fps <= 240:
         raise typer.BadParameter(_("the frame rate of a video must be 0.1 to 240"), param_hint="--fps")
     with reader.Recording(file) as recording:
-        chosen = chosen_topics(recording, topics) if topics else None
-        part = exports.Part(*span_ns(recording, from_s, to_s), chosen)
+        chosen = selected_topics(recording, topics) if topics else None
+        part = exports.Part(*parse_span_ns(recording, from_s, to_s), chosen)
         folder = output or file.with_name(file.stem)
         with progress_bar(_("exporting")) as progress:
             exported = exports.export(recording, kind, folder, part, fps=fps, progress=progress)
-        words = damage.damage_words(recording.damage, recording.start_ns)
+        words = damage.corruption_text(recording.corruption, recording.start_ns)
     if as_json:
         show_json(
             [
@@ -153,7 +153,7 @@ def export(
                     "topic": each.topic,
                     "path": str(each.path),
                     "count": each.count,
-                    "unreadable": each.unreadable,
+                    "unreadable": each.undecodable_count,
                 }
                 for each in exported
             ]
@@ -165,14 +165,14 @@ def export(
         raise typer.Exit(1)
 
 
-def _show_exported(exported: Sequence[exports.Exported]) -> None:
+def _show_exported(exported: Sequence[exports.ExportedFile]) -> None:
     for each in exported:
         template = ngettext("{count} message: '{path}'", "{count} messages: '{path}'", each.count)
         print_status(template.format(count=each.count, path=each.path))
-        if each.unreadable:
+        if each.undecodable_count:
             words = ngettext(
                 "skipped {count} undecodable message",
                 "skipped {count} undecodable messages",
-                each.unreadable,
+                each.undecodable_count,
             )
-            print_status(words.format(count=each.unreadable))
+            print_status(words.format(count=each.undecodable_count))

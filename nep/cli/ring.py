@@ -16,9 +16,9 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.complete import complete_topic
-from nep.cli.network import node_for
+from nep.cli.network import open_command_node
 from nep.cli.options import JsonOption, MasterOption
-from nep.cli.recording_files import TopicsToRecord, clock_text
+from nep.cli.recording_files import TopicsToRecordArgument, clock_text
 from nep.cli.screen import console, print_status, show_json, size
 from nep.errors import NepError, RecordingError
 from nep.i18n import _, ngettext
@@ -35,10 +35,10 @@ else:  # imported on use: other commands stay fast and need no extra packages
 _STATUS_PERIOD_S = 0.2
 SAVE_TIMEOUT_S = 120.0
 """Time limit of a save in seconds; copying some GB to a slow disk takes long."""
-_FOLDER = ".nep-ring"
+_BUFFER_FOLDER = ".nep-ring"
 _STOP, _KEEP = "end", "keep"
-_NAME = "flight_recorder"
-KEEP_SERVICE = f"{_NAME}/keep"
+_DEFAULT_NAME = "flight_recorder"
+KEEP_SERVICE = f"{_DEFAULT_NAME}/keep"
 """Name of the service that saves the buffer of a flight recorder with the default name."""
 NameOption = Annotated[
     str,
@@ -53,16 +53,16 @@ class _Saver:
         self._ring, self._folder, self._seconds, self._as_json = ring, folder, seconds, as_json
         self._lock = threading.Lock()
 
-    def answer(self, request: object) -> dict[str, object]:
+    def handle_request(self, request: object) -> dict[str, object]:
         # The request is {"seconds": 30, "note": "it fell"}; both keys are optional. Raises `NepError`.
         request_body = request if isinstance(request, dict) else {}
         seconds, note = request_body.get("seconds", self._seconds), request_body.get("note", "")
         is_number = isinstance(seconds, int | float) and not isinstance(seconds, bool)
         if not is_number or not isinstance(note, str):
             raise NepError(_('the request must be a JSON object such as {"seconds": 30, "note": "it fell"}'))
-        return self.keep(float(seconds), note)
+        return self.save(float(seconds), note)
 
-    def keep(self, seconds: float | None = None, note: str = "") -> dict[str, object]:
+    def save(self, seconds: float | None = None, note: str = "") -> dict[str, object]:
         wanted = self._seconds if seconds is None else seconds
         if not 0.0 < wanted < 1e9:
             raise NepError(
@@ -71,7 +71,7 @@ class _Saver:
                 )
             )
         with self._lock:
-            kept = self._ring.keep(self._free_path(), min(wanted, self._seconds), note)
+            kept = self._ring.save(self._free_path(), min(wanted, self._seconds), note)
         result: dict[str, object] = {**asdict(kept), "path": str(kept.path.resolve())}
         if self._as_json:
             show_json(result)
@@ -94,7 +94,7 @@ class _Saver:
 
 
 def ring(
-    topics: TopicsToRecord = None,
+    topics: TopicsToRecordArgument = None,
     seconds: Annotated[
         float, typer.Option("--seconds", "-s", metavar=_("SECONDS"), help=_("Length of the buffer."))
     ] = 60.0,
@@ -115,7 +115,7 @@ def ring(
             autocompletion=complete_topic,
         ),
     ] = None,
-    name: NameOption = _NAME,
+    name: NameOption = _DEFAULT_NAME,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -130,9 +130,9 @@ def ring(
             raise typer.BadParameter(template.format(given=given, least=least, most=most), param_hint=hint)
     selection = recorder.TopicSelection(tuple(topics or ()), tuple(excluded or ()))
     commands: queue.SimpleQueue[str] = queue.SimpleQueue()
-    with node_for("ring", master) as node:
+    with open_command_node("ring", master) as node:
         node.graph()  # fail before writing anything if there is no master
-        place = folder / _FOLDER
+        place = folder / _BUFFER_FOLDER
         with rings.FlightRecorder(
             place,
             seconds=seconds,
@@ -142,9 +142,9 @@ def ring(
             keeper = _Saver(kept, folder, seconds, as_json=as_json)
             with (
                 recorder.Recorder(node, kept, selection),
-                node.new_server(f"{name}/keep", keeper.answer, threads=1),
+                node.new_server(f"{name}/keep", keeper.handle_request, threads=1),
             ):
-                interrupts.call_first(lambda: commands.put(_STOP))
+                interrupts.call_on_signal(lambda: commands.put(_STOP))
                 _save_on_signal(commands)
                 if not as_json:
                     template = _(
@@ -181,7 +181,7 @@ def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.
         while (order := next_command()) != _STOP:
             if order == _KEEP:
                 try:
-                    keeper.keep()
+                    keeper.save()
                 except NepError as error:
                     print_status(str(error))
             if shown is not None:
@@ -190,7 +190,7 @@ def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.
                 shown.update(words.format(time=clock_text(status.seconds), size=size(status.size_bytes)))
 
 
-def has_ring(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
+def has_flight_recorder(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
     """Return True if a flight recorder is running.
 
     Calling a missing service would wait for the time limit.
@@ -216,7 +216,7 @@ def keep(
             show_default=False,
         ),
     ] = None,
-    name: NameOption = _NAME,
+    name: NameOption = _DEFAULT_NAME,
     master: MasterOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -224,8 +224,8 @@ def keep(
     request_body: dict[str, object] = {"note": note}
     if seconds is not None:
         request_body["seconds"] = seconds
-    with node_for("keep", master) as node:
-        if not has_ring(node.graph(), f"{name}/keep"):
+    with open_command_node("keep", master) as node:
+        if not has_flight_recorder(node.graph(), f"{name}/keep"):
             raise NepError(_("nothing to save: 'nep recording ring' is not running"))
         answer = node.new_client(f"{name}/keep", timeout_s=SAVE_TIMEOUT_S).call(request_body)
     result = answer if isinstance(answer, dict) else {}

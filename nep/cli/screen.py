@@ -39,7 +39,7 @@ class TextColumn:
     head: str
     justify: Literal["left", "right"] = "left"
     style: str = ""
-    is_whole: bool = False
+    is_folded_last: bool = False
     """True if this column is folded last on a narrow terminal. Columns of numbers are never folded."""
 
 
@@ -62,7 +62,7 @@ def _console_class() -> type[Console]:
     return OpenConsole
 
 
-def json_painter() -> Callable[[str, str], Text]:
+def json_highlighter() -> Callable[[str, str], Text]:
     """Return a function (head, body) that formats a message with a dim head and a coloured JSON body."""
     from rich.highlighter import JSONHighlighter  # noqa: PLC0415 - see `console`
     from rich.text import Text  # noqa: PLC0415
@@ -84,11 +84,11 @@ def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> 
     room = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH
     lines = [[escaped(cell, lines=True) for cell in row] for row in rows]
     widths = _widths(columns, lines, room)
-    if _total(widths) > room:
-        write("".join(_blocks(columns, lines)))
+    if _total_width(widths) > room:
+        write("".join(_record_blocks(columns, lines)))
         return
-    if len(lines) > _MAX_RICH_ROWS and _fit(lines, widths):
-        sys.stdout.write("".join(f"{line}\n" for line in _laid_out(columns, lines, widths)))
+    if len(lines) > _MAX_RICH_ROWS and _cells_fit(lines, widths):
+        sys.stdout.write("".join(f"{line}\n" for line in _layout_lines(columns, lines, widths)))
         return
     from rich import box  # noqa: PLC0415 - see `console`
     from rich.table import Table  # noqa: PLC0415
@@ -122,11 +122,11 @@ def padded(text: str, width: int, justify: Literal["left", "right"] = "left") ->
     return text + room if justify == "left" else room + text
 
 
-def _total(widths: Sequence[int]) -> int:
+def _total_width(widths: Sequence[int]) -> int:
     return sum(widths) + _COLUMN_GAP * (len(widths) - 1)
 
 
-def _blocks(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def _record_blocks(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]]) -> Iterator[str]:
     for row in rows:
         yield f"{row[0]}\n"
         for column, cell in zip(columns[1:], row[1:], strict=True):
@@ -134,7 +134,7 @@ def _blocks(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]]) -> Ite
                 yield f"  {column.head}: {', '.join(cell.splitlines())}\n"
 
 
-def _fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
+def _cells_fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
     return all(
         cells(cell) <= width and "\n" not in cell
         for row in rows
@@ -142,7 +142,7 @@ def _fit(rows: Sequence[Sequence[str]], widths: Sequence[int]) -> bool:
     )
 
 
-def _laid_out(
+def _layout_lines(
     columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], widths: Sequence[int]
 ) -> Iterator[str]:
     gap = " " * _COLUMN_GAP
@@ -154,7 +154,7 @@ def _laid_out(
         ).rstrip()
 
     yield line(column.head for column in columns)
-    yield "─" * _total(widths)
+    yield "─" * _total_width(widths)
     yield from map(line, rows)
 
 
@@ -163,8 +163,8 @@ def _widths(columns: Sequence[TextColumn], rows: Sequence[Sequence[str]], room: 
         max(cells(line) for cell in (column.head, *(row[at] for row in rows)) for line in cell.split("\n"))
         for at, column in enumerate(columns)
     ]
-    is_fixed = [column.is_whole or column.justify == "right" for column in columns]
-    while _total(widths) > room:
+    is_fixed = [column.is_folded_last or column.justify == "right" for column in columns]
+    while _total_width(widths) > room:
         giving = [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH and not is_fixed[at]]
         giving = giving or [at for at, width in enumerate(widths) if width > _MIN_COLUMN_WIDTH]
         if not giving:
@@ -191,7 +191,7 @@ def print_status(sentence: str, out: Terminal | None = None) -> None:
         console(stderr=True, out=out).print(escaped(sentence), style="dim", markup=False)
 
 
-def say_error(sentence: str) -> None:
+def print_error_message(sentence: str) -> None:
     """Print an error message to stderr."""
     print_error(f"nep: {escaped(sentence, lines=True)}")  # plain text: unbuffered and readable for programs
 

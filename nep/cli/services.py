@@ -11,12 +11,12 @@ import typer
 from nep.cli.complete import complete_service, complete_service_type
 from nep.cli.json_input import parse_json, text_of
 from nep.cli.network import BackendOption, graph_of, open_node
-from nep.cli.options import JsonOption, MasterOption, checked_time
+from nep.cli.options import JsonOption, MasterOption, check_duration
 from nep.cli.publish import read_file
 from nep.cli.screen import UNKNOWN, TextColumn, print_status, show_alerts, show_json, show_table, size, write
-from nep.cli.topic_wait import meant
+from nep.cli.topic_wait import suggestion
 from nep.cli.typer_words import TranslatedGroup
-from nep.cli.values import ids_as_text, presented, service_type_text
+from nep.cli.values import format_payload, ids_as_text, service_type_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
 from nep.protocol.graph_view import GraphView, ServiceInfo
@@ -30,14 +30,14 @@ app: typer.Typer = typer.Typer(
 )
 _TIMEOUT_S = 5.0
 _COLUMNS = (
-    TextColumn(lazy("service"), style="bold", is_whole=True),
+    TextColumn(lazy("service"), style="bold", is_folded_last=True),
     TextColumn(lazy("servers"), style="green"),
     TextColumn(lazy("clients"), style="cyan"),
     TextColumn(lazy("answered"), "right"),
     TextColumn(lazy("errors"), "right"),
 )
 _INFO_COLUMNS = (
-    TextColumn(lazy("node"), style="bold", is_whole=True),
+    TextColumn(lazy("node"), style="bold", is_folded_last=True),
     TextColumn(lazy("role")),
     TextColumn(lazy("answered"), "right"),
     TextColumn(lazy("errors"), "right"),
@@ -81,7 +81,7 @@ def info(
 ) -> None:
     """Print information about a service: its type, servers and clients."""
     graph = graph_of(master, backend)
-    found = _found(service, graph)
+    found = _find_service(service, graph)
     if as_json:
         show_json(ids_as_text(_record(graph, found)))
         return
@@ -105,7 +105,7 @@ def show_type(
     as_json: JsonOption = False,
 ) -> None:
     """Print the type of a service."""
-    found = _found(service, graph_of(master, backend))
+    found = _find_service(service, graph_of(master, backend))
     if as_json:
         show_json({"service": found.name, "msg_type": found.msg_type})
     else:
@@ -139,7 +139,7 @@ def find(
         template = _(
             "no service has the type '{msg_type}'; {meant}'nep service type NAME' shows a service's type"
         )
-        print_status(template.format(msg_type=quotable(msg_type), meant=meant(msg_type, types)))
+        print_status(template.format(msg_type=quotable(msg_type), meant=suggestion(msg_type, types)))
 
 
 @app.command("call")
@@ -162,7 +162,7 @@ def call(
                 seconds=_TIMEOUT_S
             ),
             show_default=False,
-            callback=checked_time,
+            callback=check_duration,
         ),
     ] = None,
     master: MasterOption = None,
@@ -170,43 +170,43 @@ def call(
     as_json: JsonOption = False,
 ) -> None:
     """Call a service and print its reply."""
-    asked = _request(request)
+    asked = _parse_request(request)
     with open_node("nep-service-call", master, backend) as node:
         client = node.new_client(service, timeout_s=_TIMEOUT_S if timeout_s is None else timeout_s)
         answer = client.call(asked)
     if as_json:
         show_json(answer)
     else:
-        write(f"{presented(answer, whole=True)}\n")
+        write(f"{format_payload(answer, whole=True)}\n")
 
 
-def _request(text: str) -> object:
+def _parse_request(text: str) -> object:
     if not text.startswith("@"):
         return parse_json(text)
     file = text[1:]
     return parse_json(text_of(read_file(Path(file), "json"), file), file=file)
 
 
-def _found(service: str, graph: GraphView) -> ServiceInfo:
+def _find_service(service: str, graph: GraphView) -> ServiceInfo:
     found = graph.services.get(service)
     if found is None:
         check_service(service)
         template = _("no service '{service}'; {meant}'nep service list' shows all services")
-        raise NepError(template.format(service=service, meant=meant(service, list(graph.services))))
+        raise NepError(template.format(service=service, meant=suggestion(service, list(graph.services))))
     return found
 
 
 def _row(graph: GraphView, service: ServiceInfo) -> tuple[str, ...]:
     return (
         escaped(service.name),
-        _names(graph, [each.node_id for each in service.servers]),
-        _names(graph, [each.node_id for each in service.clients]),
+        _node_names(graph, [each.node_id for each in service.servers]),
+        _node_names(graph, [each.node_id for each in service.clients]),
         str(service.calls) if service.servers else UNKNOWN,
         str(service.errors) if service.servers else UNKNOWN,
     )
 
 
-def _names(graph: GraphView, node_ids: list[str]) -> str:
+def _node_names(graph: GraphView, node_ids: list[str]) -> str:
     names = [escaped(graph.nodes[each].name) for each in node_ids if each in graph.nodes]
     return "\n".join(dict.fromkeys(names)) or UNKNOWN
 
@@ -214,14 +214,14 @@ def _names(graph: GraphView, node_ids: list[str]) -> str:
 def _record(graph: GraphView, service: ServiceInfo) -> dict[str, object]:
     record: dict[str, object] = asdict(service)
     for role, members in (("servers", service.servers), ("clients", service.clients)):
-        record[role] = [{**asdict(each), "node": _name(graph, each.node_id)} for each in members]
+        record[role] = [{**asdict(each), "node": _node_name(graph, each.node_id)} for each in members]
     return record
 
 
 def _rows(graph: GraphView, service: ServiceInfo) -> list[tuple[str, ...]]:
     servers = [
         (
-            escaped(_name(graph, each.node_id) or UNKNOWN),
+            escaped(_node_name(graph, each.node_id) or UNKNOWN),
             _("serves"),
             str(each.calls),
             str(each.errors),
@@ -232,10 +232,10 @@ def _rows(graph: GraphView, service: ServiceInfo) -> list[tuple[str, ...]]:
     ]
     clients = [
         (
-            escaped(_name(graph, each.node_id) or UNKNOWN),
+            escaped(_node_name(graph, each.node_id) or UNKNOWN),
             _("calls"),
-            _count(each.answered),
-            _count(each.failed),
+            _count_text(each.answered),
+            _count_text(each.failed),
             UNKNOWN,
             UNKNOWN,
         )
@@ -244,10 +244,10 @@ def _rows(graph: GraphView, service: ServiceInfo) -> list[tuple[str, ...]]:
     return [*servers, *sorted(clients)]  # calls go to the first server
 
 
-def _name(graph: GraphView, node_id: str) -> str | None:
+def _node_name(graph: GraphView, node_id: str) -> str | None:
     node = graph.nodes.get(node_id)
     return None if node is None else node.name
 
 
-def _count(value: int | None) -> str:
+def _count_text(value: int | None) -> str:
     return UNKNOWN if value is None else str(value)

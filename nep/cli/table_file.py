@@ -12,11 +12,11 @@ from nep.cli.screen import print_status
 from nep.cli.values import json_of
 from nep.errors import DecodeError
 from nep.i18n import _, ngettext
-from nep.messages.fields import MISSING, Path, parse_path, pick
+from nep.messages.fields import MISSING, Path, parse_path, value_at
 from nep.messages.message import Message
 from nep.text import escaped
 
-STAMP = "stamp_s"
+STAMP_COLUMN = "stamp_s"
 
 
 class TextSink(Protocol):
@@ -29,7 +29,7 @@ class TextSink(Protocol):
         """Flush buffered text."""
 
 
-class Fields:
+class FieldExtractor:
     """Extractor of fields from messages. Counts messages in which a field is missing."""
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -40,7 +40,7 @@ class Fields:
         self.messages = 0
         self.unreadable = 0
 
-    def of(self, message: Message) -> list[object] | None:
+    def extract(self, message: Message) -> list[object] | None:
         """Return the field values of a message (`MISSING` for missing ones); None if it can't be decoded."""
         try:
             payload = dict(message.extension) if message.codec == "image" else message.payload
@@ -48,11 +48,11 @@ class Fields:
             self.unreadable += 1
             return None
         self.messages += 1
-        values = [pick(payload, path) for path in self._paths]
+        values = [value_at(payload, path) for path in self._paths]
         self.missing.update(name for name, value in zip(self.names, values, strict=True) if value is MISSING)
         return values
 
-    def plain(self, values: Sequence[object]) -> dict[str, object]:
+    def as_dict(self, values: Sequence[object]) -> dict[str, object]:
         """Convert the result of `of` to a dict by field name, without missing fields."""
         return {name: value for name, value in zip(self.names, values, strict=True) if value is not MISSING}
 
@@ -74,22 +74,24 @@ class Fields:
             print_status(template.format(count=self.unreadable))
 
 
-class Table:
+class CsvWriter:
     """Writer of comma-separated values: the time of publication (s since 1970), followed by the fields."""
 
-    def __init__(self, fields: Fields, out: TextSink | None = None, *, names_topic: bool = False) -> None:
+    def __init__(
+        self, fields: FieldExtractor, out: TextSink | None = None, *, names_topic: bool = False
+    ) -> None:
         self._fields = fields
         self._names_topic = names_topic
         # escape control characters only on a terminal; files get the original text
         self._clean = escaped if out is None and sys.stdout.isatty() else str
         self._out = out or _binary_safe_stdout()
         self._write = csv.writer(self._out, lineterminator="\r\n").writerow
-        self._write([STAMP, *(["topic"] if names_topic else []), *fields.names])
+        self._write([STAMP_COLUMN, *(["topic"] if names_topic else []), *fields.names])
         self._out.flush()
 
     def __call__(self, message: Message) -> None:
         """Write one row for a message."""
-        values = self._fields.of(message)
+        values = self._fields.extract(message)
         if values is not None:
             topic = [message.topic] if self._names_topic else []
             self._write(

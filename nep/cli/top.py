@@ -48,7 +48,7 @@ _WAIT_SLICE_S = 0.1
 _MAX_NAMES_LENGTH = 40
 _FRAME_LINES = 6
 """Number of terminal lines that are not rows: two headings with rules, the summary, and a spare line."""
-_NODES_SHARE = 3
+_NODE_ROWS_DIVISOR = 3
 """Divisor of the rows for nodes: a third, plus rows that topics don't need."""
 
 
@@ -62,7 +62,7 @@ class TopicOrder(str, enum.Enum):
 
 
 _TOPIC_COLUMNS = (
-    TextColumn(lazy("topic"), style="bold", is_whole=True),
+    TextColumn(lazy("topic"), style="bold", is_folded_last=True),
     TextColumn(lazy("type")),
     TextColumn(lazy("publishers"), style="green"),
     TextColumn(lazy("rate"), "right"),
@@ -71,7 +71,7 @@ _TOPIC_COLUMNS = (
     TextColumn(lazy("lost"), "right"),
 )
 _NODE_COLUMNS = (
-    TextColumn(lazy("node"), style="bold", is_whole=True),
+    TextColumn(lazy("node"), style="bold", is_folded_last=True),
     TextColumn(lazy("computer")),
     TextColumn(lazy("pid"), "right"),
     TextColumn(lazy("language")),
@@ -149,7 +149,7 @@ def _screen(*, as_json: bool) -> AbstractContextManager[Live | None]:
         return nullcontext(None)
     from rich.live import Live  # noqa: PLC0415 - only a terminal needs it
 
-    interrupts.leave_when_told()  # exit through cleanup, which restores the terminal
+    interrupts.exit_on_termination()  # exit through cleanup, which restores the terminal
     out: Console = console()
     out.soft_wrap = False
     return Live(console=out, screen=True, auto_refresh=False, redirect_stdout=False, redirect_stderr=False)
@@ -158,7 +158,7 @@ def _screen(*, as_json: bool) -> AbstractContextManager[Live | None]:
 # ---- output
 
 
-def _sortable(value: float | None) -> float:
+def _sort_key(value: float | None) -> float:
     return -1.0 if value is None or math.isnan(value) else value
 
 
@@ -178,7 +178,7 @@ def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrd
         TopicOrder.LOST: lambda each: each.lost,
     }
     if order in figures:
-        found.sort(key=lambda each: _sortable(figures[order](each)), reverse=True)
+        found.sort(key=lambda each: _sort_key(figures[order](each)), reverse=True)
     return found
 
 
@@ -189,7 +189,7 @@ def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
         for publisher in topic.publishers:
             if publisher.rate_hz is not None:
                 published[publisher.node_id] = published.get(publisher.node_id, 0.0) + publisher.rate_hz
-    nodes = sorted(graph.nodes.values(), key=lambda node: (-_sortable(node.cpu_ratio), node.name, node.id))
+    nodes = sorted(graph.nodes.values(), key=lambda node: (-_sort_key(node.cpu_ratio), node.name, node.id))
     return [(node, published.get(node.id)) for node in nodes]
 
 
@@ -219,14 +219,14 @@ class _GraphPrinter:
         if problem:
             print_status(problem)
             return
-        write(f"{self.head(graph)}\n")
+        write(f"{self.summary(graph)}\n")
         topics = topic_rows(graph, self.pattern, self.order)
         show_table(_TOPIC_COLUMNS, [self.topic_cells(graph, each) for each in topics])
         write("\n")
         show_table(_NODE_COLUMNS, [self.node_cells(*each) for each in node_rows(graph)])
         write("\n")
 
-    def head(self, graph: GraphView) -> str:
+    def summary(self, graph: GraphView) -> str:
         rates = [each.rate_hz for each in graph.topics.values() if each.rate_hz is not None]
         bytes_s = [each.bandwidth_Bps for each in graph.topics.values() if each.bandwidth_Bps is not None]
         lost = [each.lost for each in graph.topics.values() if each.lost is not None]
@@ -277,11 +277,11 @@ class _LiveTables:
         topics, nodes = topic_rows(graph, self._shown.pattern, self._shown.order), node_rows(graph)
         notes = [Text(f"! {problem}", "yellow")] if problem else []
         notes += [Text(f"! {escaped(alert.sentence)}", "yellow", no_wrap=True) for alert in graph.alerts]
-        room = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_NODES_SHARE]))
-        for_nodes = max(min(len(nodes), room // _NODES_SHARE), room - len(topics))
+        room = max(2, shutil.get_terminal_size().lines - _FRAME_LINES - len(notes[:_NODE_ROWS_DIVISOR]))
+        for_nodes = max(min(len(nodes), room // _NODE_ROWS_DIVISOR), room - len(topics))
         above, below = topics[: room - min(len(nodes), for_nodes)], nodes[:for_nodes]
-        parts: list[RenderableType] = [Text(self._shown.head(graph), "dim", no_wrap=True)]
-        parts += notes[:_NODES_SHARE]
+        parts: list[RenderableType] = [Text(self._shown.summary(graph), "dim", no_wrap=True)]
+        parts += notes[:_NODE_ROWS_DIVISOR]
         rows = [self._shown.topic_cells(graph, each) for each in above]
         grown = {
             at

@@ -22,7 +22,7 @@ from nep.cli.screen import (
     size,
     write,
 )
-from nep.cli.topic_wait import meant
+from nep.cli.topic_wait import suggestion
 from nep.cli.values import ids_as_text
 from nep.errors import NepError
 from nep.i18n import _, lazy
@@ -46,7 +46,7 @@ TypeArgument = Annotated[
     ),
 ]
 _COLUMNS = (
-    TextColumn(lazy("node"), style="bold", is_whole=True),
+    TextColumn(lazy("node"), style="bold", is_folded_last=True),
     TextColumn(lazy("role")),
     TextColumn(lazy("messages"), "right"),
     TextColumn(lazy("rate"), "right"),
@@ -63,7 +63,7 @@ def info(
 ) -> None:
     """Print information about a topic: its type, publishers and subscribers."""
     graph = graph_of(master, backend)
-    found = _found(topic, graph)
+    found = _find_topic(topic, graph)
     if as_json:
         show_json(ids_as_text(_record(graph, found)))
         return
@@ -75,7 +75,7 @@ def info(
         (_("latched"), _("yes") if latched else _("no")),
         (_("rate"), rate(found.rate_hz)),
         (_("bandwidth"), bandwidth(found)),
-        (_("lost"), _count(found.lost)),
+        (_("lost"), _count_text(found.lost)),
     ):
         write(f"{head}: {value}\n")
     write("\n")
@@ -90,7 +90,7 @@ def show_type(
     as_json: JsonOption = False,
 ) -> None:
     """Print the type of a topic."""
-    found = _found(topic, graph_of(master, backend))
+    found = _find_topic(topic, graph_of(master, backend))
     if as_json:
         show_json({"topic": found.name, "msg_type": found.msg_type, "codec": found.codec})
     else:
@@ -113,10 +113,10 @@ def find(
     else:
         types = sorted({each.msg_type for each in graph.topics.values()})
         template = _("no topic has the type '{msg_type}'; {meant}'nep topic list' shows all types")
-        print_status(template.format(msg_type=msg_type, meant=meant(msg_type, types)))
+        print_status(template.format(msg_type=msg_type, meant=suggestion(msg_type, types)))
 
 
-def _found(topic: str, graph: GraphView) -> TopicInfo:
+def _find_topic(topic: str, graph: GraphView) -> TopicInfo:
     found = graph.topics.get(check_topic(topic))
     if found is None and topic in graph.patterns:
         template = _(
@@ -125,21 +125,21 @@ def _found(topic: str, graph: GraphView) -> TopicInfo:
         raise NepError(template.format(topic=topic))
     if found is None:
         template = _("no topic '{topic}'; {meant}'nep topic list' shows all topics")
-        raise NepError(template.format(topic=topic, meant=meant(topic, list(graph.topics))))
+        raise NepError(template.format(topic=topic, meant=suggestion(topic, list(graph.topics))))
     return found
 
 
 def _record(graph: GraphView, topic: TopicInfo) -> dict[str, object]:
     record: dict[str, object] = asdict(topic)
     for role, members in (("publishers", topic.publishers), ("subscribers", topic.subscribers)):
-        record[role] = [{**asdict(each), "node": _name(graph, each.node_id)} for each in members]
+        record[role] = [{**asdict(each), "node": _node_name(graph, each.node_id)} for each in members]
     return record
 
 
 def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
     publishers = [
         (
-            escaped(_name(graph, each.node_id) or UNKNOWN),
+            escaped(_node_name(graph, each.node_id) or UNKNOWN),
             _("publishes"),
             str(each.count),
             rate(each.rate_hz),
@@ -150,22 +150,22 @@ def _rows(graph: GraphView, topic: TopicInfo) -> list[tuple[str, ...]]:
     ]
     subscribers = [
         (
-            escaped(_name(graph, each.node_id) or UNKNOWN),
+            escaped(_node_name(graph, each.node_id) or UNKNOWN),
             _("subscribes"),
-            _count(each.received),
+            _count_text(each.received),
             UNKNOWN,
             UNKNOWN,
-            _count(each.lost),
+            _count_text(each.lost),
         )
         for each in topic.subscribers
     ]
     return [*sorted(publishers), *sorted(subscribers)]
 
 
-def _name(graph: GraphView, node_id: str) -> str | None:
+def _node_name(graph: GraphView, node_id: str) -> str | None:
     node = graph.nodes.get(node_id)
     return None if node is None else node.name
 
 
-def _count(value: int | None) -> str:
+def _count_text(value: int | None) -> str:
     return UNKNOWN if value is None else str(value)

@@ -38,7 +38,7 @@ class TopicPatterns:
         self._reported: set[str] = set()
         self._poll_at = 0.0
 
-    def new_in(self, graph: GraphView) -> list[tuple[str, str]]:
+    def new_topics(self, graph: GraphView) -> list[tuple[str, str]]:
         """Return new matching topics with their types. Patterns without a match are reported once."""
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
         published = {name: each for name, each in graph.topics.items() if each.publishers}
@@ -64,5 +64,5 @@ class TopicPatterns:
         if self.patterns and time.monotonic() >= self._poll_at:
             self._poll_at = time.monotonic() + _GRAPH_POLL_S
             with suppress(NepError):
-                return self.new_in(self._node.graph(_GRAPH_TIMEOUT_S))
+                return self.new_topics(self._node.graph(_GRAPH_TIMEOUT_S))
         return []

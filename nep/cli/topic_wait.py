@@ -14,12 +14,12 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.wire import check_topic
 
 _GRAPH_POLL_S = 1.0
-_SLICE_S = 0.1
+_WAIT_SLICE_S = 0.1
 _GRAPH_TIMEOUT_S = 0.3
 """Time limit of a graph query in seconds; short, because waiting for a missing master delays messages."""
 
 
-class TopicWait:
+class TopicMonitor:
     """Topics that a command receives. Each topic without publishers is reported once.
 
     The graph is queried only while no messages arrive.
@@ -38,7 +38,7 @@ class TopicWait:
         return self._types[topic]
 
     @property
-    def silent(self) -> frozenset[str]:
+    def silent_topics(self) -> frozenset[str]:
         """Topics without publishers."""
         return frozenset(self._silent)
 
@@ -59,7 +59,7 @@ class TopicWait:
                     template = _("'{topic}' has no publisher any more; {meant}waiting (Ctrl+C to stop)")
                 else:
                     template = _("'{topic}' has no publisher yet; {meant}waiting (Ctrl+C to stop)")
-                print_status(template.format(topic=topic, meant=meant(topic, other_topics)))
+                print_status(template.format(topic=topic, meant=suggestion(topic, other_topics)))
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
 
     def mark_received(self, topics: Collection[str]) -> None:
@@ -70,7 +70,7 @@ class TopicWait:
 
     def slice_s(self, timeout_s: float | None) -> float:
         """Return the maximum time in seconds to wait for a message before the next poll."""
-        return _SLICE_S if timeout_s is None else min(_SLICE_S, max(0.0, timeout_s))
+        return _WAIT_SLICE_S if timeout_s is None else min(_WAIT_SLICE_S, max(0.0, timeout_s))
 
     def poll(self) -> None:
         """Query the graph if no message arrived for a while. Does nothing while the master is down."""
@@ -80,7 +80,7 @@ class TopicWait:
                 self.update(self._node.graph(_GRAPH_TIMEOUT_S))
 
 
-def meant(topic: str, names: Sequence[str]) -> str:
+def suggestion(topic: str, names: Sequence[str]) -> str:
     """Return a "did you mean" question followed by a space, or "" if no name is similar."""
     near = nearest(topic, names)
     return "" if near is None else _("did you mean '{near}'?").format(near=near) + " "

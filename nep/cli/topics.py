@@ -42,7 +42,7 @@ app.command("info")(info)
 app.command("type")(show_type)
 app.command("find")(find)
 _COLUMNS = (
-    TextColumn(lazy("topic"), style="bold", is_whole=True),
+    TextColumn(lazy("topic"), style="bold", is_folded_last=True),
     TextColumn(lazy("type")),
     TextColumn(lazy("publishers"), style="green"),
     TextColumn(lazy("subscribers"), style="cyan"),
@@ -73,15 +73,15 @@ def _row(graph: GraphView, topic: TopicInfo) -> tuple[str, ...]:
     return (
         escaped(topic.name),
         escaped(topic.msg_type),
-        _names(graph, [each.node_id for each in topic.publishers]),
-        _names(graph, [each.node_id for each in topic.subscribers]),
+        _node_names(graph, [each.node_id for each in topic.publishers]),
+        _node_names(graph, [each.node_id for each in topic.subscribers]),
         rate(topic.rate_hz),
         bandwidth(topic),
         UNKNOWN if topic.lost is None else str(topic.lost),
     )
 
 
-def _names(graph: GraphView, node_ids: list[str]) -> str:
+def _node_names(graph: GraphView, node_ids: list[str]) -> str:
     nodes = [graph.nodes[each] for each in node_ids if each in graph.nodes]
     originals = any(node.generation not in {"native", "gateway"} for node in nodes)
     named = [node.name for node in nodes if not (originals and node.generation == "gateway")]

@@ -18,12 +18,12 @@ from typer.core import TyperCommand, TyperGroup
 from nep.i18n import _, lazy
 from nep.text import escaped
 
-_HELPS = frozenset({
+_BUILTIN_HELP_TEXTS = frozenset({
     lazy("Show this message and exit."),
     lazy("Install completion for the current shell."),
     lazy("Show completion for the current shell, to copy it or customize the installation."),
 })  # fmt: skip
-_PIECES = frozenset({lazy("[OPTIONS]"), lazy("COMMAND [ARGS]...")})
+_USAGE_PARTS = frozenset({lazy("[OPTIONS]"), lazy("COMMAND [ARGS]...")})
 _USAGE_ERRORS = (
     lazy("Missing argument {name}."),
     lazy("Missing option {name}."),
@@ -48,7 +48,7 @@ _UsageError: Any = typer.BadParameter.__mro__[1]
 
 def translated(english: str) -> str:
     """Translate a usage error of typer; an unknown message is returned unchanged."""
-    for words, pattern in _patterns():
+    for words, pattern in _usage_error_patterns():
         found = pattern.fullmatch(english)
         if found is not None:
             return _(words).format(**{name: translated(value) for name, value in found.groupdict().items()})
@@ -56,7 +56,7 @@ def translated(english: str) -> str:
 
 
 @cache
-def _patterns() -> Sequence[tuple[str, re.Pattern[str]]]:
+def _usage_error_patterns() -> Sequence[tuple[str, re.Pattern[str]]]:
     return [
         (words, re.compile(re.sub(r"\\\{(\w+)\\\}", r"(?P<\1>.+)", re.escape(words)), re.DOTALL))
         for words in _USAGE_ERRORS
@@ -75,19 +75,19 @@ def _translate_usage_errors() -> Iterator[None]:
         raise _UsageError(words, ctx=error.ctx) from error
 
 
-def _translate_helps(parameters: Sequence[Any]) -> Sequence[Any]:
+def _translate_help_texts(parameters: Sequence[Any]) -> Sequence[Any]:
     for each in parameters:
-        if getattr(each, "help", None) in _HELPS:
+        if getattr(each, "help", None) in _BUILTIN_HELP_TEXTS:
             each.help = _(each.help)
     return parameters
 
 
 def _write_usage(command: Any, ctx: Any, formatter: Any) -> None:  # noqa: ANN401 - typer's types are not public
-    pieces = [_(piece) if piece in _PIECES else piece for piece in command.collect_usage_pieces(ctx)]
+    pieces = [_(piece) if piece in _USAGE_PARTS else piece for piece in command.collect_usage_pieces(ctx)]
     formatter.write_usage(ctx.command_path, " ".join(pieces), prefix=_("Usage:") + " ")
 
 
-def _reflowed(text: str) -> str:
+def _join_paragraph_lines(text: str) -> str:
     return "\n\n".join(" ".join(paragraph.split("\n")) for paragraph in text.split("\n\n"))
 
 
@@ -97,7 +97,7 @@ class TranslatedCommand(TyperCommand):
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the help with each paragraph joined to one line, because rich wraps the lines."""
         text = self.help
-        self.help = _reflowed(text or "")
+        self.help = _join_paragraph_lines(text or "")
         try:
             super().format_help(ctx, formatter)
         finally:
@@ -105,7 +105,7 @@ class TranslatedCommand(TyperCommand):
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
         """Return the parameters, with the help of built-in ones translated."""
-        return _translate_helps(super().get_params(ctx))
+        return _translate_help_texts(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the translated usage line."""
@@ -117,7 +117,7 @@ class TranslatedGroup(TyperGroup):
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
         """Return the parameters, with the help of built-in ones translated."""
-        return _translate_helps(super().get_params(ctx))
+        return _translate_help_texts(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the translated usage line."""

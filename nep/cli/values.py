@@ -21,7 +21,7 @@ MAX_CHARACTERS = 500
 MAX_DEPTH = 40
 _MAX_JSON_DEPTH = 200
 """Maximum nesting depth of JSON output; deeper values are written as text."""
-_IDS = frozenset({"id", "publisher"})
+_ID_KEYS = frozenset({"id", "publisher"})
 _CONTROL = re.compile("[\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff]")
 _SAFE_INTEGERS = range(-(1 << 63), 1 << 64)
 
@@ -33,32 +33,32 @@ def json_of(value: object, *, indent: bool = False) -> bytes:
     """
     option = orjson.OPT_NON_STR_KEYS | numpy_option() | (orjson.OPT_INDENT_2 if indent else 0)
     try:
-        data = orjson.dumps(value, default=_plain, option=option)
+        data = orjson.dumps(value, default=_to_plain, option=option)
     except TypeError:  # too deep, or keys and numbers that JSON lacks
-        data = orjson.dumps(_simplified(value, _MAX_JSON_DEPTH), default=str, option=option)
+        data = orjson.dumps(_simplify(value, _MAX_JSON_DEPTH), default=str, option=option)
     if data.isascii() and b"\x7f" not in data:
         return data
     return _CONTROL.sub(lambda found: f"\\u{ord(found.group()):04x}", data.decode()).encode()
 
 
-def _plain(value: object) -> object:
+def _to_plain(value: object) -> object:
     return value.hex() if isinstance(value, (bytes, bytearray, memoryview)) else str(value)
 
 
-def _simplified(value: object, depth: int) -> object:
+def _simplify(value: object, depth: int) -> object:
     if isinstance(value, Mapping):
         if depth <= 0:
             return "…"
-        return {_key(key): _simplified(each, depth - 1) for key, each in value.items()}
+        return {_key_text(key): _simplify(each, depth - 1) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_simplified(each, depth - 1) for each in value] if depth > 0 else "…"
+        return [_simplify(each, depth - 1) for each in value] if depth > 0 else "…"
     if isinstance(value, int) and not isinstance(value, bool) and value not in _SAFE_INTEGERS:
         return str(value)
     return _valid_text(value) if isinstance(value, str) else value
 
 
-def _key(key: object) -> str:
-    return _valid_text(key) if isinstance(key, str) else str(_plain(key))
+def _key_text(key: object) -> str:
+    return _valid_text(key) if isinstance(key, str) else str(_to_plain(key))
 
 
 def _valid_text(text: str) -> str:
@@ -69,23 +69,23 @@ def ids_as_text(value: object) -> object:
     """Convert ids in maps and lists to strings, because many JSON readers lose digits beyond 2^53."""
     if isinstance(value, Mapping):
         return {
-            key: str(each) if key in _IDS and isinstance(each, int) else ids_as_text(each)
+            key: str(each) if key in _ID_KEYS and isinstance(each, int) else ids_as_text(each)
             for key, each in value.items()
         }
     return [ids_as_text(each) for each in value] if isinstance(value, (list, tuple)) else value
 
 
-def presented(value: object, *, whole: bool, indent: bool = False) -> str:
+def format_payload(value: object, *, whole: bool, indent: bool = False) -> str:
     """Format a payload for people as JSON that may contain NaN. Long values are shortened unless `whole`."""
     limits = (
         (math.inf, math.inf, math.inf, _MAX_JSON_DEPTH)
         if whole
         else (MAX_ITEMS, MAX_FIELDS, MAX_CHARACTERS, MAX_DEPTH)
     )
-    return json_of(_presented(value, *limits), indent=indent).decode()
+    return json_of(_shorten_value(value, *limits), indent=indent).decode()
 
 
-def _presented(value: object, items: float, fields: float, letters: float, depth: float) -> object:
+def _shorten_value(value: object, items: float, fields: float, letters: float, depth: float) -> object:
     if isinstance(value, float) and not math.isfinite(value):
         return orjson.Fragment(str(value).encode())
     if isinstance(value, (bytes, bytearray, memoryview)):
@@ -97,23 +97,27 @@ def _presented(value: object, items: float, fields: float, letters: float, depth
     if depth <= 0:
         return orjson.Fragment("…".encode())
     if isinstance(value, Mapping):
-        return _map(value, items, fields, letters, depth)
-    return _list(value, items, fields, letters, depth)
+        return _shorten_map(value, items, fields, letters, depth)
+    return _shorten_list(value, items, fields, letters, depth)
 
 
-def _map(value: Mapping[object, object], items: float, fields: float, letters: float, depth: float) -> object:
+def _shorten_map(
+    value: Mapping[object, object], items: float, fields: float, letters: float, depth: float
+) -> object:
     shown: dict[str, object] = {}
     for number, (key, each) in enumerate(value.items()):
         if number >= fields:
             shown["…"] = _("{count} more").format(count=len(value) - number)
             break
-        shown[_key(key)] = _presented(each, items, fields, letters, depth - 1)
+        shown[_key_text(key)] = _shorten_value(each, items, fields, letters, depth - 1)
     return shown
 
 
-def _list(value: Sequence[object], items: float, fields: float, letters: float, depth: float) -> object:
+def _shorten_list(
+    value: Sequence[object], items: float, fields: float, letters: float, depth: float
+) -> object:
     count = len(value) if len(value) <= items else int(items)
-    shown = [_presented(each, items, fields, letters, depth - 1) for each in value[:count]]
+    shown = [_shorten_value(each, items, fields, letters, depth - 1) for each in value[:count]]
     if count < len(value):
         shown.append(orjson.Fragment(_("… {count} more").format(count=len(value) - count).encode()))
     return shown

@@ -16,7 +16,7 @@ import typer
 
 from nep.cli import interrupts
 from nep.cli.options import AllowMovingOption, JsonOption, MasterOption
-from nep.cli.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_ring
+from nep.cli.ring import KEEP_SERVICE, SAVE_TIMEOUT_S, has_flight_recorder
 from nep.cli.screen import console, print_status, show_json, write
 from nep.cli.values import cleaned
 from nep.errors import NepError, nearest
@@ -25,12 +25,12 @@ from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.patterns.services.client import Client
-from nep.programs.alarms.alarms import Alarms, Done
+from nep.programs.alarms.alarms import Alarms, DoneCallback
 from nep.programs.alarms.commands import AlarmCommands
 from nep.programs.alarms.evaluator import AlarmEvent
 from nep.programs.alarms.rule import AlarmAction, AlarmRule
 from nep.programs.alarms.rule_file import EXAMPLE, read_alarms
-from nep.programs.alarms.sentences import action_words, rule_words, what_words
+from nep.programs.alarms.sentences import action_text, event_text, rule_text
 from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped
@@ -78,18 +78,18 @@ def watch(
     rules = read_alarms(Path(file)).rules
     if check:
         for rule in rules:
-            write(escaped(rule_words(rule)) + "\n")
+            write(escaped(rule_text(rule)) + "\n")
         print_status(_("the file is valid"))
         return
-    if not any(rule.is_on for rule in rules):
+    if not any(rule.is_enabled for rule in rules):
         raise NepError(_("all alarms of '{file}' are switched off").format(file=file))
-    interrupts.leave_when_told()
+    interrupts.exit_on_termination()
     with ExitStack() as opened:
         node = opened.enter_context(Node(f"nep-watch-{os.getpid()}", master=master))
         guard = MotionGuard(node, allow_moving or ())
-        watching = _AlarmRunner(node, rules, _JsonEvents() if as_json else _EventLines(), guard)
+        watching = _AlarmRunner(node, rules, _JsonEventPrinter() if as_json else _EventPrinter(), guard)
         opened.callback(watching.close)
-        watching.check_sends()
+        watching.check_send_actions()
         if not as_json:
             watching.show_rules()
         watching.run(count)
@@ -98,24 +98,24 @@ def watch(
 # ---- output
 
 
-class _EventLines:
+class _EventPrinter:
     """Printer of alarm events for people, coloured on a terminal."""
 
     def __init__(self) -> None:
         self._console = console()
 
     def event(self, event: AlarmEvent) -> None:
-        what = escaped(what_words(event.rule.condition, event.seen))
+        what = escaped(event_text(event.rule.condition, event.value))
         if event.kind == "off":
             template = _("resolved after {seconds:.1f} s: {what}")
-            what = template.format(seconds=event.lasted_s, what=what)
+            what = template.format(seconds=event.duration_s, what=what)
             if event.count > 1:
                 what += " " + _("(occurred {count} times)").format(count=event.count)
         elif event.is_snoozed:
             what = _("{what} (snoozed)").format(what=what)
         self._show(event.kind, event.at_s, what)
 
-    def deed(self, _rule: AlarmRule, words: str, at_s: float) -> None:
+    def action(self, _rule: AlarmRule, words: str, at_s: float) -> None:
         self._show("", at_s, f"  {cleaned(words)}")
 
     def _show(self, kind: str, at_s: float, words: str) -> None:
@@ -128,7 +128,7 @@ class _EventLines:
         self._console.print(Text.assemble((stamp, "dim"), "  ", (words, _STYLES.get(kind, ""))))
 
 
-class _JsonEvents:
+class _JsonEventPrinter:
     """Printer of alarm events as JSON lines."""
 
     def event(self, event: AlarmEvent) -> None:
@@ -137,15 +137,15 @@ class _JsonEvents:
                 "alarm": event.rule.id,
                 "event": event.kind,
                 "at_s": event.at_s,
-                "what": what_words(event.rule.condition, event.seen),
-                "seen": event.seen,
-                "lasted_s": event.lasted_s if event.kind == "off" else None,
+                "what": event_text(event.rule.condition, event.value),
+                "seen": event.value,
+                "lasted_s": event.duration_s if event.kind == "off" else None,
                 "count": event.count,
                 "snoozed": event.is_snoozed,
             }
         )
 
-    def deed(self, rule: AlarmRule, words: str, at_s: float) -> None:
+    def action(self, rule: AlarmRule, words: str, at_s: float) -> None:
         show_json({"alarm": rule.id, "event": "did", "at_s": at_s, "what": words})
 
 
@@ -156,17 +156,21 @@ class _AlarmRunner:
     """Evaluates alarms with one node: subscribes, polls the graph and runs actions."""
 
     def __init__(
-        self, node: Node, rules: tuple[AlarmRule, ...], out: _EventLines | _JsonEvents, guard: MotionGuard
+        self,
+        node: Node,
+        rules: tuple[AlarmRule, ...],
+        out: _EventPrinter | _JsonEventPrinter,
+        guard: MotionGuard,
     ) -> None:
         self._node, self._out, self._guard = node, out, guard
         self._commands = AlarmCommands(self._refusal)
         self._save_client: Client | None = None
-        carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, Done], None]] = {
+        carriers: Mapping[str, Callable[[AlarmEvent, AlarmAction, DoneCallback], None]] = {
             "banner": _do_nothing,  # every alarm is printed anyway
             "console": _do_nothing,
             "sound": self._ring_bell,
-            "call": self._command,
-            "send": self._command,
+            "call": self._run_command,
+            "send": self._run_command,
             "keep": self._save_ring,
             **dict.fromkeys(_STUDIO_ACTIONS, self._skip_studio_action),
         }
@@ -177,12 +181,12 @@ class _AlarmRunner:
         self._was_away = False
         self._has_reported_unknown = 0
 
-    def check_sends(self) -> None:
+    def check_send_actions(self) -> None:
         # Raises `typer.BadParameter` if an alarm would move a robot without permission.
         sends = [
             action
             for rule in self.alarms.rules
-            if rule.is_on
+            if rule.is_enabled
             for action in rule.actions
             if action.kind == "send"
         ]
@@ -194,14 +198,11 @@ class _AlarmRunner:
                 raise typer.BadParameter(refusal)
 
     def show_rules(self) -> None:
-        rules = [rule for rule in self.alarms.rules if rule.is_on]
+        rules = [rule for rule in self.alarms.rules if rule.is_enabled]
         for rule in rules:
-            print_status(rule_words(rule))
+            print_status(rule_text(rule))
         studios = dict.fromkeys(
-            action_words(action)
-            for rule in rules
-            for action in rule.actions
-            if action.kind in _STUDIO_ACTIONS
+            action_text(action) for rule in rules for action in rule.actions if action.kind in _STUDIO_ACTIONS
         )
         if studios:
             template = _("these actions need Studio and are skipped: {actions}")
@@ -237,7 +238,7 @@ class _AlarmRunner:
         try:
             self._view = self._node.graph(_GRAPH_TIMEOUT_S)
             self._subscribe(self._view)
-            self._guard.see(self._view)
+            self._guard.update_graph(self._view)
         except NepError as error:
             if not self._was_away:
                 print_status(_("{problem}; waiting").format(problem=error))
@@ -247,7 +248,7 @@ class _AlarmRunner:
                 print_status(_("connected to the master"))
             self._was_away = False
             self._report_unknown_once(self._view)
-        self.alarms.evaluator.see(self._view)
+        self.alarms.evaluator.update_graph(self._view)
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
 
     def _subscribe(self, view: GraphView) -> None:
@@ -272,7 +273,7 @@ class _AlarmRunner:
         self._has_reported_unknown = 1
         topics = [name for name, info in view.topics.items() if info.publishers]
         nodes = [info.name for info in view.nodes.values()]
-        for condition in (rule.condition for rule in self.alarms.rules if rule.is_on):
+        for condition in (rule.condition for rule in self.alarms.rules if rule.is_enabled):
             known = nodes if condition.is_about_node else topics
             if condition.name in known or condition.kind in {"appears", "comes"}:
                 continue
@@ -288,14 +289,14 @@ class _AlarmRunner:
         self._guard.poll()  # alarms are rare, and a robot may just have connected
         return self._guard.refusal(topic, msg_type)
 
-    def _command(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        self._commands.carry(self._node, action, done)
+    def _run_command(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+        self._commands.start_action(self._node, action, done)
 
-    def _save_ring(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
-        if self._view is None or not has_ring(self._view):
+    def _save_ring(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
+        if self._view is None or not has_flight_recorder(self._view):
             done(False, _("nothing saved: 'nep recording ring' is not running"))
             return
-        asked = {"seconds": action.seconds, "note": what_words(event.rule.condition, event.seen)}
+        asked = {"seconds": action.seconds, "note": event_text(event.rule.condition, event.value)}
         try:
             if self._save_client is None:
                 self._save_client = self._node.new_client(KEEP_SERVICE, timeout_s=SAVE_TIMEOUT_S)
@@ -303,23 +304,23 @@ class _AlarmRunner:
         except NepError as error:
             done(False, _("nothing saved: {reason}").format(reason=error))
 
-    def _ring_bell(self, _event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+    def _ring_bell(self, _event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
         if sys.stderr.isatty():
             sys.stderr.write("\a")
             sys.stderr.flush()
         done(True, "")
 
-    def _skip_studio_action(self, _event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+    def _skip_studio_action(self, _event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         template = _("this action needs Studio: {action}")
-        done(False, template.format(action=action_words(action)))
+        done(False, template.format(action=action_text(action)))
 
     def _show_actions(self) -> None:
-        for rule, words, at_s in self.alarms.take_deeds():
+        for rule, words, at_s in self.alarms.take_action_results():
             if words:
-                self._out.deed(rule, words, at_s)
+                self._out.action(rule, words, at_s)
 
 
-def _report_saved(ended: Future[object], done: Done) -> None:
+def _report_saved(ended: Future[object], done: DoneCallback) -> None:
     error = None if ended.cancelled() else ended.exception()
     if error is not None or ended.cancelled():
         done(False, _("nothing saved: {reason}").format(reason=error or ""))
@@ -329,5 +330,5 @@ def _report_saved(ended: Future[object], done: Done) -> None:
         done(True, _("saved {file}").format(file=path))
 
 
-def _do_nothing(_event: AlarmEvent, _action: AlarmAction, done: Done) -> None:
+def _do_nothing(_event: AlarmEvent, _action: AlarmAction, done: DoneCallback) -> None:
     done(True, "")

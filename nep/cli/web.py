@@ -20,11 +20,11 @@ from nep.masters.master import is_running
 from nep.programs.web.access import Access, checked_origin, new_token, query_of
 from nep.programs.web.server import DEFAULT_PORT, WebServer, WebSettings
 from nep.recordings.formats.channels import LiveChannels
-from nep.system.addresses import ANY, checked_host, master_address, own_addresses
-from nep.system.descriptors import allow_many
+from nep.system.addresses import ANY_HOST, check_host, master_address, own_addresses
+from nep.system.descriptors import raise_open_file_limit
 from nep.system.terminal import Terminal, log_to
 
-_SLICE_S = 0.1
+_WAIT_SLICE_S = 0.1
 _MASTER_TIMEOUT_S = 0.5
 _MIN_TOKEN_LENGTH, _MAX_TOKEN_BYTES = 16, 1_000
 
@@ -91,10 +91,10 @@ def web(
     computer can connect unless you add --listen. Messages that move a robot are blocked unless you add
     --allow-moving. See docs/web.md for examples.
     """
-    hosts = [checked_host(each) for each in listen or ()]
+    hosts = [check_host(each) for each in listen or ()]
     origins = frozenset(map(checked_origin, origin or ()))
     is_file_new = token is not None and not token.exists()
-    secret = _token(token, is_needed=bool(hosts))
+    secret = _read_or_create_token(token, is_needed=bool(hosts))
     settings = WebSettings(
         port=port,
         listen=tuple(hosts),
@@ -103,15 +103,15 @@ def web(
         master=master,
         foxglove=LiveChannels() if foxglove else None,
     )
-    allow_many()
+    raise_open_file_limit()
     with Terminal(sys.stderr) as terminal:
         log_to(terminal, logging.WARNING)
         server = WebServer(settings)
         try:
             _start(server)
-            interrupts.leave_when_told()
-            _say_running(server, terminal, token_file=None if token is None or is_file_new else token)
-            while not server.wait(_SLICE_S):
+            interrupts.exit_on_termination()
+            _print_start_message(server, terminal, token_file=None if token is None or is_file_new else token)
+            while not server.wait(_WAIT_SLICE_S):
                 pass  # short waits: on Windows Ctrl+C does not interrupt a wait
             if server.problem is not None:
                 raise NepError(
@@ -119,7 +119,7 @@ def web(
                 )
         finally:
             server.close()
-            _say_ended(server, terminal)
+            _print_summary(server, terminal)
 
 
 def _start(server: WebServer) -> None:
@@ -134,13 +134,13 @@ def _start(server: WebServer) -> None:
         ) from error
 
 
-def _token(file: Path | None, *, is_needed: bool) -> str:
+def _read_or_create_token(file: Path | None, *, is_needed: bool) -> str:
     """Return the token, reading or creating it if needed; "" if none is required. Raises `NepError`."""
     if file is None:
         return new_token() if is_needed else ""
     try:
         if not file.exists():
-            return _written(file)
+            return _create_token_file(file)
         with file.open("rb") as opened:
             found = opened.read(_MAX_TOKEN_BYTES).decode("utf-8", "replace").strip()
     except OSError as error:
@@ -157,7 +157,7 @@ def _token(file: Path | None, *, is_needed: bool) -> str:
     return found
 
 
-def _written(file: Path) -> str:
+def _create_token_file(file: Path) -> str:
     """Create a file with a new token, readable by its owner only; return the token."""
     token = new_token()
     descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
@@ -166,7 +166,7 @@ def _written(file: Path) -> str:
     return token
 
 
-def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | None) -> None:
+def _print_start_message(server: WebServer, terminal: Terminal, *, token_file: Path | None) -> None:
     """Print the URLs and the access rules, and report a missing master."""
     out = console(out=terminal)
     token = server.settings.access.token
@@ -194,10 +194,10 @@ def _say_running(server: WebServer, terminal: Terminal, *, token_file: Path | No
 
 
 def _network_hosts(listen: Collection[str]) -> list[str]:
-    return [own.host for own in own_addresses()] if ANY in listen else list(listen)
+    return [own.host for own in own_addresses()] if ANY_HOST in listen else list(listen)
 
 
-def _say_ended(server: WebServer, terminal: Terminal) -> None:
+def _print_summary(server: WebServer, terminal: Terminal) -> None:
     counts = server.counts
     if not (counts.opened or counts.turned_away):
         return

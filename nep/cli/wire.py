@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nep.cli.options import JsonOption
-from nep.cli.screen import console, print_status, say_error, show_json, write
+from nep.cli.screen import console, print_error_message, print_status, show_json, write
 from nep.cli.typer_words import TranslatedGroup
 from nep.i18n import _, ngettext
 from nep.system.lazy_import import lazy_module
@@ -35,7 +35,7 @@ RuleOption = Annotated[
 ]
 ListOption = Annotated[bool, typer.Option("--list", help=_("List the rules and exit."))]
 _STYLES = {"passed": "green", "failed": "bold red", "skipped": "dim"}
-_USAGE = 2
+_USAGE_EXIT_CODE = 2
 
 
 @app.callback()
@@ -58,13 +58,13 @@ def check(
     Exits with 0 if no rule failed, 1 if a rule failed, and 2 if the adapter can't be started.
     """
     try:
-        rules = conformance.chosen_rules(rule or ())
+        rules = conformance.select_rules(rule or ())
     except KeyError as error:
         raise typer.BadParameter(
             _("unknown rule '{id}'; '--list' shows all rules").format(id=error.args[0]), param_hint="--rule"
         ) from error
     if list_rules:
-        _list(rules, as_json=as_json)
+        _show_rules(rules, as_json=as_json)
         return
     if not command:
         raise typer.BadParameter(_("missing the command of the adapter after '--'"), param_hint="COMMAND")
@@ -73,10 +73,10 @@ def check(
         for outcome in conformance.check(lambda master: conformance.AdapterProcess(command, master), rules):
             outcomes.append(outcome)
             if not as_json:
-                _show(outcome)
+                _show_outcome(outcome)
     except conformance.AdapterError as error:
-        say_error(str(error))
-        raise typer.Exit(_USAGE) from error
+        print_error_message(str(error))
+        raise typer.Exit(_USAGE_EXIT_CODE) from error
     failed = sum(each.status == "failed" for each in outcomes)
     if as_json:
         show_json([each.to_plain() for each in outcomes])
@@ -85,7 +85,7 @@ def check(
     raise typer.Exit(1 if failed else 0)
 
 
-def _list(rules: list[conformance.Rule], *, as_json: bool) -> None:
+def _show_rules(rules: list[conformance.Rule], *, as_json: bool) -> None:
     if as_json:
         show_json(
             [{"id": each.id, "requirement": _(each.requirement), "features": each.features} for each in rules]
@@ -96,7 +96,7 @@ def _list(rules: list[conformance.Rule], *, as_json: bool) -> None:
         write(f"{each.id:{width}}  {_(each.requirement)}\n")
 
 
-def _show(outcome: conformance.Outcome) -> None:
+def _show_outcome(outcome: conformance.Outcome) -> None:
     from rich.text import Text  # noqa: PLC0415 - see `nep.cli.screen.console`
 
     words = {"passed": _("passed"), "failed": _("failed"), "skipped": _("skipped")}
@@ -104,10 +104,10 @@ def _show(outcome: conformance.Outcome) -> None:
     out.print(Text.assemble((words[outcome.status], _STYLES[outcome.status]), f"  {outcome.rule.id}"))
     if outcome.status == "failed":
         plain = outcome.to_plain()
-        for line in (plain["requirement"], outcome.seen, plain["section"]):
+        for line in (plain["requirement"], outcome.observed, plain["section"]):
             out.print(Text(f"    {escaped(str(line))}"))
     elif outcome.status == "skipped":
-        out.print(Text(f"    {escaped(outcome.seen)}", "dim"))
+        out.print(Text(f"    {escaped(outcome.observed)}", "dim"))
 
 
 def _summarize(outcomes: list[conformance.Outcome], failed: int) -> None:

@@ -64,7 +64,7 @@ class BadRequests:
         self._refilled_at = now
         if is_logged(known.count) and self._log_tokens >= 1.0:
             self._log_tokens -= 1.0
-            _logger.warning("%s", _sentence(known))
+            _logger.warning("%s", _alert_text(known))
         while len(self._senders) > _MAX_SENDERS:
             self._senders.popitem(last=False)
 
@@ -82,7 +82,7 @@ class BadRequests:
             if now - known.newest_at < _ALERT_DURATION_S
         ]
         alerts = [
-            Alert(f"request:{sender}", _sentence(known), _(_HINT)) for sender, known in shown[:_MAX_ALERTS]
+            Alert(f"request:{sender}", _alert_text(known), _(_HINT)) for sender, known in shown[:_MAX_ALERTS]
         ]
         if len(shown) > _MAX_ALERTS:
             sentence = ngettext(
@@ -107,7 +107,7 @@ def describe_sender(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
     return peer, _("A program on {host}").format(host=peer)
 
 
-def _sentence(sender: _Sender) -> str:
+def _alert_text(sender: _Sender) -> str:
     words = ngettext(
         "{program} sent a request that the master can't read: {reason}",
         "{program} sent {count} requests that the master can't read: {reason}",

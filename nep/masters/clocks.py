@@ -8,7 +8,7 @@ from collections.abc import Callable
 from nep.masters.registry import NodeClock, RegisteredNode, Registry
 from nep.messages.clocks import drift_ns, is_clock
 
-Differences = dict[str, tuple[int, int]]
+ClockDifferences = dict[str, tuple[int, int]]
 """Clock differences by node id: offset to add to its times for the receiver's clock, and uncertainty (ns)."""
 _MASTER_CLOCK = NodeClock(0, 0, None)
 
@@ -23,11 +23,11 @@ class Clocks:
         self._registry = registry
         self._computer = computer
 
-    def is_here(self, member: RegisteredNode) -> bool:
+    def is_local(self, member: RegisteredNode) -> bool:
         """Return True if the node shares the master's clock."""
         return bool(self._computer) and member.node.computer == self._computer
 
-    def note(self, member: RegisteredNode, clock: tuple[int, ...] | None, now: float) -> None:
+    def store(self, member: RegisteredNode, clock: tuple[int, ...] | None, now: float) -> None:
         """Store the clock offset and uncertainty that a node reports.
 
         Args:
@@ -36,32 +36,32 @@ class Clocks:
                 Implausible values count as unknown.
             now: Current time.
         """
-        if clock is not None and self.is_here(member):
+        if clock is not None and self.is_local(member):
             member.clock = _MASTER_CLOCK
         elif clock is not None and len(clock) == 2 and is_clock(*clock):
             member.clock = NodeClock(*clock, now)
         else:
             member.clock = None
 
-    def differences(self, member: RegisteredNode, now: float) -> Differences:
+    def differences(self, member: RegisteredNode, now: float) -> ClockDifferences:
         """Return the known clock differences to remote nodes whose publishers the node receives."""
         own = member.clock
         if own is None:
             return {}
-        found: Differences = {}
+        found: ClockDifferences = {}
         for other in self._registry.remote_nodes_of(member):
             if other.clock is not None:
                 uncertainty_ns = _uncertainty_ns(own, now) + _uncertainty_ns(other.clock, now)
                 found[other.node.id] = other.clock.offset_ns - own.offset_ns, uncertainty_ns
         return found
 
-    def times(
+    def renewal_timestamps(
         self, member: RegisteredNode, received_ns: int, wall: Callable[[], int] | None = None
     ) -> tuple[int, ...]:
         """Return the receipt and reply time of a renewal; empty for nodes that share the master's clock."""
-        return () if self.is_here(member) else (received_ns, (wall or time.time_ns)())
+        return () if self.is_local(member) else (received_ns, (wall or time.time_ns)())
 
 
 def _uncertainty_ns(clock: NodeClock, now: float) -> int:
-    aged = 0 if clock.told_at is None else drift_ns((now - clock.told_at) * 1e9)
+    aged = 0 if clock.reported_at is None else drift_ns((now - clock.reported_at) * 1e9)
     return clock.uncertainty_ns + aged

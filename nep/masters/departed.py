@@ -16,7 +16,7 @@ _MAX_PER_TOPIC = 64
 P = TypeVar("P")
 
 
-class Departed(Generic[P]):
+class DepartedPublishers(Generic[P]):
     """Publishers that were unregistered within the last minute, limited in number. Has no clock.
 
     They are stored under their topic and under the patterns that matched it.
@@ -34,7 +34,7 @@ class Departed(Generic[P]):
     def __contains__(self, publisher: int) -> bool:
         return publisher in self._names
 
-    def of(self, topic: str) -> dict[int, P]:
+    def for_topic(self, topic: str) -> dict[int, P]:
         """Return the publishers of a topic or pattern by id. Read-only."""
         return self._by_name.get(topic, {})
 

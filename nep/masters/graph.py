@@ -38,19 +38,20 @@ from nep.protocol.requests import (
     AddPublisher,
     AddSubscriber,
     Done,
-    Expected,
+    ExpectedSubscriber,
     Found,
+    GraphReply,
     Join,
     Leave,
     Listen,
-    Look,
     NodeRecord,
     Ping,
     Probe,
-    PublisherCame,
-    PublisherGone,
+    PublisherAdded,
     PublisherRecord,
+    PublisherRemoved,
     Push,
+    QueryGraph,
     Refused,
     RemovePublisher,
     RemoveSubscriber,
@@ -60,7 +61,6 @@ from nep.protocol.requests import (
     ReportAlerts,
     ReportMissing,
     Request,
-    Seen,
     SubscriberRecord,
     TopicPublishers,
     is_proven,
@@ -75,11 +75,11 @@ class Outgoing(NamedTuple):
     """Message to send: a push to the node `to` (`call` is None), or the reply to `call` of a connection."""
 
     to: str
-    answer: Reply | Push
+    body: Reply | Push
     call: int | None = None
 
 
-def without(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
+def without_nodes(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
     """Return an answer without these nodes, which turned out to be dead."""
     if isinstance(answer, Found) and node_ids:
         return replace(
@@ -100,7 +100,7 @@ def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
         return answer
     if isinstance(answer, Added | Found | Renewed):
         return replace(answer, hosts=hosts)
-    if isinstance(answer, Seen):
+    if isinstance(answer, GraphReply):
         return replace(answer, view=replace(answer.view, listens=hosts))
     return answer
 
@@ -173,7 +173,7 @@ class Graph:
             waiting, self._waiting = self._waiting, []
             for request, call, sender, is_foreign in waiting:
                 out.extend(self.apply(request, call, now, sender, is_foreign=is_foreign))
-        out.extend(self.drop(self._leases.expired(now)))
+        out.extend(self.unregister_nodes(self._leases.expired(now)))
         self._registry.departed.tick(now)
         self._leases.set_renew_interval(now)
         return tuple(out)
@@ -183,19 +183,19 @@ class Graph:
         """Time at which `tick` must be called for the waiting requests, or None if none wait."""
         return self._learning_until if self._waiting else None
 
-    def silent(self, now: float) -> tuple[Outgoing, ...]:
+    def probes_for_overdue(self, now: float) -> tuple[Outgoing, ...]:
         """Return probes for nodes that have missed a renewal.
 
         If a probe can't be sent, its node is dead.
         """
-        return self.probes(self._leases.overdue(now))
+        return self.probes_for(self._leases.overdue(now))
 
-    def probes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
+    def probes_for(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
         """Return probes for those of these nodes that are registered."""
         probe = Probe(self.epoch, self.revision)
         return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._registry.members)
 
-    def drop(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
+    def unregister_nodes(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
         """Unregister nodes that are dead or don't respond; return the messages to send."""
         out: list[Outgoing] = []
         for node_id in node_ids:
@@ -343,8 +343,8 @@ class Graph:
             return self._join(request, now, sender, out)
         if isinstance(request, Renew):
             return self._renew(request, now, sender)
-        if isinstance(request, Look):
-            return Seen(self.epoch, self.revision, self.view())
+        if isinstance(request, QueryGraph):
+            return GraphReply(self.epoch, self.revision, self.view())
         if isinstance(request, ReportAlerts):
             self._registry.report_alerts(request.source, request.alerts)
         elif not isinstance(request, Ping | Listen):
@@ -381,14 +381,16 @@ class Graph:
         # a publisher unlisted for its silence may report new endpoints before it rejoins
         is_new = id not in member.publishers and id not in self._registry.departed
         self._register_publisher(member, request.publisher, out, is_new=is_new)
-        expected: list[Expected] = []
-        hung: list[Expected] = []
+        expected: list[ExpectedSubscriber] = []
+        hung: list[ExpectedSubscriber] = []
         for other, subscriber in self._registry.receivers_of(request.publisher.topic):
             if not other.is_managed:
-                entry = Expected(subscriber.record.id, other.node.id, other.node.name)
+                entry = ExpectedSubscriber(subscriber.record.id, other.node.id, other.node.name)
                 # hung for this node: not waited for. Hung for another node: waited for unless its renewal is
                 # late, too.
-                is_hung = member.node.id in other.hung or (other.hung and self._leases.is_late(other, now))
+                is_hung = member.node.id in other.hung_for or (
+                    other.hung_for and self._leases.is_late(other, now)
+                )
                 (hung if is_hung else expected).append(entry)
         return Added(self.epoch, self.revision, tuple(expected), tuple(hung))
 
@@ -402,7 +404,7 @@ class Graph:
             for remote in self._registry.publishers_of(topic)
         )
         # if a probe can't be sent, the dead publisher is removed from the reply
-        out.extend(self.probes(sorted({remote.node_id for remote in found} - {member.node.id})))
+        out.extend(self.probes_for(sorted({remote.node_id for remote in found} - {member.node.id})))
         return Found(self.epoch, self.revision, found, pattern=request.subscriber.pattern)
 
     def _join(self, request: Join, now: float, sender: str, out: list[Outgoing]) -> Reply:
@@ -431,7 +433,7 @@ class Graph:
             return None
         if not self._registry.renew(member, renewal.publishers, renewal.subscribers, now, renewal.cpu_ratio):
             return None
-        self.clocks.note(member, renewal.clock, now)
+        self.clocks.store(member, renewal.clock, now)
         return member
 
     def _member_at(self, node_id: str, sender: str) -> RegisteredNode | None:
@@ -473,7 +475,7 @@ class Graph:
         last_seq = member.publishers[publisher].last_seq
         record = self._registry.remove_publisher(member.node.id, publisher)
         if record is not None:
-            gone = PublisherGone(self.epoch, self.revision, record.id, record.topic, False, last_seq)
+            gone = PublisherRemoved(self.epoch, self.revision, record.id, record.topic, False, last_seq)
             self._notify_subscribers(record, gone, out)
 
     def _remove_publisher(self, request: RemovePublisher, out: list[Outgoing]) -> None:
@@ -483,7 +485,7 @@ class Graph:
             self._registry.update_last_message(known, request.last_seq, known.last_stamp_ns)
         record = self._registry.remove_publisher(request.node_id, request.id)
         if record is not None:
-            gone = PublisherGone(
+            gone = PublisherRemoved(
                 self.epoch, self.revision, record.id, record.topic, is_closed=True, last_seq=request.last_seq
             )
             self._notify_subscribers(record, gone, out)
@@ -494,14 +496,14 @@ class Graph:
         self, member: RegisteredNode, record: PublisherRecord, out: list[Outgoing], *, is_new: bool
     ) -> None:
         if self._registry.add_publisher(member, record) and record.endpoints:
-            remote = self._registry.remote(member, record)
-            self._notify_subscribers(record, PublisherCame(self.epoch, self.revision, remote, is_new), out)
+            remote = self._registry.remote_publisher(member, record)
+            self._notify_subscribers(record, PublisherAdded(self.epoch, self.revision, remote, is_new), out)
 
     def _unregister_node(self, member: RegisteredNode, out: list[Outgoing], *, is_closed: bool) -> None:
         publishers = list(member.publishers.values())
-        self._registry.forget(member.node.id)
+        self._registry.remove_node(member.node.id)
         for publisher in publishers:
-            gone = PublisherGone(
+            gone = PublisherRemoved(
                 self.epoch,
                 self.revision,
                 publisher.record.id,

@@ -12,7 +12,7 @@ import zmq
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import Alert
-from nep.system.addresses import ANY, OwnAddress, endpoint_of, own_addresses
+from nep.system.addresses import ANY_HOST, OwnAddress, endpoint_of, own_addresses
 
 _logger = logging.getLogger("nep.master")
 
@@ -31,7 +31,7 @@ def check_hosts(hosts: Iterable[str], addresses: Iterable[OwnAddress]) -> tuple[
             raise NepError(
                 _("'{host}' is not an IPv4 address; use an address such as '192.168.1.20'").format(host=host)
             ) from None
-        if host != ANY and host not in known and not address.is_loopback:
+        if host != ANY_HOST and host not in known and not address.is_loopback:
             others = ", ".join(sorted(known)) or _(
                 "none that other computers can reach; connect to a network first"
             )
@@ -107,12 +107,12 @@ class ListenAddresses:
         return tuple(
             self._lost_alert(host, addresses)
             for host in self.hosts
-            if host != ANY and host not in self._bound
+            if host != ANY_HOST and host not in self._bound
         )
 
     def _available_hosts(self, hosts: tuple[str, ...], addresses: tuple[OwnAddress, ...]) -> set[str]:
         present = {own.host for own in addresses}
-        if ANY in hosts:
+        if ANY_HOST in hosts:
             return present
         return {host for host in hosts if host in present or ipaddress.IPv4Address(host).is_loopback}
 

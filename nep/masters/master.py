@@ -18,10 +18,10 @@ from nep.masters.leases import LEASE_S
 from nep.masters.process import Owner, is_running, listen, start_process
 from nep.masters.server import MasterServer
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import Listen, Look, Refused, Reply, Request, Seen
+from nep.protocol.requests import GraphReply, Listen, QueryGraph, Refused, Reply, Request
 from nep.system.addresses import master_address
 from nep.system.computer import computer_id
-from nep.system.forks import give_up, watch
+from nep.system.forks import close_in_child, watch
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -117,7 +117,7 @@ class Master:
     def forked(self) -> None:
         """Detach from the parent's master in a forked child process. See `nep.system.forks`."""
         if self._server is not None:
-            give_up(*self._server.endpoints)
+            close_in_child(*self._server.endpoints)
         self._server = None
         self._lock = threading.Lock()
         self._is_forked = True
@@ -169,8 +169,8 @@ class Master:
             ClosedError: The master has stopped.
             WaitTimeoutError: The master did not reply in time.
         """
-        reply = self.submit(Look())
-        if not isinstance(reply, Seen):
+        reply = self.submit(QueryGraph())
+        if not isinstance(reply, GraphReply):
             raise ClosedError(f"the master at '{self.address}'")
         return reply.view
 

@@ -13,11 +13,11 @@ import zmq
 
 from nep.errors import MasterUnreachable, RequestRefusedError, WireError
 from nep.i18n import _
-from nep.protocol.encoding import decode_answer, encode_request
+from nep.protocol.encoding import decode_reply, encode_request
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import Done, Listen, Look, Ping, Refused, Reply, Request, Seen
+from nep.protocol.requests import Done, GraphReply, Listen, Ping, QueryGraph, Refused, Reply, Request
 from nep.system.addresses import MasterName, endpoint_of, master_address
-from nep.system.descriptors import check_room
+from nep.system.descriptors import check_free_descriptors
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -77,8 +77,8 @@ def view(address: str | None = None, timeout_s: float = 2.0) -> GraphView:
         RequestRefusedError: The master rejected the request.
     """
     chosen = master_address(address)
-    reply = _request(Look(), chosen, timeout_s)
-    if not isinstance(reply, Seen):
+    reply = _request(QueryGraph(), chosen, timeout_s)
+    if not isinstance(reply, GraphReply):
         raise RequestRefusedError(
             _("the master at '{chosen}' did not reply with its graph").format(chosen=chosen)
         )
@@ -113,7 +113,7 @@ def listen(hosts: Sequence[str], address: str | None = None, timeout_s: float = 
 
 
 def _request(request: Request, address: str, timeout_s: float) -> Reply:
-    check_room(_DESCRIPTORS_NEEDED, "a question to the master")
+    check_free_descriptors(_DESCRIPTORS_NEEDED, "a question to the master")
     started = time.monotonic()
     name = MasterName(address, lambda _known: None)
     name.resolve(started)
@@ -130,7 +130,7 @@ def _request(request: Request, address: str, timeout_s: float) -> Reply:
         deadline, again_at = time.monotonic() + timeout_s, time.monotonic() + _RETRY_S
         while (left := deadline - time.monotonic()) > 0:
             if socket.poll(int(min(left, 0.1) * 1000) + 1):
-                reply = _read(socket.recv())
+                reply = _decode_reply(socket.recv())
                 if reply is not None:
                     return reply
             # the request may have been sent to a master that was just stopping
@@ -151,10 +151,10 @@ def _send(socket: zmq.Socket[bytes], endpoint: str, body: bytes) -> None:
         socket.connect(endpoint)
 
 
-def _read(body: bytes) -> Reply | None:
+def _decode_reply(body: bytes) -> Reply | None:
     # None for a push. Raises `RequestRefusedError`.
     try:
-        answer = decode_answer(body)[1]
+        answer = decode_reply(body)[1]
     except WireError as error:
         raise RequestRefusedError(
             _("the master's reply can't be read: {reason}").format(reason=error.reason)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from nep.errors import NepError, WireError
 from nep.i18n import _
-from nep.masters.departed import Departed
+from nep.masters.departed import DepartedPublishers
 from nep.masters.pattern_index import PatternIndex
 from nep.masters.rates import Meter
 from nep.protocol.graph_view import Alert
@@ -30,7 +30,7 @@ from nep.protocol.requests import (
     as_count,
 )
 from nep.protocol.wire import check_node_name, check_topic
-from nep.text import control_in, escaped, shortened
+from nep.text import escaped, first_control, shortened
 
 RECORDS_MAX = 5_000
 """Maximum number of publishers and subscribers of one node."""
@@ -90,7 +90,7 @@ class NodeClock(NamedTuple):
 
     offset_ns: int
     uncertainty_ns: int
-    told_at: float | None
+    reported_at: float | None
 
 
 @dataclass
@@ -120,11 +120,11 @@ class RegisteredNode:
     route: str = ""
     publishers: dict[int, RegisteredPublisher] = field(default_factory=dict)
     subscribers: dict[int, RegisteredSubscriber] = field(default_factory=dict)
-    hung: set[str] = field(default_factory=set)
+    hung_for: set[str] = field(default_factory=set)
     cpu_ratio: float | None = None
-    heard: dict[int, RegisteredPublisher] = field(default_factory=dict)
+    sources: dict[int, RegisteredPublisher] = field(default_factory=dict)
     sources_version: int = -1
-    far: tuple[RegisteredNode, ...] = ()
+    remote_nodes: tuple[RegisteredNode, ...] = ()
     clock: NodeClock | None = None
 
 
@@ -152,7 +152,7 @@ class Registry:
         self._subscribing: dict[str, dict[int, RegisteredNode]] = {}
         self._reported: dict[str, tuple[Alert, ...]] = {}
         self.patterns: PatternIndex[RegisteredNode] = PatternIndex()
-        self.departed: Departed[RegisteredPublisher] = Departed()
+        self.departed: DepartedPublishers[RegisteredPublisher] = DepartedPublishers()
 
     # ---- reading
 
@@ -160,7 +160,7 @@ class Registry:
         """Return the publishers of a topic to which subscribers can connect."""
         found = self._publishing.get(topic, {})
         return tuple(
-            self.remote(member, member.publishers[known].record)
+            self.remote_publisher(member, member.publishers[known].record)
             for known, member in found.items()
             if member.publishers[known].record.endpoints
         )
@@ -170,7 +170,7 @@ class Registry:
         """Names of all topics with publishers or subscribers."""
         return sorted(set(self._publishing) | set(self._subscribing))
 
-    def publishing(self, topic: str) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
+    def publishers_with_nodes(self, topic: str) -> list[tuple[RegisteredNode, RegisteredPublisher]]:
         """Return all publishers of a topic with their nodes, including those without endpoints."""
         found = self._publishing.get(topic)
         return [(member, member.publishers[known]) for known, member in found.items()] if found else []
@@ -197,7 +197,7 @@ class Registry:
             topic for subscriber in member.subscribers.values() for topic in self.topics_of(subscriber.record)
         }
 
-    def remote(self, member: RegisteredNode, record: PublisherRecord) -> RemotePublisher:
+    def remote_publisher(self, member: RegisteredNode, record: PublisherRecord) -> RemotePublisher:
         """Return a publisher in the form that is sent to subscribers."""
         return RemotePublisher(record, member.node.id, member.node.name, member.node.computer)
 
@@ -212,24 +212,28 @@ class Registry:
             member.sources_version = version
             topics = self.topics_received_by(member)
             names = {subscriber.record.topic for subscriber in member.subscribers.values()}
-            member.heard = {known: gone for name in names for known, gone in self.departed.of(name).items()}
-            member.heard |= {
+            member.sources = {
+                known: gone for name in names for known, gone in self.departed.for_topic(name).items()
+            }
+            member.sources |= {
                 known: other.publishers[known]
                 for topic in topics
                 for known, other in self._publishing.get(topic, {}).items()
                 if other.publishers[known].record.endpoints
             }
-            owners = {owner.node.id: owner for owner in map(self.publisher_owners.get, member.heard) if owner}
+            owners = {
+                owner.node.id: owner for owner in map(self.publisher_owners.get, member.sources) if owner
+            }
             computer = member.node.computer
-            member.far = tuple(
+            member.remote_nodes = tuple(
                 each for each in owners.values() if not computer or each.node.computer != computer
             )
-        return member.heard
+        return member.sources
 
     def remote_nodes_of(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:
         """Return the nodes of `sources_of` that are not known to be on the same computer."""
         self.sources_of(member)
-        return member.far
+        return member.remote_nodes
 
     def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
         """Return the newest sequence number of each publisher of `sources_of`, by publisher id.
@@ -332,7 +336,7 @@ class Registry:
             self.touched.discard(topic)
             self._topic_revisions.pop(topic, None)
 
-    def forget(self, node_id: str) -> None:
+    def remove_node(self, node_id: str) -> None:
         """Unregister a node with all its publishers and subscribers."""
         member = self.members[node_id]
         for publisher in list(member.publishers):
@@ -380,8 +384,8 @@ class Registry:
                     return False
                 self.update_subscriber(subscribers[seen["id"]], received, lost, problem)
             member.renewed_at, member.cpu_ratio = now, _as_ratio(cpu_ratio)
-            if member.hung:
-                member.hung.clear()
+            if member.hung_for:
+                member.hung_for.clear()
         except (LookupError, TypeError, AttributeError):  # a missing field or publisher, or not a map
             return False
         return True
@@ -429,8 +433,8 @@ class Registry:
             return
         for subscriber in subscribers:
             member = self._subscribing.get(known.record.topic, {}).get(subscriber)
-            if member is not None and len(member.hung) < _MAX_HUNG:
-                member.hung.add(reporter.node.id)
+            if member is not None and len(member.hung_for) < _MAX_HUNG:
+                member.hung_for.add(reporter.node.id)
 
     def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
         """Replace the alerts of `source`."""
@@ -522,11 +526,11 @@ def _check_node(node: NodeRecord) -> None:
         check_node_name(node.name)
     except NepError as error:
         raise WireError(str(error), code="node-name") from error
-    _check_word("host", node.host, 255)
-    _check_word("language", node.language, 50)
-    _check_word("generation", node.generation, 50)
-    _check_word("key", node.key, 200)
-    _check_word("computer", node.computer, 64)
+    _check_text("host", node.host, 255)
+    _check_text("language", node.language, 50)
+    _check_text("generation", node.generation, 50)
+    _check_text("key", node.key, 200)
+    _check_text("computer", node.computer, 64)
     if node.pid is not None and not 0 <= node.pid <= _PID_MAX:
         raise WireError(_("{pid} is not a process id").format(pid=node.pid), code="pid")
     if not 0 <= node.since_ns <= COUNT_MAX:
@@ -543,9 +547,9 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
             ),
             code="record-id",
         )
-    _check_word("type", record.msg_type, 200)
+    _check_text("type", record.msg_type, 200)
     if isinstance(record, PublisherRecord):
-        _check_word("codec", record.codec, 50)
+        _check_text("codec", record.codec, 50)
         if len(record.endpoints) > _ENDPOINTS_MAX:
             raise WireError(
                 _("a publisher has {count} endpoints; at most {most} are allowed").format(
@@ -564,8 +568,8 @@ def _check_registration(record: PublisherRecord | SubscriberRecord) -> None:
                 )
 
 
-def _check_word(what: str, word: str, most: int) -> None:
-    control = control_in(word)
+def _check_text(what: str, word: str, most: int) -> None:
+    control = first_control(word)
     if len(word) > most or control:
         hint = (
             _("the character '{control}' is not allowed").format(control=control)

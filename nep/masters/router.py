@@ -11,14 +11,14 @@ import zmq
 
 from nep.errors import AddressInUseError
 from nep.system.addresses import endpoint_of
-from nep.system.descriptors import check_room
+from nep.system.descriptors import check_free_descriptors
 
 REQUEST_MAX_BYTES = 4 * 2**20
 """Maximum size of a part in bytes; a peer that sends more is disconnected."""
 UNREAD_MAX_BYTES = 32 * 2**20
 """Maximum number of unread bytes per connection in large bodies (4 kB and more)."""
-_LARGE_BYTES = 4096
-_RECEIVE_QUEUE = 16
+_LARGE_BODY_BYTES = 4096
+_RECEIVE_QUEUE_LENGTH = 16
 """Receive queue length per connection; further requests wait at the sender."""
 _DONTWAIT, _SNDMORE = int(zmq.DONTWAIT), int(zmq.SNDMORE)
 _DESCRIPTORS_NEEDED = 16
@@ -36,7 +36,7 @@ class MasterRouter:
     """
 
     def __init__(self, address: str) -> None:
-        check_room(_DESCRIPTORS_NEEDED, "a master")
+        check_free_descriptors(_DESCRIPTORS_NEEDED, "a master")
         self._monitor: zmq.Socket[bytes] | None = None
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self.socket = self._context.socket(zmq.ROUTER)
@@ -52,8 +52,8 @@ class MasterRouter:
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
         self.socket.setsockopt(zmq.TCP_KEEPALIVE_CNT, 4)
         self.socket.setsockopt(zmq.SNDHWM, 10_000)
-        self.socket.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE)
-        self.socket.copy_threshold = _LARGE_BYTES
+        self.socket.setsockopt(zmq.RCVHWM, _RECEIVE_QUEUE_LENGTH)
+        self.socket.copy_threshold = _LARGE_BODY_BYTES
         self.socket.setsockopt(zmq.MAXMSGSIZE, REQUEST_MAX_BYTES)
         try:
             self.socket.bind(endpoint_of(address))
@@ -78,7 +78,7 @@ class MasterRouter:
             frames.append(recv(_DONTWAIT, False))
         self._last_frame = frames[0]
         parts = [frame.bytes for frame in frames]
-        self._note_connection(frames[0], parts[0])
+        self._record_connection(frames[0], parts[0])
         return parts
 
     def peer(self) -> str:
@@ -88,7 +88,7 @@ class MasterRouter:
         except zmq.ZMQError:
             return ""
 
-    def _note_connection(self, frame: zmq.Frame, sender: bytes) -> None:
+    def _record_connection(self, frame: zmq.Frame, sender: bytes) -> None:
         try:
             connection = frame.get(_SRCFD)
         except zmq.ZMQError:  # the connection has already ended
@@ -99,7 +99,7 @@ class MasterRouter:
                 self._ended.setdefault(before, time.monotonic())
             self._senders[connection] = sender
 
-    def ended(self, now: float) -> list[bytes]:
+    def take_ended_senders(self, now: float) -> list[bytes]:
         """Return the senders whose connection has just ended, each once. They may have reconnected."""
         sent = [each for each, unread in self._unread.items() if all(one.done for one, _size in unread)]
         for route in sent:
@@ -123,7 +123,7 @@ class MasterRouter:
         Large bodies are dropped while more than `UNREAD_MAX_BYTES` of them are unread.
         """
         try:
-            if len(body) < _LARGE_BYTES:
+            if len(body) < _LARGE_BODY_BYTES:
                 self._send(to, _SNDMORE | _DONTWAIT)
                 self._send(body, _DONTWAIT)
                 return True

@@ -16,17 +16,17 @@ import zmq
 from nep.errors import ClosedError, NepError, WaitTimeoutError, WireError
 from nep.i18n import _
 from nep.masters.bad_requests import BadRequests, describe_sender
-from nep.masters.graph import Graph, Outgoing, with_hosts, without
+from nep.masters.graph import Graph, Outgoing, with_hosts, without_nodes
 from nep.masters.leases import encode_renewed, is_renewal, read_renewal
 from nep.masters.listen_addresses import ListenAddresses
 from nep.masters.process import Owner
 from nep.masters.router import MasterRouter
-from nep.protocol.encoding import AnswerEncoder, ReceivedRequest, collecting_later, decode_request
+from nep.protocol.encoding import ReceivedRequest, ReplyEncoder, decode_request, gc_disabled
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import (
     Done,
     Listen,
-    Look,
+    QueryGraph,
     Refused,
     Renew,
     Renewed,
@@ -41,7 +41,7 @@ from nep.system.wakeup import Waker
 
 _logger = logging.getLogger("nep.master")
 _TICK_S = 0.25
-_SUSPENDED_S = 1.0
+_MIN_SUSPENSION_S = 1.0
 """Pause in seconds (suspended computer, large request) after which the next tick expires no node."""
 _MAX_COLLECT_MS = 10
 _NODES_PER_MS = 50
@@ -84,7 +84,7 @@ class MasterServer:
         self._submitted: deque[Submission] = deque()
         self._pending: dict[int, Submission] = {}
         self._calls = 0
-        self._encoder = AnswerEncoder()
+        self._encoder = ReplyEncoder()
         self._bad_requests = BadRequests()
         self._renewals: list[tuple[bytes, bytes, int]] = []
         """Renewals without a reply yet: sender, body, and time of receipt (ns since 1970)."""
@@ -156,7 +156,7 @@ class MasterServer:
                 if is_due:
                     tick_at = now + _TICK_S
                 try:
-                    self._run_turn(waker, is_due=is_due)
+                    self._run_once(waker, is_due=is_due)
                 except Exception as error:  # noqa: BLE001 - logged; one program must not stop the master
                     self._log_failure(error, "its periodic work")
         finally:
@@ -166,14 +166,14 @@ class MasterServer:
                 for submission in (*self._submitted, *self._pending.values()):
                     submission.done.set()
 
-    def _run_turn(self, waker: tuple[int, int], *, is_due: bool) -> None:
+    def _run_once(self, waker: tuple[int, int], *, is_due: bool) -> None:
         # Requests first, then periodic work.
         self._serve_submissions()
         if self._is_open:
             self._serve_router()
             if self._renewals and self._wait_for_more_renewals(waker):
                 self._serve_router()
-            self._answer_renewals()
+            self._reply_to_renewals()
         now = time.monotonic()
         if is_due:
             self._tick(now)
@@ -201,12 +201,12 @@ class MasterServer:
         return max(0, int((at - time.monotonic()) * 1000) + 1)
 
     def _tick(self, now: float) -> None:
-        was_away, self._ticked_at = now - self._ticked_at > _SUSPENDED_S, now
+        was_away, self._ticked_at = now - self._ticked_at > _MIN_SUSPENSION_S, now
         if not was_away:  # otherwise this thread was late itself: renewals may still be queued
             self._send(self._graph.tick(now))
-            self._send(self._graph.silent(now))
-        ended = (self._graph.node_at(_name_of(sender)) for sender in self._port.ended(now))
-        self._send(self._graph.probes([each.node.id for each in ended if each is not None]))
+            self._send(self._graph.probes_for_overdue(now))
+        ended = (self._graph.node_at(_route_of(sender)) for sender in self._port.take_ended_senders(now))
+        self._send(self._graph.probes_for([each.node.id for each in ended if each is not None]))
         self._graph.apply(ReportAlerts("requests", self._bad_requests.alerts(now)), 0, now, "")
         if self._owner is not None and self._owner.is_gone() and not self._is_needed():
             self._closing = True
@@ -244,10 +244,10 @@ class MasterServer:
             if len(body) == 1 and is_renewal(body[0]):
                 self._renewals.append((sender, body[0], time.time_ns()))
             else:
-                self._answer_renewals()  # in order of arrival
+                self._reply_to_renewals()  # in order of arrival
                 self._serve(sender, body, self._port.peer())
 
-    def _answer_renewals(self) -> None:
+    def _reply_to_renewals(self) -> None:
         # All replies are sent together, so that libzmq's thread wakes once.
         renewals, self._renewals = self._renewals, []
         answers = [self._renew_safely(*renewal) for renewal in renewals]
@@ -255,7 +255,7 @@ class MasterServer:
             if answer is None:
                 self._serve(sender, [body], "")
             elif not self._port.send(sender, answer):
-                self._send(self._graph.drop(self._node_ids_at(_name_of(sender))))
+                self._send(self._graph.unregister_nodes(self._node_ids_at(_route_of(sender))))
 
     def _renew_safely(self, sender: bytes, body: bytes, came_ns: int) -> bytes | None:
         # If this fails for a renewal, the general path handles it and replies.
@@ -272,12 +272,12 @@ class MasterServer:
             return None
         graph = self._graph
         now = time.monotonic()
-        last_seqs = graph.renew_fast(renewal, now, _name_of(sender))
+        last_seqs = graph.renew_fast(renewal, now, _route_of(sender))
         if last_seqs is None:
             return None
         member = graph.members[renewal.node_id]
         clocks = graph.clocks.differences(member, now)
-        times = () if renewal.clock is None else graph.clocks.times(member, came_ns)
+        times = () if renewal.clock is None else graph.clocks.renewal_timestamps(member, came_ns)
         return encode_renewed(
             renewal.call,
             graph.epoch,
@@ -294,7 +294,7 @@ class MasterServer:
         if isinstance(asked.request, Listen) and self._listening.hosts and peer != "127.0.0.1":
             reason = _("this setting can be changed only on the master's own computer")
             asked = ReceivedRequest(asked.call, WireError(reason, code="listen"))
-        name = _name_of(sender)
+        name = _route_of(sender)
         reason = self._apply(asked, name)
         if reason:
             member = self._graph.node_at(name)
@@ -311,13 +311,13 @@ class MasterServer:
                 outgoing = (Outgoing(sender, self._listen(request), asked.call),)
             else:
                 now, is_foreign = time.monotonic(), bool(sender)
-                with collecting_later() if isinstance(request, Look) else nullcontext():
+                with gc_disabled() if isinstance(request, QueryGraph) else nullcontext():
                     came_ns = time.time_ns()
                     outgoing = self._graph.apply(request, asked.call, now, sender, is_foreign=is_foreign)
                     if isinstance(request, Renew) and request.clock is not None:
                         outgoing = self._with_times(outgoing, came_ns)
                     self._send(outgoing)
-                return _reason_in(outgoing)
+                return _rejection_reason(outgoing)
         except Exception as error:  # noqa: BLE001 - logged; one request must not stop the master
             self._log_failure(error, "a request")
             outgoing = (Outgoing(sender, self._refusal(), asked.call),)
@@ -327,8 +327,10 @@ class MasterServer:
     def _with_times(self, outgoing: Sequence[Outgoing], came_ns: int) -> tuple[Outgoing, ...]:
         # Adds receipt and reply time to replies of a renewal.
         return tuple(
-            each._replace(answer=replace(each.answer, times=self._graph.clocks.times(member, came_ns)))
-            if isinstance(each.answer, Renewed) and (member := self._graph.node_at(each.to)) is not None
+            each._replace(
+                body=replace(each.body, times=self._graph.clocks.renewal_timestamps(member, came_ns))
+            )
+            if isinstance(each.body, Renewed) and (member := self._graph.node_at(each.to)) is not None
             else each
             for each in outgoing
         )
@@ -350,12 +352,12 @@ class MasterServer:
             elif not self._deliver(each, frozenset(dead)):
                 dead.update([each.to] if each.call is None else self._node_ids_at(each.to))
         if dead:
-            self._send(self._graph.drop(dead))
+            self._send(self._graph.unregister_nodes(dead))
 
     def _reply_to_submission(self, each: Outgoing) -> None:
         submission = self._pending.pop(each.call or 0, None)
         if submission is not None:
-            submission.reply = with_hosts(each.answer, self._listening.hosts)  # type: ignore[assignment]
+            submission.reply = with_hosts(each.body, self._listening.hosts)  # type: ignore[assignment]
             submission.done.set()
 
     def _deliver(self, each: Outgoing, dead: frozenset[str]) -> bool:
@@ -366,7 +368,7 @@ class MasterServer:
             if member is None:
                 return True
             route = member.route
-        answer = with_hosts(without(each.answer, dead), self._listening.hosts)
+        answer = with_hosts(without_nodes(each.body, dead), self._listening.hosts)
         try:
             body = self._encoder.encode(answer, each.call or 0)
         except Exception as error:  # noqa: BLE001 - logged; the caller gets an error reply
@@ -403,9 +405,9 @@ class MasterServer:
         self._waker.close()
 
 
-def _reason_in(outgoing: Sequence[Outgoing]) -> str:
-    return next((each.answer.reason for each in outgoing if isinstance(each.answer, Refused)), "")
+def _rejection_reason(outgoing: Sequence[Outgoing]) -> str:
+    return next((each.body.reason for each in outgoing if isinstance(each.body, Refused)), "")
 
 
-def _name_of(sender: bytes) -> str:
+def _route_of(sender: bytes) -> str:
     return sender.decode("utf-8", "surrogateescape")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 from nep.masters.registry import RegisteredNode, RegisteredPublisher, RegisteredSubscriber, Registry
-from nep.protocol.encoding import make_frozen
+from nep.protocol.encoding import create_frozen
 from nep.protocol.graph_view import (
     Alert,
     ClientInfo,
@@ -20,7 +20,7 @@ from nep.protocol.graph_view import (
     TopicInfo,
 )
 from nep.protocol.requests import as_count
-from nep.protocol.service_wire import SURVEY, service_of
+from nep.protocol.service_wire import SURVEY_PREFIX, service_of
 
 _MAX_NAMES = 5
 """Maximum number of program names in an alert."""
@@ -56,7 +56,7 @@ class GraphViewer:
                 self._alerts.pop(gone, None)
         for name in names:
             if name not in known:
-                publishing, subscribing = registry.publishing(name), registry.subscribers_of(name)
+                publishing, subscribing = registry.publishers_with_nodes(name), registry.subscribers_of(name)
                 known[name] = self._topic(name, publishing, subscribing)
                 is_told = any(each.problem for _member, each in subscribing)
                 is_told = is_told or any(each.problem for _member, each in publishing)
@@ -111,7 +111,7 @@ def _node_info(member: RegisteredNode) -> NodeInfo:
         "clock_offset_ns": None if clock is None else clock.offset_ns,
         "clock_uncertainty_ns": None if clock is None else clock.uncertainty_ns,
     }
-    return make_frozen(NodeInfo, every_field)
+    return create_frozen(NodeInfo, every_field)
 
 
 def _topic_info(
@@ -154,7 +154,7 @@ def _topic_info(
         "lost": lost,
         "loss_ratio": None if lost is None else lost / (lost + received) if lost else 0.0,
     }
-    return make_frozen(TopicInfo, every_field)
+    return create_frozen(TopicInfo, every_field)
 
 
 def _rate_publishers(
@@ -181,7 +181,7 @@ def _publisher_info(
         "rate_hz": None if rates is None else rates[0],
         "bandwidth_Bps": None if rates is None else rates[1],
     }
-    return make_frozen(PublisherInfo, every_field)
+    return create_frozen(PublisherInfo, every_field)
 
 
 def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -> SubscriberInfo:
@@ -191,11 +191,11 @@ def _subscriber_info(member: RegisteredNode, subscriber: RegisteredSubscriber) -
         "received": subscriber.received,
         "lost": subscriber.lost,
     }
-    return make_frozen(SubscriberInfo, every_field)
+    return create_frozen(SubscriberInfo, every_field)
 
 
 def _service(topic: str, registry: Registry) -> ServiceInfo:
-    publishing, subscribing = registry.publishing(topic), registry.subscribers_of(topic)
+    publishing, subscribing = registry.publishers_with_nodes(topic), registry.subscribers_of(topic)
     servers = tuple(
         ServerInfo(each.record.id, member.node.id, each.record.endpoints, each.count, each.errors, each.bytes)
         for member, each in publishing
@@ -218,7 +218,7 @@ def _service(topic: str, registry: Registry) -> ServiceInfo:
 def _service_alerts(services: Mapping[str, ServiceInfo], registry: Registry) -> Iterator[Alert]:
     for name in sorted(services):
         servers = services[name].servers
-        if len(servers) > 1 and not name.startswith(SURVEY):
+        if len(servers) > 1 and not name.startswith(SURVEY_PREFIX):
             yield Alert(
                 f"service:{name}",
                 _("The service “{service}” has {count} servers: {nodes}").format(
@@ -274,11 +274,11 @@ def _name_alerts(registry: Registry) -> Iterator[Alert]:
 
 def _missing_alerts(registry: Registry) -> Iterator[Alert]:
     for member in registry.members.values():
-        if member.hung:
+        if member.hung_for:
             yield Alert(
                 f"missing:{member.node.id}",
                 _("“{node}” does not respond to {others}").format(
-                    node=member.node.name, others=_names(_names_of(registry, member.hung))
+                    node=member.node.name, others=_names(_names_of(registry, member.hung_for))
                 ),
                 _("It may be busy or stopped in a debugger. Messages published in the meantime may be lost."),
             )
@@ -301,7 +301,7 @@ def _topic_alerts(
         yield Alert(
             f"type:{topic}",
             _("The topic “{topic}” has {count} types. Publishers: {nodes}").format(
-                topic=topic, count=len(types), nodes=listed(parts)
+                topic=topic, count=len(types), nodes=format_list(parts)
             ),
             _("Use the same type in all programs, or rename one of the topics."),
         )

@@ -33,15 +33,15 @@ class ClockDifference:
         known_at_ns: Time of the comparison (`time.monotonic_ns`), or None for one and the same clock.
     """
 
-    add_ns: int
+    offset_ns: int
     uncertainty_ns: int
-    known_at_ns: int | None = None
+    measured_at_ns: int | None = None
 
     def uncertainty_at(self, now_ns: int) -> int:
         """Return the uncertainty in nanoseconds at `now_ns`. It grows with the drift of the clocks."""
-        if self.known_at_ns is None:
+        if self.measured_at_ns is None:
             return self.uncertainty_ns
-        return self.uncertainty_ns + drift_ns(now_ns - self.known_at_ns)
+        return self.uncertainty_ns + drift_ns(now_ns - self.measured_at_ns)
 
 
 SAME_CLOCK = ClockDifference(0, 0)
@@ -64,10 +64,10 @@ class PublisherClock:
         known = self.difference
         if known is None:
             return None
-        return known.add_ns / 1e9, known.uncertainty_at(time.monotonic_ns()) / 1e9
+        return known.offset_ns / 1e9, known.uncertainty_at(time.monotonic_ns()) / 1e9
 
 
-NOT_COMPARED = PublisherClock()
+UNKNOWN_CLOCK = PublisherClock()
 """Clock of publishers whose back end doesn't compare clocks. Immutable."""
 OWN_CLOCK = PublisherClock(SAME_CLOCK)
 """Clock of publishers on this computer. Immutable."""

@@ -37,8 +37,8 @@ import orjson
 from nep.errors import DecodeError, EncodeError, did_you_mean
 from nep.i18n import _
 from nep.messages import image_codec
-from nep.messages.encoded import Encoded, encoded
-from nep.messages.nesting import MAX_LEVELS, json_is_too_deep, packed_is_too_deep, too_deep
+from nep.messages.encoded import Encoded, new_encoded
+from nep.messages.nesting import MAX_LEVELS, json_is_too_deep, packed_is_too_deep, too_deep_reason
 from nep.messages.packing import pack, unpack
 
 __all__ = [
@@ -48,15 +48,14 @@ __all__ = [
     "Encoded",
     "JsonEncoder",
     "codec",
+    "codec_by_number",
     "codec_for",
-    "codec_numbered",
     "find_nan",
     "numpy_option",
-    "ordinary",
 ]
 
-_BYTES = (bytes, bytearray, memoryview)
-_NUMPY = orjson.OPT_SERIALIZE_NUMPY
+_BYTES_TYPES = (bytes, bytearray, memoryview)
+_NUMPY_OPTION = orjson.OPT_SERIALIZE_NUMPY
 _modules = sys.modules
 
 NAN_WARNING_INTERVAL_S = 10.0
@@ -104,13 +103,13 @@ def numpy_option() -> int:
     With the option set, orjson imports numpy at the first value of an unknown type. That takes 0.1 s, during
     which a publisher would stall. Without numpy loaded there can't be any numpy values.
     """
-    return _NUMPY if "numpy" in _modules else 0
+    return _NUMPY_OPTION if "numpy" in _modules else 0
 
 
 def _encode_json(payload: object) -> Encoded:
     option = numpy_option()
     try:
-        return encoded((_checked_depth(orjson.dumps(payload, _plain_value, option), payload), None))
+        return new_encoded((_check_depth(orjson.dumps(payload, _plain_value, option), payload), None))
     except TypeError:
         pass  # number keys need the slower option; other errors are raised again below
     try:
@@ -118,27 +117,29 @@ def _encode_json(payload: object) -> Encoded:
     except (TypeError, RecursionError) as error:
         # orjson's own limit is 254 levels
         is_deep = isinstance(error, RecursionError) or "Recursion limit" in str(error)
-        reason = too_deep() if is_deep else str(error.__cause__ or error) or _("it can't be encoded")
+        reason = too_deep_reason() if is_deep else str(error.__cause__ or error) or _("it can't be encoded")
         raise EncodeError("json", type(payload).__name__, reason) from error
     if json_is_too_deep(data):
-        raise EncodeError("json", type(payload).__name__, too_deep())
+        raise EncodeError("json", type(payload).__name__, too_deep_reason())
     return Encoded(data)
 
 
-def _ordinary_json(payload: object) -> bytes:
+def _encode_json_fast(payload: object) -> bytes:
     # `numpy_option` inlined: the call would cost a tenth of the time of a small message
-    return _checked_depth(orjson.dumps(payload, _plain_value, _NUMPY if "numpy" in _modules else 0), payload)
+    return _check_depth(
+        orjson.dumps(payload, _plain_value, _NUMPY_OPTION if "numpy" in _modules else 0), payload
+    )
 
 
-def _checked_depth(data: bytes, payload: object) -> bytes:
+def _check_depth(data: bytes, payload: object) -> bytes:
     if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
-        raise EncodeError("json", type(payload).__name__, too_deep())
+        raise EncodeError("json", type(payload).__name__, too_deep_reason())
     return data
 
 
 def _decode_json(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
     if len(data) > 2 * MAX_LEVELS and json_is_too_deep(data):
-        raise DecodeError("json", len(data), too_deep())
+        raise DecodeError("json", len(data), too_deep_reason())
     try:
         return orjson.loads(data)
     except orjson.JSONDecodeError as first:
@@ -178,18 +179,18 @@ def _decode_string(data: bytes | memoryview, _extension: Mapping[str, object]) -
 
 
 def _check_bytes(payload: object) -> bytes | bytearray | memoryview:
-    if not isinstance(payload, _BYTES):
+    if not isinstance(payload, _BYTES_TYPES):
         raise EncodeError("bytes", type(payload).__name__, _("publish 'bytes'"))
     return payload
 
 
 def _encode_bytes(payload: object) -> Encoded:
     if isinstance(payload, bytes):
-        return encoded((payload, None))
+        return new_encoded((payload, None))
     return Encoded(bytes(_check_bytes(payload)))
 
 
-def _ordinary_bytes(payload: object) -> bytes:
+def _encode_bytes_fast(payload: object) -> bytes:
     if type(payload) is bytes:
         return payload
     raise TypeError
@@ -221,9 +222,11 @@ def _encode_msgpack(payload: object) -> Encoded:
         data = pack(payload, _packable_value)
     except ValueError as error:
         is_deep = "recursion limit" in str(error)
-        raise EncodeError("msgpack", type(payload).__name__, too_deep() if is_deep else str(error)) from error
+        raise EncodeError(
+            "msgpack", type(payload).__name__, too_deep_reason() if is_deep else str(error)
+        ) from error
     if packed_is_too_deep(data, payload):
-        raise EncodeError("msgpack", type(payload).__name__, too_deep())
+        raise EncodeError("msgpack", type(payload).__name__, too_deep_reason())
     return Encoded(data)
 
 
@@ -232,9 +235,9 @@ def _decode_msgpack(data: bytes | memoryview, _extension: Mapping[str, object]) 
         value = unpack(data)
     except ValueError as error:
         is_deep = isinstance(error.__cause__, msgpack.StackError)
-        raise DecodeError("msgpack", len(data), too_deep() if is_deep else str(error)) from error
+        raise DecodeError("msgpack", len(data), too_deep_reason() if is_deep else str(error)) from error
     if packed_is_too_deep(data, value):
-        raise DecodeError("msgpack", len(data), too_deep())
+        raise DecodeError("msgpack", len(data), too_deep_reason())
     return value
 
 
@@ -242,7 +245,7 @@ def _decode_image(data: bytes | memoryview, extension: Mapping[str, object]) -> 
     return image_codec.decode(memoryview(data), extension)
 
 
-def _no_payload() -> object:
+def _empty_image() -> object:
     return None
 
 
@@ -258,19 +261,19 @@ BYTES = Codec("bytes", 3, _encode_bytes, _decode_bytes, bytes, _check_bytes)
 MSGPACK = Codec("msgpack", 4, _encode_msgpack, _decode_msgpack, dict, _accept_any)
 
 
-IMAGE = Codec("image", 5, image_codec.encode, _decode_image, _no_payload, image_codec.check)
+IMAGE = Codec("image", 5, image_codec.encode, _decode_image, _empty_image, image_codec.check_image)
 
 
 CODECS: Mapping[str, Codec] = {each.name: each for each in (JSON, STRING, BYTES, MSGPACK, IMAGE)}
 
 
-_NUMBERED = {each.number: each for each in CODECS.values()}
+_CODECS_BY_NUMBER = {each.number: each for each in CODECS.values()}
 
 
-_ORDINARY: Mapping[Callable[[object], Encoded], Callable[[Any], bytes]] = {
-    _encode_json: _ordinary_json,
+_FAST_ENCODERS: Mapping[Callable[[object], Encoded], Callable[[Any], bytes]] = {
+    _encode_json: _encode_json_fast,
     _encode_string: str.encode,
-    _encode_bytes: _ordinary_bytes,
+    _encode_bytes: _encode_bytes_fast,
 }
 
 
@@ -288,17 +291,17 @@ def codec(name: str) -> Codec:
         ) from None
 
 
-def codec_numbered(number: int) -> Codec | None:
+def codec_by_number(number: int) -> Codec | None:
     """Return the codec with a number, or None if this version has none."""
-    return _NUMBERED.get(number)
+    return _CODECS_BY_NUMBER.get(number)
 
 
-def ordinary(codec: Codec) -> Callable[[Any], bytes] | None:
+def fast_encoder(codec: Codec) -> Callable[[Any], bytes] | None:
     """Return a faster encoder for common payloads of a codec, or None if there is none.
 
     It returns the same bytes as `codec.encode`; for other payloads it raises any exception.
     """
-    return _ORDINARY.get(codec.encode)
+    return _FAST_ENCODERS.get(codec.encode)
 
 
 def codec_for(msg_type: str) -> Codec:

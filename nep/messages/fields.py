@@ -15,7 +15,7 @@ MISSING = object()
 
 _STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
 _MAX_DEPTH = 40
-_PLAIN = re.compile(r"[^.\[\]\"\s]+")
+_PLAIN_NAME = re.compile(r"[^.\[\]\"\s]+")
 
 
 def parse_path(text: str) -> Path:
@@ -44,7 +44,7 @@ def parse_path(text: str) -> Path:
     return tuple(steps)
 
 
-def pick(payload: object, path: Path) -> object:
+def value_at(payload: object, path: Path) -> object:
     """Return the value at a path, or `MISSING`."""
     value = payload
     for step in path:
@@ -71,24 +71,24 @@ def path_text(path: Path) -> str:
 def _format_step(step: str | int) -> str:
     if isinstance(step, int):
         return f"[{step}]"
-    return f".{step}" if _PLAIN.fullmatch(step) else '["' + re.sub(r'(["\\])', r"\\\1", step) + '"]'
+    return f".{step}" if _PLAIN_NAME.fullmatch(step) else '["' + re.sub(r'(["\\])', r"\\\1", step) + '"]'
 
 
-def leaves(payload: object, most: int = 200) -> Iterator[str]:
+def leaf_paths(payload: object, most: int = 200) -> Iterator[str]:
     """Yield the paths of at most `most` scalar values. A value below the depth limit counts as a scalar."""
     remaining = [most]
-    yield from _leaves(payload, "", remaining, _MAX_DEPTH)
+    yield from _leaf_paths(payload, "", remaining, _MAX_DEPTH)
 
 
-def _leaves(value: object, path: str, remaining: list[int], depth: int) -> Iterator[str]:
+def _leaf_paths(value: object, path: str, remaining: list[int], depth: int) -> Iterator[str]:
     if remaining[0] <= 0:
         return
     if depth and isinstance(value, Mapping) and value:
         for key, each in value.items():
-            yield from _leaves(each, path + _format_step(str(key)), remaining, depth - 1)
+            yield from _leaf_paths(each, path + _format_step(str(key)), remaining, depth - 1)
     elif depth and isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and value:
         for number, each in enumerate(value[:10]):
-            yield from _leaves(each, f"{path}[{number}]", remaining, depth - 1)
+            yield from _leaf_paths(each, f"{path}[{number}]", remaining, depth - 1)
     else:
         remaining[0] -= 1
         yield path.removeprefix(".") or "."

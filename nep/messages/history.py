@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 
 MAX_HISTORY = 1_000
 """Maximum length of a history; every back end can send this many messages at once to a new subscriber."""
-HISTORY_BYTES = 64 * 2**20
+MAX_HISTORY_BYTES = 64 * 2**20
 
 T = TypeVar("T")
 
@@ -19,7 +19,7 @@ class History(Generic[T]):
     With a maximum of 0 messages it stays empty. Not thread-safe: guarded by the publisher's lock.
     """
 
-    def __init__(self, max_messages: int, max_bytes: int = HISTORY_BYTES) -> None:
+    def __init__(self, max_messages: int, max_bytes: int = MAX_HISTORY_BYTES) -> None:
         self._max_messages = max_messages
         self._max_bytes = max_bytes
         self._messages: deque[tuple[T, int]] = deque()

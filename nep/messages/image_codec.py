@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, Any
 from nep.errors import DecodeError, EncodeError
 from nep.i18n import _, lazy
 from nep.messages.encoded import Encoded
-from nep.messages.image_files import ImageFile, check_size, examine
-from nep.system.arguments import one_of, within
+from nep.messages.image_files import ImageFile, check_size, parse_header
+from nep.system.arguments import check_choice, check_range
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,17 +34,17 @@ if TYPE_CHECKING:
 JPEG_QUALITY = 90
 MAX_WIDTH = 65_535
 """Maximum width in pixels."""
-_NEEDS = lazy("install the image codec with: pip install 'nep-studio[image]'")
+_INSTALL_HINT = lazy("install the image codec with: pip install 'nep-studio[image]'")
 _FAST_PNG_OPTIONS = [16, 1]  # IMWRITE_PNG_COMPRESSION: the fastest that compresses
 _NAMED_LAYOUTS = {
     "mono8": ("u1", 1), "bgr8": ("u1", 3), "bgra8": ("u1", 4), "rgb8": ("u1", 3), "rgba8": ("u1", 4),
     "mono16": ("<u2", 1), "bgr16": ("<u2", 3), "bgra16": ("<u2", 4), "rgb16": ("<u2", 3),
     "rgba16": ("<u2", 4),
 }  # fmt: skip
-_NUMBERS = {"8U": "u1", "8S": "i1", "16U": "<u2", "16S": "<i2", "32S": "<i4", "32F": "<f4", "64F": "<f8"}
+_DTYPES = {"8U": "u1", "8S": "i1", "16U": "<u2", "16S": "<i2", "32S": "<i4", "32F": "<f4", "64F": "<f8"}
 _LAYOUT = re.compile(r"(8U|8S|16U|16S|32S|32F|64F)C([1-4])")
-_ENCODING = {value: key for key, value in _NAMED_LAYOUTS.items() if not key.startswith("rgb")}
-_TYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
+_ENCODINGS = {value: key for key, value in _NAMED_LAYOUTS.items() if not key.startswith("rgb")}
+_DTYPE_NAMES = lazy("uint8, int8, uint16, int16, int32, float32 or float64")
 
 
 @dataclass(frozen=True)
@@ -66,26 +66,26 @@ class ImageFormat:
     width: int | None = None
 
     def __post_init__(self) -> None:
-        one_of("kind", self.kind, ("auto", "jpeg", "png", "raw"))
-        within("quality", self.quality, 1, 100)
+        check_choice("kind", self.kind, ("auto", "jpeg", "png", "raw"))
+        check_range("quality", self.quality, 1, 100)
         if self.width is not None:
-            within("width", self.width, 1, MAX_WIDTH)
+            check_range("width", self.width, 1, MAX_WIDTH)
 
     def encode(self, payload: object) -> Encoded:
         """Encode an image. Raises `EncodeError`."""
         if isinstance(payload, bytes | bytearray | memoryview):
             return encode(payload)
         try:
-            frame = self._scaled(_contiguous(payload))
+            frame = self._scale(_as_contiguous(payload))
             if self.kind == "jpeg":
-                return _as_jpeg(frame, self.quality)
+                return _encode_jpeg(frame, self.quality)
             if self.kind == "png":
-                return _as_png(frame)
+                return _encode_png(frame)
         except ImportError as error:
-            raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
-        return _raw(frame) if self.kind == "raw" else _encode_default(frame, self.quality)
+            raise EncodeError("image", type(payload).__name__, _(_INSTALL_HINT)) from error
+        return _encode_raw(frame) if self.kind == "raw" else _encode_default(frame, self.quality)
 
-    def _scaled(self, frame: NDArray[Any]) -> NDArray[Any]:
+    def _scale(self, frame: NDArray[Any]) -> NDArray[Any]:
         height, width = frame.shape[:2]
         if self.width is None or width <= self.width:
             return frame
@@ -109,7 +109,7 @@ class RawLayout:
         is_red_first: True for the order RGB, False for BGR.
     """
 
-    numbers: str
+    dtype: str
     channels: int
     is_red_first: bool = False
 
@@ -136,13 +136,13 @@ def encode(payload: object) -> Encoded:
     if isinstance(payload, bytes | bytearray | memoryview):
         data = bytes(payload)
         try:
-            return Encoded(data, examine(data).extension)
+            return Encoded(data, parse_header(data).extension)
         except DecodeError as error:
             raise EncodeError("image", kind, error.reason) from error
     try:
-        return _encode_default(_contiguous(payload), JPEG_QUALITY)
+        return _encode_default(_as_contiguous(payload), JPEG_QUALITY)
     except ImportError as error:
-        raise EncodeError("image", kind, _(_NEEDS)) from error
+        raise EncodeError("image", kind, _(_INSTALL_HINT)) from error
 
 
 def _channels(frame: NDArray[Any]) -> int:
@@ -152,28 +152,28 @@ def _channels(frame: NDArray[Any]) -> int:
 def _encode_default(frame: NDArray[Any], quality: int) -> Encoded:
     # The module docstring describes the default format.
     if frame.dtype.name == "uint8" and _channels(frame) in (1, 3):
-        return _as_jpeg(frame, quality)
-    return _as_png(frame) if _can_encode_png(frame) else _raw(frame)
+        return _encode_jpeg(frame, quality)
+    return _encode_png(frame) if _can_encode_png(frame) else _encode_raw(frame)
 
 
 def _can_encode_png(frame: NDArray[Any]) -> bool:
     return frame.dtype.name in ("uint8", "uint16") and _channels(frame) in (1, 3, 4)
 
 
-def _as_jpeg(frame: NDArray[Any], quality: int) -> Encoded:
+def _encode_jpeg(frame: NDArray[Any], quality: int) -> Encoded:
     if frame.dtype.name != "uint8" or _channels(frame) not in (1, 3):
         reason = _("a JPEG image needs 'uint8' and one or three channels; choose 'png', 'raw' or 'auto'")
         raise EncodeError("image", type(frame).__name__, reason)
-    return _as_file(frame, "jpeg", [1, quality])  # 1 = IMWRITE_JPEG_QUALITY
+    return _encode_file(frame, "jpeg", [1, quality])  # 1 = IMWRITE_JPEG_QUALITY
 
 
-def _as_png(frame: NDArray[Any]) -> Encoded:
+def _encode_png(frame: NDArray[Any]) -> Encoded:
     if not _can_encode_png(frame):
         reason = _(
             "a PNG image needs 'uint8' or 'uint16' and one, three or four channels; choose 'raw' or 'auto'"
         )
         raise EncodeError("image", type(frame).__name__, reason)
-    return _as_file(frame, "png", _FAST_PNG_OPTIONS)
+    return _encode_file(frame, "png", _FAST_PNG_OPTIONS)
 
 
 def raw_image(payload: object) -> Encoded:
@@ -189,12 +189,12 @@ def raw_image(payload: object) -> Encoded:
         EncodeError: The value is not an image, or numpy is not installed.
     """
     try:
-        return _raw(_contiguous(payload))
+        return _encode_raw(_as_contiguous(payload))
     except ImportError as error:
-        raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
+        raise EncodeError("image", type(payload).__name__, _(_INSTALL_HINT)) from error
 
 
-def _as_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
+def _encode_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
     opencv = _opencv()
     try:
         is_made, buffer = opencv.imencode(f".{kind}", frame, options)
@@ -208,18 +208,18 @@ def _as_file(frame: NDArray[Any], kind: str, options: list[int]) -> Encoded:
     return Encoded(buffer.tobytes(), {"shape": _shape(frame), "encoding": kind})
 
 
-def _raw(frame: NDArray[Any]) -> Encoded:
+def _encode_raw(frame: NDArray[Any]) -> Encoded:
     shape = _shape(frame)
-    numbers = _numbers(frame.dtype)
-    encoding = _ENCODING.get((numbers, shape[2]))
+    numbers = _dtype_name(frame.dtype)
+    encoding = _ENCODINGS.get((numbers, shape[2]))
     if encoding is None:
-        encoding = f"{next(name for name, each in _NUMBERS.items() if each == numbers)}C{shape[2]}"
+        encoding = f"{next(name for name, each in _DTYPES.items() if each == numbers)}C{shape[2]}"
     # not copied: a publisher copies it once, into shared memory if possible
     data = frame.astype(numbers, copy=False).data.cast("B")
     return Encoded(data, {"shape": shape, "encoding": encoding})
 
 
-def _numbers(dtype: np.dtype[Any]) -> str:
+def _dtype_name(dtype: np.dtype[Any]) -> str:
     # Name as in `_NUMBERS`: little-endian, as everything on the wire.
     return dtype.newbyteorder("<").str.removeprefix("|")
 
@@ -228,26 +228,26 @@ def _shape(frame: NDArray[Any]) -> list[int]:
     return [frame.shape[0], frame.shape[1], 1 if frame.ndim == 2 else frame.shape[2]]
 
 
-def check(payload: object) -> None:
+def check_image(payload: object) -> None:
     """Raise `EncodeError` if the type, shape or number type of a value is not that of an image."""
     if isinstance(payload, (bytes, bytearray, memoryview)):
         return
     try:
-        _validated(payload)
+        _validate(payload)
     except ImportError as error:
-        raise EncodeError("image", type(payload).__name__, _(_NEEDS)) from error
+        raise EncodeError("image", type(payload).__name__, _(_INSTALL_HINT)) from error
 
 
-def _validated(payload: object) -> NDArray[Any]:
+def _validate(payload: object) -> NDArray[Any]:
     np = _numpy()
     kind = type(payload).__name__
     if not isinstance(payload, np.ndarray):
         raise EncodeError("image", kind, _("publish a 'uint8' array (height, width, 3) or a JPEG"))
-    if _numbers(payload.dtype) not in _NUMBERS.values():
+    if _dtype_name(payload.dtype) not in _DTYPES.values():
         raise EncodeError(
             "image",
             kind,
-            _("its elements are '{dtype}'; use {types}").format(dtype=payload.dtype, types=_(_TYPE_NAMES)),
+            _("its elements are '{dtype}'; use {types}").format(dtype=payload.dtype, types=_(_DTYPE_NAMES)),
         )
     is_picture = payload.ndim == 2 or (payload.ndim == 3 and 1 <= payload.shape[2] <= 4)
     if not is_picture or 0 in payload.shape:
@@ -262,10 +262,10 @@ def _validated(payload: object) -> NDArray[Any]:
     return frame
 
 
-def _contiguous(payload: object) -> NDArray[Any]:
+def _as_contiguous(payload: object) -> NDArray[Any]:
     # One channel becomes two dimensions. Raises `EncodeError`.
     np = _numpy()
-    frame = _validated(payload)
+    frame = _validate(payload)
     if frame.ndim == 3 and frame.shape[2] == 1:
         frame = frame[:, :, 0]
     whole: NDArray[Any] = np.ascontiguousarray(frame, dtype=frame.dtype.newbyteorder("="))
@@ -283,13 +283,13 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
     try:
         layout = raw_layout(extension.get("encoding"))
         if layout is None:
-            return read_file(examine(data))
+            return read_file(parse_header(data))
         frame = raw_array(data, layout, extension.get("shape"))
         if layout.is_red_first:
             frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
         return frame
     except ImportError as error:
-        raise DecodeError("image", data.nbytes, _(_NEEDS)) from error
+        raise DecodeError("image", data.nbytes, _(_INSTALL_HINT)) from error
 
 
 def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
@@ -332,13 +332,13 @@ def raw_layout(encoding: object) -> RawLayout | None:
     if named is not None:
         return RawLayout(*named, is_red_first=encoding.startswith("rgb"))
     found = _LAYOUT.fullmatch(encoding)
-    return None if found is None else RawLayout(_NUMBERS[found[1]], int(found[2]))
+    return None if found is None else RawLayout(_DTYPES[found[1]], int(found[2]))
 
 
 def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any]:
     """Return raw bytes as an array in their original channel order, without a copy. Raises `DecodeError`."""
     np = _numpy()
-    numbers = np.dtype(layout.numbers)
+    numbers = np.dtype(layout.dtype)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
     if len(sides) < 2 or not all(type(side) is int for side in sides):
         raise DecodeError(
@@ -359,6 +359,6 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
 def picture_info(data: bytes | memoryview) -> dict[str, object] | None:
     """Return the extension of a JPEG or PNG file, from its header; None if `decode` would reject the file."""
     try:
-        return examine(data).extension
+        return parse_header(data).extension
     except DecodeError:
         return None

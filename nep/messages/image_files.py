@@ -27,8 +27,8 @@ MAX_SCANNED_PIXELS = 1_200_000_000
 MAX_SEGMENTS = 100_000
 """Maximum number of JPEG segments or PNG chunks. Encoders write them with 8 kB and more."""
 
-_JPEG = b"\xff\xd8\xff"
-_PNG = b"\x89PNG\r\n\x1a\n"
+_JPEG_SIGNATURE = b"\xff\xd8\xff"
+_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _UNSUPPORTED_FORMATS = {
     b"GIF8": "GIF", b"BM": "BMP", b"RIFF": "WebP", b"II*\0": "TIFF", b"MM\0*": "TIFF", b"<svg": "SVG",
     b"<?xml": "SVG", b"\0\0\0\x0cjP": "JPEG 2000", b"\xff\x4f\xff\x51": "JPEG 2000",
@@ -42,11 +42,11 @@ _FRAME_MARKERS = {0xC0: False, 0xC1: False, 0xC2: True}
 """Supported JPEG frame headers; True if progressive. Cameras and browsers use no others."""
 _TABLE_MARKERS = frozenset({0xC4, 0xDB, 0xDD, 0xFE, *range(0xE0, 0xF0)})
 _SCAN, _APP1 = 0xDA, 0xE1
-_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 4, 6: 4}
+_PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 4, 6: 4}
 """Number of channels of a decoded PNG, by colour type."""
-_DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
+_PNG_DEPTHS = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
 _REQUIRED_CHUNKS = frozenset({b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"})
-_FIRST_ROTATED = 5
+_FIRST_ROTATED_ORIENTATION = 5
 """First EXIF orientation that swaps rows and columns."""
 
 
@@ -78,13 +78,13 @@ class ImageFile:
         return {"shape": [self.height, self.width, self.channels], "encoding": self.kind}
 
 
-def examine(data: bytes | memoryview) -> ImageFile:
+def parse_header(data: bytes | memoryview) -> ImageFile:
     """Parse the header of a file. Raises `DecodeError` if it is not a valid JPEG or PNG, or is too large."""
     file = data if isinstance(data, bytes) else memoryview(data).cast("B")
     head = bytes(file[:8])
-    if head == _PNG:
+    if head == _PNG_SIGNATURE:
         return _Png(file).read()
-    if head.startswith(_JPEG):
+    if head.startswith(_JPEG_SIGNATURE):
         return _Jpeg(file).read()
     size = len(file)
     if not size:
@@ -137,7 +137,7 @@ class _Reader:
     def number(self, at: int, count: int) -> int:
         return int.from_bytes(self.data[at : at + count], "big")
 
-    def broken(self, reason: str) -> DecodeError:
+    def error(self, reason: str) -> DecodeError:
         reason = _("the {upper} image is damaged: {reason}").format(upper=self.kind.upper(), reason=reason)
         return DecodeError("image", self.size, reason)
 
@@ -154,48 +154,48 @@ class _Jpeg(_Reader):
     def read(self) -> ImageFile:
         frame, orientation, at = None, 1, 2
         for _piece in range(MAX_SEGMENTS):
-            marker, at = self._marker(at)
+            marker, at = self._read_marker(at)
             if marker in _MARKERS_WITHOUT_LENGTH:
                 continue
             length = self.number(at, 2)
             if length < 2 or at + length > self.size:
-                raise self.broken(_("it is truncated"))
+                raise self.error(_("it is truncated"))
             if marker in _FRAME_MARKERS:
                 if frame is not None:
-                    raise self.broken(_("it has two header chunks"))
-                frame = self._frame(marker, at, length)
+                    raise self.error(_("it has two header chunks"))
+                frame = self._read_frame(marker, at, length)
             elif marker == _SCAN:
                 if frame is None:
-                    raise self.broken(_("its pixels come before the frame header"))
-                return self._checked(frame, orientation, at)
+                    raise self.error(_("its pixels come before the frame header"))
+                return self._check_frame(frame, orientation, at)
             elif marker == _APP1:
                 orientation = _orientation(self.data[at + 2 : at + length]) or orientation
             elif marker not in _TABLE_MARKERS:
-                raise self.broken(
+                raise self.error(
                     _("it has the unknown marker 'ff{marker}'").format(marker=number(marker, "02x"))
                 )
             at += length
-        raise self.broken(_("it has too many segments"))
+        raise self.error(_("it has too many segments"))
 
-    def _marker(self, at: int) -> tuple[int, int]:
+    def _read_marker(self, at: int) -> tuple[int, int]:
         if self.number(at, 1) != 0xFF:
             reason = (
                 _("it is truncated")
                 if at >= self.size
                 else _("a segment does not follow directly after the previous one")
             )
-            raise self.broken(reason)
+            raise self.error(reason)
         found = _FILL_BYTES.match(self.data, at)
         at = found.end() if found is not None else at
         if at >= self.size:
-            raise self.broken(_("it is truncated"))
+            raise self.error(_("it is truncated"))
         return self.data[at], at + 1
 
-    def _frame(self, marker: int, at: int, length: int) -> _Frame:
+    def _read_frame(self, marker: int, at: int, length: int) -> _Frame:
         bits, height, width = self.number(at + 2, 1), self.number(at + 3, 2), self.number(at + 5, 2)
         components = self.number(at + 7, 1)
         if length != 8 + 3 * components or components not in (1, 3, 4):
-            raise self.broken(_("it has {components} colour components").format(components=components))
+            raise self.error(_("it has {components} colour components").format(components=components))
         if bits != 8:
             raise DecodeError(
                 "image",
@@ -205,13 +205,13 @@ class _Jpeg(_Reader):
         sampling = [self.number(at + 9 + 3 * each, 1) for each in range(components)]
         factors = [(each >> 4, each & 15) for each in sampling]
         if not all(1 <= across <= 4 and 1 <= down <= 4 for across, down in factors):
-            raise self.broken(_("its colour components have invalid sampling factors"))
+            raise self.error(_("its colour components have invalid sampling factors"))
         return _Frame(width, height, components, _FRAME_MARKERS[marker], factors)
 
-    def _checked(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
+    def _check_frame(self, frame: _Frame, orientation: int, at: int) -> ImageFile:
         channels = 1 if frame.components == 1 else 3
         pixel_bytes = float(_DECODER_COPIES * channels)
-        is_refined = frame.is_refined or self.number(at + 2, 1) != frame.components
+        is_refined = frame.is_progressive or self.number(at + 2, 1) != frame.components
         if is_refined:  # the decoder holds all coefficients until the last scan
             pixel_bytes += frame.coefficient_bytes
         check_size(frame.width, frame.height, pixel_bytes, self.size)
@@ -224,7 +224,7 @@ class _Jpeg(_Reader):
                 )
                 raise DecodeError("image", self.size, reason)
         width, height = frame.width, frame.height
-        if orientation >= _FIRST_ROTATED:
+        if orientation >= _FIRST_ROTATED_ORIENTATION:
             width, height = height, width
         return ImageFile("jpeg", width, height, channels, 8, orientation, self.data)
 
@@ -236,15 +236,18 @@ class _Frame:
     width: int
     height: int
     components: int
-    is_refined: bool
-    factors: list[tuple[int, int]]
+    is_progressive: bool
+    sampling_factors: list[tuple[int, int]]
 
     @property
     def coefficient_bytes(self) -> float:
         # Two bytes per coefficient, in whole blocks.
-        across, down = max(each[0] for each in self.factors), max(each[1] for each in self.factors)
+        across, down = (
+            max(each[0] for each in self.sampling_factors),
+            max(each[1] for each in self.sampling_factors),
+        )
         units = -(-self.width // (8 * across)) * -(-self.height // (8 * down))
-        blocks = units * sum(each[0] * each[1] for each in self.factors)
+        blocks = units * sum(each[0] * each[1] for each in self.sampling_factors)
         return 128 * blocks / max(1, self.width * self.height)
 
 
@@ -255,25 +258,25 @@ class _Png(_Reader):
 
     def read(self) -> ImageFile:
         if self.size < 33 or self.data[8:16] != b"\0\0\0\x0dIHDR":
-            raise self.broken(_("the header chunk is missing"))
+            raise self.error(_("the header chunk is missing"))
         width, height = self.number(16, 4), self.number(20, 4)
         depth, colour = self.data[24], self.data[25]
-        if depth not in _DEPTHS.get(colour, ()):
-            raise self.broken(
+        if depth not in _PNG_DEPTHS.get(colour, ()):
+            raise self.error(
                 _("colour type {colour} does not allow {depth} bits").format(colour=colour, depth=depth)
             )
-        needed, kinds, orientation = self._chunks()
-        channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _CHANNELS[colour]
+        needed, kinds, orientation = self._read_chunks()
+        channels = 4 if b"tRNS" in kinds and colour in (2, 3) else _PNG_CHANNELS[colour]
         bits = 16 if depth == 16 else 8
         check_size(width, height, _DECODER_COPIES * channels * bits // 8, self.size)
-        if orientation >= _FIRST_ROTATED:
+        if orientation >= _FIRST_ROTATED_ORIENTATION:
             width, height = height, width
         data = self.data
         if len(needed) > 1 or needed[0] != (8, self.size):
-            data = _PNG + b"".join([bytes(self.data[start:end]) for start, end in needed])
+            data = _PNG_SIGNATURE + b"".join([bytes(self.data[start:end]) for start, end in needed])
         return ImageFile("png", width, height, channels, bits, orientation, data)
 
-    def _chunks(self) -> tuple[list[tuple[int, int]], set[bytes], int]:
+    def _read_chunks(self) -> tuple[list[tuple[int, int]], set[bytes], int]:
         # Returns the ranges of the chunks needed for the picture, all kinds, and the orientation. Other
         # chunks are dropped: compressed text and profiles may be decompression bombs, and animation frames
         # are not used.
@@ -283,10 +286,10 @@ class _Png(_Reader):
         for _piece in range(MAX_SEGMENTS):
             kind, end = bytes(self.data[at + 4 : at + 8]), at + 12 + self.number(at, 4)
             if kind == b"IHDR" and kind in kinds:
-                raise self.broken(_("it has two header chunks"))
+                raise self.error(_("it has two header chunks"))
             if kind in _REQUIRED_CHUNKS:
                 if end > self.size:  # OpenCV allocates the declared size, up to 4 GB, before it checks
-                    raise self.broken(_("it is truncated"))
+                    raise self.error(_("it is truncated"))
                 kinds.add(kind)
                 if needed and needed[-1][1] == at:
                     needed[-1] = needed[-1][0], end
@@ -300,7 +303,7 @@ class _Png(_Reader):
             at = end
             if kind == b"IEND" or at + 8 > self.size:
                 return needed, kinds, orientation
-        raise self.broken(_("it has too many chunks"))
+        raise self.error(_("it has too many chunks"))
 
 
 _MAX_EXIF_BYTES = 4096

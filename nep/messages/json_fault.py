@@ -15,8 +15,8 @@ from nep.text import shortened
 _MAX_WORD_LENGTH = 30
 _STRING_OR_CONSTANT = re.compile(r'"(?:[^"\\\n]|\\.)*"?|(?P<constant>-?\b(?:NaN|Infinity)\b)')
 _WORD = re.compile(r"[^\W\d][\w.-]*")
-_CLOSING = {"{": "}", "[": "]"}
-_OTHER_LANGUAGES = {"True": "true", "False": "false", "None": "null", "undefined": "null", "nil": "null"}
+_CLOSING_BRACKETS = {"{": "}", "[": "]"}
+_FOREIGN_CONSTANTS = {"True": "true", "False": "false", "None": "null", "undefined": "null", "nil": "null"}
 _JSON_START = re.compile(r'\s*(?:[{["]|-?\d|-?(?:Infinity|NaN)\b|(?:true|false|null)\b)')
 
 
@@ -48,7 +48,7 @@ class JsonFault:
     is_nan: bool = False
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """Description of the error as a sentence for the window."""
         return _("Line {line}, column {column}: {reason}.").format(
             line=self.line, column=self.column, reason=self.reason
@@ -66,19 +66,19 @@ def find_json_fault(text: str, *, allow_nan: bool = False) -> JsonFault | None:
     With `allow_nan`, NaN and Infinity are accepted as values.
     """
     try:
-        json.loads(text, parse_constant=float if allow_nan else _reject_constant, parse_float=_finite)
+        json.loads(text, parse_constant=float if allow_nan else _reject_constant, parse_float=_parse_finite)
     except json.JSONDecodeError as error:
         return _explain(text, error)
     except _ConstantError:
-        return _constant(text)
+        return _constant_fault(text)
     except RecursionError:
         return JsonFault(1, 1, _("too many nested levels"))
     except ValueError:  # Python limits the digits of ints, and parses 1e999 as infinity
         return JsonFault(1, 1, _("a number is too large"))
-    return None if allow_nan else _stricter_fault(text)
+    return None if allow_nan else _orjson_fault(text)
 
 
-def _stricter_fault(text: str) -> JsonFault | None:
+def _orjson_fault(text: str) -> JsonFault | None:
     # Accepted by Python's parser, but not by orjson: surrogates, deep nesting.
     try:
         orjson.loads(text)
@@ -87,7 +87,7 @@ def _stricter_fault(text: str) -> JsonFault | None:
             return JsonFault(1, 1, _("too many nested levels"))
         if "infinity" in error.msg:
             return JsonFault(1, 1, _("a number is too large"))
-        return _at(text, error.pos, _("an unpaired surrogate is not a character"))
+        return _fault_at(text, error.pos, _("an unpaired surrogate is not a character"))
     return None
 
 
@@ -99,20 +99,22 @@ def _reject_constant(_constant: str) -> object:
     raise _ConstantError
 
 
-def _finite(digits: str) -> float:
+def _parse_finite(digits: str) -> float:
     value = float(digits)
     if math.isinf(value):
         raise ValueError(digits)
     return value
 
 
-def _constant(text: str) -> JsonFault:
+def _constant_fault(text: str) -> JsonFault:
     found = next(each for each in _STRING_OR_CONSTANT.finditer(text) if each["constant"] is not None)
     fix = JsonFix(found.start(), found.end(), "null")
-    return _at(text, found.start(), _("{word} is not JSON; use null").format(word=found[0]), fix, is_nan=True)
+    return _fault_at(
+        text, found.start(), _("{word} is not JSON; use null").format(word=found[0]), fix, is_nan=True
+    )
 
 
-def _at(
+def _fault_at(
     text: str, position: int, reason: str, fix: JsonFix | None = None, *, is_nan: bool = False
 ) -> JsonFault:
     line = text.count("\n", 0, position) + 1
@@ -124,62 +126,62 @@ def _explain(text: str, error: json.JSONDecodeError) -> JsonFault:
     position, message = error.pos, error.msg
     if not text.strip():
         example = _("the text is empty; write JSON, such as {example}").format(example='{"x": 1}')
-        return _at(text, 0, example)
+        return _fault_at(text, 0, example)
     if message.startswith(("Unterminated", "Invalid control")):
-        return _open_string(text, position)
+        return _invalid_string(text, position)
     if message.startswith("Invalid \\"):
         fix = JsonFix(position, position, "\\") if text[position : position + 1] == "\\" else None
-        return _at(text, position, _("a string contains a single \\; use \\\\"), fix)
+        return _fault_at(text, position, _("a string contains a single \\; use \\\\"), fix)
     if message.startswith("Extra data"):
-        return _at(text, position, _("there is extra text after the first value"))
+        return _fault_at(text, position, _("there is extra text after the first value"))
     if message.startswith("Illegal trailing comma"):
         return _trailing_comma(text, text.rfind(",", 0, position + 1))
-    return _unexpected(text, position, message)
+    return _unexpected_character(text, position, message)
 
 
-def _unexpected(text: str, position: int, message: str) -> JsonFault:
+def _unexpected_character(text: str, position: int, message: str) -> JsonFault:
     sign, end = text[position : position + 1], len(text[:position].rstrip())
     last = text[end - 1 : end]
     if sign in {"}", "]"} and last == ",":
         return _trailing_comma(text, end - 1)
     if message.startswith("Expecting ':'"):
-        return _at(text, end, _("a colon is missing after the name"), JsonFix(end, end, ":"))
+        return _fault_at(text, end, _("a colon is missing after the name"), JsonFix(end, end, ":"))
     if not sign:
-        return _unclosed(text, end)
+        return _unclosed_bracket(text, end)
     if message.startswith("Expecting ','"):
         return _missing_comma(text, position, end)
     if sign in {"}", "]", ","} and last == ":":
-        return _at(text, end, _("a value is missing after the colon"))
+        return _fault_at(text, end, _("a value is missing after the colon"))
     return _missing_value(text, position, is_name=message.startswith("Expecting property name"))
 
 
 def _trailing_comma(text: str, position: int) -> JsonFault:
-    return _at(text, position, _("there is an extra comma"), JsonFix(position, position + 1, ""))
+    return _fault_at(text, position, _("there is an extra comma"), JsonFix(position, position + 1, ""))
 
 
 def _missing_comma(text: str, position: int, end: int) -> JsonFault:
     sign = text[position]
     if sign in {"}", "]"}:
-        return _at(text, position, _("{sign} does not match the opening bracket").format(sign=sign))
+        return _fault_at(text, position, _("{sign} does not match the opening bracket").format(sign=sign))
     if position == end and (sign.isalnum() or sign in "._"):
-        return _at(text, position, _("JSON does not support this number"))
-    return _at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
+        return _fault_at(text, position, _("JSON does not support this number"))
+    return _fault_at(text, end, _("a comma is missing between two values"), JsonFix(end, end, ","))
 
 
-def _unclosed(text: str, end: int) -> JsonFault:
+def _unclosed_bracket(text: str, end: int) -> JsonFault:
     opened: list[str] = []
     for found in re.finditer(r'"(?:[^"\\\n]|\\.)*"|[{}\[\]]', text):
         sign = found[0]
-        if sign in _CLOSING:
+        if sign in _CLOSING_BRACKETS:
             opened.append(sign)
         elif sign in {"}", "]"} and opened:
             opened.pop()
     if not opened:
-        return _at(text, end, _("a value is missing at the end"))
-    missing = "".join(_CLOSING[sign] for sign in reversed(opened))
+        return _fault_at(text, end, _("a value is missing at the end"))
+    missing = "".join(_CLOSING_BRACKETS[sign] for sign in reversed(opened))
     fix = JsonFix(end, end, missing) if text[end - 1] not in ",:" else None
     shown = shortened(missing, _MAX_WORD_LENGTH)
-    return _at(text, end, _("a closing {signs} is missing at the end").format(signs=shown), fix)
+    return _fault_at(text, end, _("a closing {signs} is missing at the end").format(signs=shown), fix)
 
 
 def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
@@ -189,31 +191,31 @@ def _missing_value(text: str, position: int, *, is_name: bool) -> JsonFault:
         inside = text[position + 1 : end] if end > position else ""
         is_plain = bool(inside) and not any(sign in inside for sign in '"\\\n')
         fix = JsonFix(position, end + 1, f'"{inside}"') if is_plain else None
-        return _at(text, position, _("JSON needs double quotes, not single quotes"), fix)
+        return _fault_at(text, position, _("JSON needs double quotes, not single quotes"), fix)
     if word is None:
         reason = _("a name in double quotes is expected") if is_name else _("a value is expected")
-        return _at(text, position, reason)
-    known = _OTHER_LANGUAGES.get(word[0])
+        return _fault_at(text, position, reason)
+    known = _FOREIGN_CONSTANTS.get(word[0])
     if known is not None and not is_name:
         fix = JsonFix(position, word.end(), known)
-        return _at(
+        return _fault_at(
             text, position, _("use {right} instead of {word} in JSON").format(word=word[0], right=known), fix
         )
     shown = shortened(word[0], _MAX_WORD_LENGTH)
     fix = JsonFix(position, word.end(), f'"{word[0]}"')
-    return _at(text, position, _("{word} needs double quotes").format(word=shown), fix)
+    return _fault_at(text, position, _("{word} needs double quotes").format(word=shown), fix)
 
 
-def _open_string(text: str, position: int) -> JsonFault:
+def _invalid_string(text: str, position: int) -> JsonFault:
     # No closing quote, or a character that must be escaped.
     sign = text[position : position + 1]
     if sign == "\t":
         fix = JsonFix(position, position + 1, "\\t")
-        return _at(text, position, _("a string contains a tab character; use \\t"), fix)
+        return _fault_at(text, position, _("a string contains a tab character; use \\t"), fix)
     if sign and sign not in {'"', "\n", "\r"}:
-        return _at(text, position, _("a string contains an invisible character; delete it"))
+        return _fault_at(text, position, _("a string contains an invisible character; delete it"))
     start = text.rfind("\n", 0, position) + 1
     end = text.find("\n", position)
     line = text[start : end if end >= 0 else len(text)].rstrip()
     close = start + len(line[:-1].rstrip() if line.endswith(",") else line)
-    return _at(text, position, _("a string has no closing quote"), JsonFix(close, close, '"'))
+    return _fault_at(text, position, _("a string has no closing quote"), JsonFix(close, close, '"'))

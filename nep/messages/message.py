@@ -8,11 +8,11 @@ from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
-from nep.messages.clocks import NOT_COMPARED, PublisherClock
+from nep.messages.clocks import UNKNOWN_CLOCK, PublisherClock
 from nep.messages.codecs import CODECS
 from nep.messages.codecs import codec as codec_named
 
-NOTHING: Mapping[str, object] = MappingProxyType({})
+NO_EXTENSION: Mapping[str, object] = MappingProxyType({})
 UNDECODED = object()
 new_message = object.__new__
 """Fast constructor that skips `__init__`, for creating messages at high rates. See `arrived`."""
@@ -26,27 +26,27 @@ class MessageKind(NamedTuple):
     msg_type: str
     is_latched: bool
     decode: Callable[[bytes | memoryview, Mapping[str, object]], object]
-    clock: PublisherClock = NOT_COMPARED
+    clock: PublisherClock = UNKNOWN_CLOCK
 
 
-def kind_of(
+def message_kind(
     topic: str,
     codec: str,
     msg_type: str,
     *,
     is_latched: bool = False,
-    clock: PublisherClock = NOT_COMPARED,
+    clock: PublisherClock = UNKNOWN_CLOCK,
 ) -> MessageKind:
     """Return the properties shared by all messages of a publisher.
 
     An unknown codec raises only when a payload is decoded.
     """
     known = CODECS.get(codec)
-    decode = partial(_no_codec, codec) if known is None else known.decode
+    decode = partial(_raise_unknown_codec, codec) if known is None else known.decode
     return MessageKind(topic, codec, msg_type, is_latched, decode, clock)
 
 
-def _no_codec(name: str, data: bytes | memoryview, extension: Mapping[str, object]) -> object:
+def _raise_unknown_codec(name: str, data: bytes | memoryview, extension: Mapping[str, object]) -> object:
     return codec_named(name).decode(data, extension)
 
 
@@ -95,9 +95,9 @@ class Message:
         stamp_ns: int | None = None,
         seq: int | None = None,
         publisher: int | None = None,
-        extension: Mapping[str, object] = NOTHING,
+        extension: Mapping[str, object] = NO_EXTENSION,
     ) -> None:
-        self.kind = kind_of(topic, codec, msg_type)
+        self.kind = message_kind(topic, codec, msg_type)
         self.raw = data if isinstance(data, bytes) else memoryview(data).toreadonly()
         self.stamp_ns = stamp_ns
         self.seq = seq
@@ -152,7 +152,7 @@ class Message:
         except AttributeError:
             seen_ns = self.seen_ns = time.time_ns()
         known = self.kind.clock.difference
-        return (seen_ns - self.stamp_ns - (0 if known is None else known.add_ns)) / 1e9
+        return (seen_ns - self.stamp_ns - (0 if known is None else known.offset_ns)) / 1e9
 
     @property
     def latency_uncertainty_s(self) -> float | None:
@@ -173,13 +173,13 @@ class Message:
         return f"Message({self.topic!r}, seq={self.seq}, codec={self.codec!r}, size_bytes={self.size_bytes})"
 
 
-def arrived(
+def received_message(
     kind: MessageKind,
     data: bytes | memoryview,
     stamp_ns: int | None,
     seq: int,
     publisher: int,
-    extension: Mapping[str, object] = NOTHING,
+    extension: Mapping[str, object] = NO_EXTENSION,
 ) -> Message:
     """Create a received message. For back ends.
 

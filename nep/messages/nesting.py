@@ -17,16 +17,16 @@ from datetime import datetime
 from nep.i18n import _
 
 MAX_LEVELS = 64
-_COUNTED_BYTES = 4_096  # up to this size, all brackets or headers are counted in less than 3 µs
-_AS_LISTS = bytes.maketrans(b"{}", b"[]")
-_NO_BRACKETS = bytes(each for each in range(256) if each not in b'[]{}"')
-_NO_HEADERS = bytes(each for each in range(256) if not (0x80 <= each <= 0x9F or 0xDC <= each <= 0xDF))
-_CONTAINERS = (list, tuple, dict)
-_PLAIN = frozenset((*_CONTAINERS, str, bytes, int, float, bool, datetime, type(None)))
-_TEXT = re.compile(rb'"[^"]*"')
+_MAX_COUNTED_BYTES = 4_096  # up to this size, all brackets or headers are counted in less than 3 µs
+_TO_LIST_BRACKETS = bytes.maketrans(b"{}", b"[]")
+_NON_BRACKETS = bytes(each for each in range(256) if each not in b'[]{}"')
+_NON_HEADERS = bytes(each for each in range(256) if not (0x80 <= each <= 0x9F or 0xDC <= each <= 0xDF))
+_CONTAINER_TYPES = (list, tuple, dict)
+_PLAIN_TYPES = frozenset((*_CONTAINER_TYPES, str, bytes, int, float, bool, datetime, type(None)))
+_STRING_LITERAL = re.compile(rb'"[^"]*"')
 
 
-def too_deep() -> str:
+def too_deep_reason() -> str:
     """Return the reason for the error message."""
     return _("it has more than {levels} levels of lists and maps").format(levels=MAX_LEVELS)
 
@@ -37,12 +37,12 @@ def json_is_too_deep(data: bytes | memoryview) -> bool:
     if size <= 2 * MAX_LEVELS:
         return False
     data = bytes(data)
-    if size <= _COUNTED_BYTES:
+    if size <= _MAX_COUNTED_BYTES:
         if data.count(b"[") + data.count(b"{") <= MAX_LEVELS:
             return False
     elif not _has_many_brackets(data):
         return False
-    return _levels_exceeded(_brackets(data))
+    return _exceeds_levels(_extract_brackets(data))
 
 
 def _has_many_brackets(data: bytes) -> bool:
@@ -57,15 +57,15 @@ def _has_many_brackets(data: bytes) -> bool:
     return False
 
 
-def _brackets(data: bytes) -> bytes:
+def _extract_brackets(data: bytes) -> bytes:
     # Reduces JSON to its brackets, outside of strings, all as list brackets.
     if b"\\" in data:
         data = data.replace(b"\\\\", b"").replace(b'\\"', b"")
-    brackets = data.translate(_AS_LISTS, _NO_BRACKETS).replace(b'""', b"")
-    return _TEXT.sub(b"", brackets) if b'"' in brackets else brackets
+    brackets = data.translate(_TO_LIST_BRACKETS, _NON_BRACKETS).replace(b'""', b"")
+    return _STRING_LITERAL.sub(b"", brackets) if b'"' in brackets else brackets
 
 
-def _levels_exceeded(brackets: bytes) -> bool:
+def _exceeds_levels(brackets: bytes) -> bool:
     for _level in range(MAX_LEVELS):
         inner = brackets.replace(b"[]", b"")
         if not inner:
@@ -81,7 +81,7 @@ def packed_is_too_deep(data: bytes | memoryview, value: object) -> bool:
     size = len(data)
     if size <= MAX_LEVELS:
         return False
-    if size <= _COUNTED_BYTES and len(bytes(data).translate(None, _NO_HEADERS)) <= MAX_LEVELS:
+    if size <= _MAX_COUNTED_BYTES and len(bytes(data).translate(None, _NON_HEADERS)) <= MAX_LEVELS:
         return False
     return _may_be_too_deep(value) and _is_too_deep(value)
 
@@ -95,7 +95,7 @@ def _may_be_too_deep(value: object) -> bool:
         inner = gc.get_referents(*level)
         if not inner:
             return False
-        if not _PLAIN.issuperset(map(type, level)):
+        if not _PLAIN_TYPES.issuperset(map(type, level)):
             return True
         level = inner
     return True
@@ -105,7 +105,7 @@ def _is_too_deep(value: object) -> bool:
     level: list[object] = [value]
     for _level in range(MAX_LEVELS + 1):
         kinds = {
-            kind for kind in set(map(type, level)) if issubclass(kind, _CONTAINERS) or is_dataclass(kind)
+            kind for kind in set(map(type, level)) if issubclass(kind, _CONTAINER_TYPES) or is_dataclass(kind)
         }
         if not kinds:
             return False

@@ -53,17 +53,17 @@ def unpack(data: bytes | memoryview) -> object:
     try:
         value: object = msgpack.unpackb(data, raw=False, strict_map_key=False, timestamp=3)
     except (TypeError, OverflowError):  # rare: a list as key, or a timestamp beyond datetime's range
-        return _unpack_rare(data)
+        return _unpack_slow(data)
     except (ValueError, msgpack.UnpackException, RecursionError) as error:
         raise ValueError(str(error) or _("the data is truncated")) from error
     return value
 
 
-def _unpack_rare(data: bytes | memoryview) -> object:
+def _unpack_slow(data: bytes | memoryview) -> object:
     for timestamp in (3, 0):
         try:
             value: object = msgpack.unpackb(
-                data, raw=False, strict_map_key=False, timestamp=timestamp, object_pairs_hook=_map
+                data, raw=False, strict_map_key=False, timestamp=timestamp, object_pairs_hook=_to_dict
             )
         except OverflowError:
             continue
@@ -73,7 +73,7 @@ def _unpack_rare(data: bytes | memoryview) -> object:
     raise ValueError(_("a timestamp is invalid"))
 
 
-def _map(pairs: list[tuple[object, object]]) -> dict[object, object]:
+def _to_dict(pairs: list[tuple[object, object]]) -> dict[object, object]:
     return {_hashable(key): value for key, value in pairs}
 
 

@@ -7,20 +7,22 @@ from typing import Literal
 
 from nep.messages.message import Message
 
-Keep = Literal["all", "latest"]
+QueuePolicy = Literal["all", "latest"]
 """Queue policy of a subscriber: all messages while there is room, or only the newest."""
 
 MAX_MESSAGES = 10_000
 MAX_BYTES = 256 * 2**20
 _FAST_READ_S = 10e-6
 """Maximum time in seconds between two reads of a fast reader, whose batch size is doubled."""
-AHEAD_MOST = 64
+MAX_READ_AHEAD = 64
 
 
 class Inbox:
     """Queue that drops its oldest message when it is full. Not thread-safe: guarded by its owner's lock."""
 
-    def __init__(self, keep: Keep, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:
+    def __init__(
+        self, keep: QueuePolicy, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES
+    ) -> None:
         self._keeps_all = keep == "all"
         self._max_messages = max_messages if self._keeps_all else 1
         self._max_bytes = max_bytes
@@ -63,7 +65,7 @@ class Inbox:
             most_bytes -= size
             most -= 1
 
-    def take_all(self, most_bytes: int | None = None) -> list[Message]:
+    def pop_all(self, most_bytes: int | None = None) -> list[Message]:
         """Remove and return all messages, oldest first, until `most_bytes` are reached."""
         if most_bytes is None or self._bytes <= most_bytes:
             messages = list(self.messages)
@@ -88,19 +90,19 @@ class ReadAhead:
     """
 
     def __init__(self, max_messages: int) -> None:
-        self._most = max(1, min(AHEAD_MOST, max_messages))
+        self._most = max(1, min(MAX_READ_AHEAD, max_messages))
         self.now = 1
         """Current number of messages per read."""
         self.span_s = _FAST_READ_S
         """Maximum time in seconds between two reads for the reader to count as fast."""
 
-    def more(self) -> int:
+    def increase(self) -> int:
         """Increase the number of messages for a fast reader, and return it."""
         self.now = min(2 * self.now, self._most)
         self.span_s = self.now * _FAST_READ_S
         return self.now
 
-    def begin(self) -> None:
+    def reset(self) -> None:
         """Reset to one message, because the reader is slow or fewer messages were available."""
         self.now = 1
         self.span_s = _FAST_READ_S

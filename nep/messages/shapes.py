@@ -11,7 +11,7 @@ from datetime import date, datetime, time
 from enum import Enum, Flag
 from typing import Any
 
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 from nep.text import escaped, shortened
 
 _MIN_INT, _MAX_INT = -(1 << 63), (1 << 64) - 1
@@ -34,14 +34,14 @@ class ShapeMismatch(Exception):  # noqa: N818 - internal
         return self
 
     @property
-    def place(self) -> str:
+    def path(self) -> str:
         """Path of the value, such as "pose.position.x" or "joints[3]"; "" for the whole payload."""
         return "".join(reversed(self.steps)).removeprefix(".")
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """Path and reason as a sentence."""
-        place = self.place or _("it")
+        place = self.path or _("it")
         return f"{place} {self.reason}"
 
 
@@ -77,14 +77,14 @@ class ValueShape:
         return _("a '{name}'").format(name=self.name) if self._describe is None else self._describe()
 
 
-def wrong_type(value: object, expected: str) -> ShapeMismatch:
+def wrong_type_error(value: object, expected: str) -> ShapeMismatch:
     """Return the error for a value of a wrong type."""
     return ShapeMismatch(
         _("is a '{kind}'; expected {wanted}").format(kind=type(value).__name__, wanted=expected)
     )
 
 
-def missing_value(shape: ValueShape) -> ShapeMismatch:
+def missing_value_error(shape: ValueShape) -> ShapeMismatch:
     """Return the error for a missing value."""
     return ShapeMismatch(_("is missing; expected {wanted}").format(wanted=shape.expected))
 
@@ -97,13 +97,13 @@ def short_repr(value: object) -> str:
 # ---- scalars
 
 
-def _of_numpy(value: object) -> object:
+def _from_numpy(value: object) -> object:
     # numpy scalars and arrays to Python values
     to_list = getattr(value, "tolist", None)
     return to_list() if callable(to_list) else value
 
 
-def _float() -> ValueShape:
+def _float_shape() -> ValueShape:
     shape = ValueShape("float", float)
 
     def read(value: object) -> float:
@@ -116,7 +116,7 @@ def _float() -> ValueShape:
     def write(value: object) -> float:
         if isinstance(value, float):
             return float(value)
-        plain = value if isinstance(value, int) else _of_numpy(value)
+        plain = value if isinstance(value, int) else _from_numpy(value)
         if isinstance(plain, int | float) and not isinstance(plain, bool):
             try:
                 return float(plain)
@@ -124,24 +124,24 @@ def _float() -> ValueShape:
                 raise ShapeMismatch(
                     _("is too large; expected {wanted}").format(wanted=shape.expected)
                 ) from None
-        raise wrong_type(value, shape.expected)
+        raise wrong_type_error(value, shape.expected)
 
     shape.read, shape.write = read, write
     return shape
 
 
-def _int() -> ValueShape:
+def _int_shape() -> ValueShape:
     shape = ValueShape("int", int)
 
     def read(value: object) -> int:
         if isinstance(value, int) and not isinstance(value, bool):
             return value
-        raise wrong_type(value, shape.expected)
+        raise wrong_type_error(value, shape.expected)
 
     def write(value: object) -> int:
-        plain = value if isinstance(value, int) else _of_numpy(value)
+        plain = value if isinstance(value, int) else _from_numpy(value)
         if not isinstance(plain, int) or isinstance(plain, bool):
-            raise wrong_type(value, shape.expected)
+            raise wrong_type_error(value, shape.expected)
         if not _MIN_INT <= plain <= _MAX_INT:
             raise ShapeMismatch(
                 _("does not fit into 64 bits; expected {wanted}").format(wanted=shape.expected)
@@ -152,77 +152,77 @@ def _int() -> ValueShape:
     return shape
 
 
-def _str() -> ValueShape:
+def _str_shape() -> ValueShape:
     shape = ValueShape("str", str)
 
     def read(value: object) -> str:
         if isinstance(value, str):
             return value
-        raise wrong_type(value, shape.expected)
+        raise wrong_type_error(value, shape.expected)
 
     def write(value: object) -> str:
         if not isinstance(value, str):
-            raise wrong_type(value, shape.expected)
+            raise wrong_type_error(value, shape.expected)
         if not value.isascii():
-            _check_letters(value)
+            _check_surrogates(value)
         return str(value)
 
     shape.read, shape.write = read, write
     return shape
 
 
-def _check_letters(value: str) -> None:
+def _check_surrogates(value: str) -> None:
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:
         raise ShapeMismatch(_("contains an unpaired surrogate; use valid Unicode text")) from None
 
 
-def _bool() -> ValueShape:
+def _bool_shape() -> ValueShape:
     shape = ValueShape("bool", bool)
 
-    def both(value: object) -> bool:
-        plain = value if isinstance(value, bool) else _of_numpy(value)
+    def convert(value: object) -> bool:
+        plain = value if isinstance(value, bool) else _from_numpy(value)
         if isinstance(plain, bool):
             return plain
-        raise wrong_type(value, shape.expected)
+        raise wrong_type_error(value, shape.expected)
 
-    shape.read = shape.write = both
+    shape.read = shape.write = convert
     return shape
 
 
-def _none() -> ValueShape:
+def _none_shape() -> ValueShape:
     shape = ValueShape("None", json_types={type(None)}, describe=lambda: "None")
 
-    def both(value: object) -> None:
+    def convert(value: object) -> None:
         if value is not None:
-            raise wrong_type(value, shape.expected)
+            raise wrong_type_error(value, shape.expected)
 
-    shape.read = shape.write = both
+    shape.read = shape.write = convert
     return shape
 
 
 def _any_shape() -> ValueShape:
     shape = ValueShape("Any")
 
-    def both(value: object) -> object:
+    def convert(value: object) -> object:
         return value
 
-    shape.read = shape.write = both
+    shape.read = shape.write = convert
     return shape
 
 
 def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
     shape = ValueShape(kind.__name__, json_types={str})
 
-    def is_one(value: object) -> bool:
+    def is_of_kind(value: object) -> bool:
         return isinstance(value, kind) and (kind is not date or not isinstance(value, datetime))
 
     def read(value: object) -> object:
-        if is_one(value):  # msgpack has times
+        if is_of_kind(value):  # msgpack has times
             return value
         if not isinstance(value, str):
-            raise wrong_type(value, _("a string such as {example}").format(example=_EXAMPLES[kind]))
+            raise wrong_type_error(value, _("a string such as {example}").format(example=_EXAMPLES[kind]))
         whole = f"{value[:-1]}+00:00" if value.endswith("Z") else value  # Python 3.10 does not parse "Z"
         try:
             return kind.fromisoformat(whole)
@@ -234,8 +234,8 @@ def _datetime_shape(kind: type[datetime | date | time]) -> ValueShape:
             ) from None
 
     def write(value: Any) -> str:  # noqa: ANN401 - checked here
-        if not is_one(value):
-            raise wrong_type(value, shape.expected)
+        if not is_of_kind(value):
+            raise wrong_type_error(value, shape.expected)
         return str(value.isoformat())
 
     shape.read, shape.write = read, write
@@ -247,16 +247,16 @@ _EXAMPLES: Mapping[type, str] = {
     date: "'2026-01-31'",
     time: "'12:00:00'",
 }
-ANYTHING = _any_shape()
-SCALARS: Mapping[Any, ValueShape] = {
-    float: _float(),
-    int: _int(),
-    str: _str(),
-    bool: _bool(),
-    None: _none(),
-    type(None): _none(),
-    Any: ANYTHING,
-    object: ANYTHING,
+ANY_SHAPE = _any_shape()
+SCALAR_SHAPES: Mapping[Any, ValueShape] = {
+    float: _float_shape(),
+    int: _int_shape(),
+    str: _str_shape(),
+    bool: _bool_shape(),
+    None: _none_shape(),
+    type(None): _none_shape(),
+    Any: ANY_SHAPE,
+    object: ANY_SHAPE,
     **{each: _datetime_shape(each) for each in (datetime, date, time)},
 }
 
@@ -279,10 +279,10 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
         return None
     json_types = map(type, values)
     shape = ValueShape(
-        "Literal", json_types=json_types, describe=lambda: listed([repr(each) for each in values], "or")
+        "Literal", json_types=json_types, describe=lambda: format_list([repr(each) for each in values], "or")
     )
 
-    def both(value: object) -> object:
+    def convert(value: object) -> object:
         for each in values:
             if _is_same(value, each):
                 return each
@@ -290,7 +290,7 @@ def literal_shape(values: Sequence[object]) -> ValueShape | None:
             _("is {value}; expected {wanted}").format(value=short_repr(value), wanted=shape.expected)
         )
 
-    shape.read = shape.write = both
+    shape.read = shape.write = convert
     return shape
 
 
@@ -311,12 +311,12 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
                 return kind(value)
             except ValueError:
                 pass
-        wanted = shape.expected if is_flag else listed([repr(each.value) for each in members], "or")
+        wanted = shape.expected if is_flag else format_list([repr(each.value) for each in members], "or")
         raise ShapeMismatch(_("is {value}; expected {wanted}").format(value=short_repr(value), wanted=wanted))
 
     def write(value: object) -> object:
         if not isinstance(value, kind):
-            raise wrong_type(value, shape.expected)
+            raise wrong_type_error(value, shape.expected)
         return value.value
 
     shape.read, shape.write = read, write
@@ -331,7 +331,7 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
     json_types = [form for each in shapes for form in each.json_types]
     if len(json_types) > len(set(json_types)):
         return None
-    none = SCALARS[None]
+    none = SCALAR_SHAPES[None]
     others = [each for each in shapes if each.name != none.name]
     others.sort(key=lambda each: float in each.json_types)  # float accepts ints, too
     nones = [none] if len(others) < len(shapes) else []
@@ -339,7 +339,7 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
     shape = ValueShape(
         "Union",
         json_types=json_types,
-        describe=lambda: listed([each.expected for each in (*others, *nones)], "or"),
+        describe=lambda: format_list([each.expected for each in (*others, *nones)], "or"),
     )
 
     def first(value: object, ways: Sequence[Callable[[Any], Any]]) -> object:
@@ -351,7 +351,7 @@ def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
                 mismatch = found
         if mismatch is not None and mismatch.steps and len(others) == 1:
             raise mismatch  # has the path inside the member
-        raise wrong_type(value, shape.expected)
+        raise wrong_type_error(value, shape.expected)
 
     # looked up at use: a dataclass may be filled later
     shape.read = lambda value: first(value, [each.read for each in ordered])
@@ -373,10 +373,10 @@ def _convert_items(way: Callable[[Any], Any], values: Iterable[Any], first: int 
     return converted
 
 
-def _items(value: object, expected: str) -> list[Any] | tuple[Any, ...]:
-    plain = value if isinstance(value, list | tuple) else _of_numpy(value)
+def _as_items(value: object, expected: str) -> list[Any] | tuple[Any, ...]:
+    plain = value if isinstance(value, list | tuple) else _from_numpy(value)
     if not isinstance(plain, list | tuple):
-        raise wrong_type(value, expected)
+        raise wrong_type_error(value, expected)
     return plain
 
 
@@ -386,13 +386,13 @@ def list_shape(item: ValueShape, kind: type) -> ValueShape:
     exact = {item.unchanged_type} - {None}
 
     def read(value: object) -> object:
-        values = _items(value, shape.expected)
+        values = _as_items(value, shape.expected)
         # fast path for thousands of numbers; the list is copied because it may be shared
         converted = values if exact and set(map(type, values)) <= exact else _convert_items(item.read, values)
         return kind(converted)
 
     def write(value: object) -> object:
-        values = _items(value, shape.expected)
+        values = _as_items(value, shape.expected)
         if item.unchanged_type is float and set(map(type, values)) <= exact:
             return list(values)
         return _convert_items(item.write, values)
@@ -407,8 +407,8 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
         "tuple", json_types={list}, describe=lambda: _("{count} values").format(count=len(items))
     )
 
-    def each(value: object, ways: Sequence[Callable[[Any], Any]]) -> list[Any]:
-        values = _items(value, shape.expected)
+    def convert(value: object, ways: Sequence[Callable[[Any], Any]]) -> list[Any]:
+        values = _as_items(value, shape.expected)
         if len(values) != len(ways):
             raise ShapeMismatch(
                 _("has {count} values; expected {wanted}").format(count=len(values), wanted=shape.expected)
@@ -418,19 +418,19 @@ def tuple_shape(items: Sequence[ValueShape]) -> ValueShape:
             converted += _convert_items(way, (part,), len(converted))
         return converted
 
-    shape.read = lambda value: tuple(each(value, [item.read for item in items]))
-    shape.write = lambda value: each(value, [item.write for item in items])
+    shape.read = lambda value: tuple(convert(value, [item.read for item in items]))
+    shape.write = lambda value: convert(value, [item.write for item in items])
     return shape
 
 
 def map_shape(item: ValueShape) -> ValueShape:
     """Return the shape of a map with text keys."""
     shape = ValueShape("dict", json_types={dict})
-    word = SCALARS[str]
+    word = SCALAR_SHAPES[str]
 
-    def each(value: object, way: Callable[[Any], Any]) -> dict[str, Any]:
+    def convert(value: object, way: Callable[[Any], Any]) -> dict[str, Any]:
         if not isinstance(value, Mapping):
-            raise wrong_type(value, shape.expected)
+            raise wrong_type_error(value, shape.expected)
         converted: dict[str, Any] = {}
         for key, part in value.items():
             try:
@@ -439,6 +439,6 @@ def map_shape(item: ValueShape) -> ValueShape:
                 raise mismatch.in_field(key) from mismatch.__cause__
         return converted
 
-    shape.read = lambda value: each(value, item.read)
-    shape.write = lambda value: each(value, item.write)
+    shape.read = lambda value: convert(value, item.read)
+    shape.write = lambda value: convert(value, item.write)
     return shape

@@ -32,20 +32,20 @@ from nep.i18n import _
 from nep.messages.codecs import JSON, Codec, codec_for
 from nep.messages.message import UNDECODED, Message, MessageKind, new_message
 from nep.messages.shapes import (
-    ANYTHING,
-    SCALARS,
+    ANY_SHAPE,
+    SCALAR_SHAPES,
     ShapeMismatch,
     ValueShape,
     enum_shape,
     list_shape,
     literal_shape,
     map_shape,
-    missing_value,
+    missing_value_error,
     tuple_shape,
     union_shape,
-    wrong_type,
+    wrong_type_error,
 )
-from nep.system.arguments import text
+from nep.system.arguments import check_type_name
 from nep.text import escaped, shortened
 
 OTHER_NAME = "nep.other_name"
@@ -88,7 +88,7 @@ def message_type(declared: type) -> MessageType:
                 "with '@dataclass'"
             ).format(name=_name_of(declared))
         )
-    name = text("MSG_TYPE", getattr(declared, "MSG_TYPE", declared.__name__))
+    name = check_type_name("MSG_TYPE", getattr(declared, "MSG_TYPE", declared.__name__))
     if codec_for(name) is not JSON:
         raise ValueError(
             _(
@@ -96,7 +96,7 @@ def message_type(declared: type) -> MessageType:
                 "another name"
             ).format(type=declared.__name__, name=name)
         )
-    return MessageType(name, _whole_shape(declared), dict if is_map else declared)
+    return MessageType(name, _complete_shape(declared), dict if is_map else declared)
 
 
 def value_shape(declared: type) -> ValueShape | None:
@@ -106,10 +106,10 @@ def value_shape(declared: type) -> ValueShape | None:
     """
     if not (is_dataclass(declared) or _is_typed_dict(declared) or issubclass(declared, Enum)):
         return None
-    return _whole_shape(declared)
+    return _complete_shape(declared)
 
 
-def _whole_shape(declared: type) -> ValueShape:
+def _complete_shape(declared: type) -> ValueShape:
     try:
         return _shape(declared, declared.__name__, {})
     except RecursionError:
@@ -140,7 +140,7 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
         try:
             return base.encode(write(payload))
         except ShapeMismatch as mismatch:
-            place, reason = mismatch.place, mismatch.sentence
+            place, reason = mismatch.path, mismatch.message
         except RecursionError:
             place, reason = "", _("it contains itself, or has too many levels")
         raise EncodeError(declared.name, type(payload).__name__, reason, place)
@@ -177,17 +177,17 @@ class TypedReader:
     ) -> Callable[[bytes | memoryview, Mapping[str, object]], object]:
         name, shape = self._declared.name, self._declared.shape
 
-        def typed(data: bytes | memoryview, extension: Mapping[str, object]) -> object:
+        def decode_typed(data: bytes | memoryview, extension: Mapping[str, object]) -> object:
             plain = decode(data, extension)
             try:
                 return shape.read(plain)
             except ShapeMismatch as mismatch:
-                reason = mismatch.sentence
+                reason = mismatch.message
             except RecursionError:
                 reason = _("it has too many levels")
             raise DecodeError(name, memoryview(data).nbytes, reason)
 
-        return typed
+        return decode_typed
 
 
 # ---- shapes of annotations
@@ -195,13 +195,13 @@ class TypedReader:
 
 def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape:  # noqa: ANN401 - any annotation
     # `where` names the field for errors. Raises `ValueError`.
-    hint = _unwrapped(hint)
+    hint = _unwrap(hint)
     try:
         hash(hint)
     except TypeError:
-        raise _no_form(hint, where) from None
-    if hint in SCALARS:
-        return SCALARS[hint]
+        raise _unsupported_error(hint, where) from None
+    if hint in SCALAR_SHAPES:
+        return SCALAR_SHAPES[hint]
     if isinstance(hint, type) and typing.get_origin(hint) is None:
         return _shape_of_class(hint, where, known)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
@@ -217,7 +217,7 @@ def _shape(hint: Any, where: str, known: dict[object, ValueShape]) -> ValueShape
         return tuple_shape([_shape(each, where, known) for each in arguments])
     if origin in {dict, Mapping} and arguments[0] is str:
         return map_shape(_shape(arguments[1], where, known))
-    raise _no_form(hint, where)
+    raise _unsupported_error(hint, where)
 
 
 def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> ValueShape:
@@ -230,13 +230,13 @@ def _shape_of_class(hint: type, where: str, known: dict[object, ValueShape]) -> 
     if issubclass(hint, Enum):
         return _require_shape(enum_shape(hint), hint, where)
     if hint in {list, tuple}:
-        return list_shape(ANYTHING, hint)
+        return list_shape(ANY_SHAPE, hint)
     if hint is dict:
-        return map_shape(ANYTHING)
-    raise _no_form(hint, where)
+        return map_shape(ANY_SHAPE)
+    raise _unsupported_error(hint, where)
 
 
-def _unwrapped(hint: Any) -> Any:  # noqa: ANN401 - any annotation
+def _unwrap(hint: Any) -> Any:  # noqa: ANN401 - any annotation
     # Strips wrappers without effect on values: `Annotated`, `NewType`, `NotRequired`, type aliases.
     while True:
         origin = typing.get_origin(hint)
@@ -266,7 +266,7 @@ def _is_typed_dict(hint: object) -> bool:
 
 def _require_shape(shape: ValueShape | None, hint: object, where: str) -> ValueShape:
     if shape is None:
-        raise _no_form(hint, where)
+        raise _unsupported_error(hint, where)
     return shape
 
 
@@ -281,7 +281,7 @@ def _require_distinct(shape: ValueShape | None, hint: object, where: str) -> Val
     return shape
 
 
-def _no_form(hint: object, where: str) -> ValueError:
+def _unsupported_error(hint: object, where: str) -> ValueError:
     return ValueError(
         _(
             "{where} is a '{type}', which typed messages don't support; see docs/types.md for supported types"
@@ -308,7 +308,7 @@ def _hints(declared: type) -> dict[str, Any]:
 # ---- fields
 
 
-class _Entry(NamedTuple):
+class _FieldEntry(NamedTuple):
     """Field of a received map."""
 
     name: str
@@ -317,10 +317,10 @@ class _Entry(NamedTuple):
     is_required: bool
 
 
-def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) -> dict[str, Any]:
+def _read_fields(value: object, entries: Sequence[_FieldEntry], whole: ValueShape) -> dict[str, Any]:
     # Raises `ShapeMismatch` for a missing required field.
     if not isinstance(value, Mapping):
-        raise wrong_type(value, _("a map of the fields of '{name}'").format(name=whole.name))
+        raise wrong_type_error(value, _("a map of the fields of '{name}'").format(name=whole.name))
     values: dict[str, Any] = {}
     name = ""
     try:
@@ -330,7 +330,7 @@ def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) ->
             elif other_name in value:
                 values[name] = shape.read(value[other_name])
             elif is_required:
-                raise missing_value(shape)
+                raise missing_value_error(shape)
     except ShapeMismatch as mismatch:
         raise mismatch.in_field(name) from mismatch.__cause__
     return values
@@ -338,7 +338,7 @@ def _read_fields(value: object, entries: Sequence[_Entry], whole: ValueShape) ->
 
 def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
     hints = _hints(declared)
-    entries: list[_Entry] = []
+    entries: list[_FieldEntry] = []
     written: list[tuple[str, ValueShape]] = []
     for each in fields(declared):
         where = f"{declared.__name__}.{each.name}"
@@ -348,17 +348,17 @@ def _fill_dataclass(shape: ValueShape, declared: type, known: dict[object, Value
             written.append((each.name, field_shape))
             if each.init:
                 other_name = each.metadata.get(OTHER_NAME, each.name)
-                entries.append(_Entry(each.name, other_name, field_shape, is_required))
+                entries.append(_FieldEntry(each.name, other_name, field_shape, is_required))
         elif is_required:
             raise ValueError(_("{where} is not sent; add a default value").format(where=where))
     _check_constructor(declared, {each.name for each in entries})
 
     def read(value: object) -> object:
-        return _construct(declared, _read_fields(value, entries, shape))
+        return _create_instance(declared, _read_fields(value, entries, shape))
 
     def write(value: object) -> dict[str, Any]:
         if not isinstance(value, declared):
-            raise wrong_type(value, shape.expected)
+            raise wrong_type_error(value, shape.expected)
         values: dict[str, Any] = {}
         for name, field_shape in written:
             try:
@@ -383,7 +383,7 @@ def _check_constructor(declared: type, names: Collection[str]) -> None:
             )
 
 
-def _construct(declared: type, arguments: Mapping[str, object]) -> object:
+def _create_instance(declared: type, arguments: Mapping[str, object]) -> object:
     try:
         return declared(**arguments)
     except Exception as error:
@@ -397,17 +397,17 @@ def _construct(declared: type, arguments: Mapping[str, object]) -> object:
 def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]) -> None:
     hints = _hints(declared)
     required: frozenset[str] = getattr(declared, "__required_keys__", frozenset())
-    entries: list[_Entry] = []
+    entries: list[_FieldEntry] = []
     for name, hint in hints.items():
         mark = _qualifier_of(hint)  # __required_keys__ is wrong with string annotations
         is_required = mark == "Required" or (name in required and mark != "NotRequired")
         shape_of_it = _shape(hint, f"{declared.__name__}.{name}", known)
-        entries.append(_Entry(name, name, shape_of_it, is_required))
+        entries.append(_FieldEntry(name, name, shape_of_it, is_required))
     shapes = {each.name: (each.shape, each.is_required) for each in entries}
 
     def write(value: object) -> dict[str, Any]:
         if not isinstance(value, Mapping):
-            raise wrong_type(value, shape.expected)
+            raise wrong_type_error(value, shape.expected)
         values: dict[str, Any] = {}
         name: object = ""
         try:
@@ -421,7 +421,7 @@ def _fill_map(shape: ValueShape, declared: type, known: dict[object, ValueShape]
                 values[str(name)] = shapes[str(name)][0].write(part)
             for name, (field_shape, is_required) in shapes.items():
                 if is_required and name not in values:
-                    raise missing_value(field_shape)
+                    raise missing_value_error(field_shape)
         except ShapeMismatch as mismatch:
             raise mismatch.in_field(name) from mismatch.__cause__
         return values

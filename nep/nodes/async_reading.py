@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from nep.backends.base import SubscriberTransport
 from nep.errors import ClosedError
 from nep.messages.message import Message
-from nep.nodes.loop_wait import give_way, loop_wait
+from nep.nodes.loop_wait import loop_wait, yield_to_loop
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class AsyncReader:
         self._reads_in_turn += 1
         if self._reads_in_turn >= _MAX_READS_PER_TURN:
             self._reads_in_turn = 0
-            await give_way()
+            await yield_to_loop()
         message = self._poll()
         if message is not None or timeout_s == 0.0:
             return message

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from nep.backends.base import SubscriberTransport
 from nep.backends.services import CallQueue
-from nep.nodes.loop_wait import LoopWait, give_way, loop_wait
+from nep.nodes.loop_wait import LoopWait, loop_wait, yield_to_loop
 from nep.nodes.work import NO_MESSAGE, Work
 from nep.system.lazy_import import lazy_module
 
@@ -33,20 +33,20 @@ async def spin(work: Work, timeout_s: float | None) -> None:
     turns = 0
     try:
         while work.is_running and work.clock() < deadline:
-            if await _run_turn(work):
+            if await _run_once(work):
                 turns = (turns + 1) % _MAX_BUSY_TURNS
                 if not turns:
-                    await give_way()
+                    await yield_to_loop()
                 continue
-            await waiter.wait(min(work.due_s, deadline - work.clock()))
+            await waiter.wait(min(work.until_next_timer_s, deadline - work.clock()))
         work.check_not_forked()
     finally:
         work.unwatch(waiter)
-        waiter.end()
+        waiter.close()
         work.reset_stop()
 
 
-async def _run_turn(work: Work) -> bool:
+async def _run_once(work: Work) -> bool:
     # One turn: every due timer, one call per server, one message per callback. Returns False if idle.
     has_called = work.run_servers()
     for timer in work.timers:
@@ -89,7 +89,7 @@ class _LoopWaiter:
 
     async def wait(self, timeout_s: float) -> None:
         # Wait until there may be work, at most `timeout_s`.
-        for subscriber in self._work.waiting:
+        for subscriber in self._work.waiting_subscribers:
             if subscriber not in self._watched:
                 call = self._watched[subscriber] = self._ready_callback(subscriber)
                 self._waits.watch(subscriber, call)
@@ -113,7 +113,7 @@ class _LoopWaiter:
 
         return call
 
-    def end(self) -> None:
+    def close(self) -> None:
         for subscriber, call in self._watched.items():
             self._waits.unwatch(subscriber, call)
         self._watched.clear()

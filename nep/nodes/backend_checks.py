@@ -11,7 +11,7 @@ from nep.i18n import _
 from nep.messages.codecs import CODECS, Codec
 from nep.messages.history import MAX_HISTORY
 from nep.messages.image_codec import ImageFormat
-from nep.nodes.arguments import one_of, within
+from nep.nodes.arguments import check_choice, check_range
 from nep.protocol.topic_pattern import is_pattern
 
 
@@ -28,7 +28,7 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
     return True
 
 
-def codec_with(codec: Codec, image: ImageFormat | None) -> Codec:
+def codec_with_image_format(codec: Codec, image: ImageFormat | None) -> Codec:
     """Return `codec` with the image format `image`. Raises `ValueError` for other codecs than "image"."""
     if image is None:
         return codec
@@ -41,9 +41,9 @@ def codec_with(codec: Codec, image: ImageFormat | None) -> Codec:
     return replace(codec, encode=image.encode)
 
 
-def history_for(backend: Backend, history: int, configuration: Configuration) -> int:
+def check_history(backend: Backend, history: int, configuration: Configuration) -> int:
     """Validate a history length and return it. Raises `ValueError` if the back end or wire has no history."""
-    within("history", history, 0, MAX_HISTORY)
+    check_range("history", history, 0, MAX_HISTORY)
     is_original = isinstance(configuration, Direct) and configuration.wire == "original"
     if history and (is_original or not backend.has_history):
         where = _("the original wire") if is_original else _("the back end '{name}'")
@@ -53,10 +53,10 @@ def history_for(backend: Backend, history: int, configuration: Configuration) ->
     return history
 
 
-def quality_for(backend: Backend, qos: str) -> str:
+def check_quality(backend: Backend, qos: str) -> str:
     """Validate a quality of service and return it. Raises `ValueError`."""
     if qos and not backend.qos:
         raise ValueError(
             _("the back end '{name}' does not support quality of service; omit qos").format(name=backend.name)
         )
-    return one_of("qos", qos, ("", *backend.qos))
+    return check_choice("qos", qos, ("", *backend.qos))

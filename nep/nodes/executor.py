@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from nep.backends.services import CallQueue
 from nep.nodes.shared_wait import SharedWait
-from nep.nodes.subscriber import SLICE_S
+from nep.nodes.subscriber import WAIT_SLICE_S
 from nep.nodes.work import Work
 
 
@@ -38,14 +38,14 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
         each.watch(waits)
     try:
         running = list(works)
-        while running := _still_running(running):
-            left = SLICE_S if deadline is None else min(SLICE_S, deadline - clock())
+        while running := _running_works(running):
+            left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - clock())
             if left <= 0.0:
                 return
             # a generator would stop at the first
             if any([each.run() for each in running if each.is_running]):  # noqa: C419
                 continue
-            left = min(left, *(each.due_s for each in running))
+            left = min(left, *(each.until_next_timer_s for each in running))
             if left > 0.0:
                 _wait(waits, running, left)
         for each in works:
@@ -57,7 +57,7 @@ def spin_all(works: Sequence[Work], timeout_s: float | None) -> None:
         waits.close()
 
 
-def _still_running(works: Sequence[Work]) -> list[Work]:
+def _running_works(works: Sequence[Work]) -> list[Work]:
     # Another thread may now spin the stopped node.
     running = [each for each in works if each.is_running]
     for each in works:
@@ -74,7 +74,7 @@ def _wait(waits: SharedWait, works: Sequence[Work], timeout_s: float) -> None:
             if not each.enter_wait(waits.wake):
                 return
             entered.append(each)
-        if all(waits.arm(each) for work in works for each in work.waiting):
+        if all(waits.arm(each) for work in works for each in work.waiting_subscribers):
             waits.wait(timeout_s)
     finally:
         waits.disarm_all()

@@ -32,22 +32,22 @@ LOG_TYPE = "nep/log"
 LAST_ERRORS_TOPIC = "/nep/log/errors"
 LAST_ERRORS_TYPE = "nep/log_errors"
 """Type of the latched list of a node's last errors, published once the node has logged an error."""
-LAST_ERRORS = 20
+MAX_LAST_ERRORS = 20
 LEVELS = ("debug", "info", "warning", "error", "critical")
 """Log levels in ascending order of severity."""
-RATE_HZ = 100.0
-BURST = 200
+MAX_RATE_HZ = 100.0
+MAX_BURST = 200
 """Number of records that a node may publish at once before the limit of `RATE_HZ` applies."""
-TEXT_LIMIT = 8_000
+MAX_TEXT_LENGTH = 8_000
 """Maximum length of a record's text in characters; longer texts are truncated."""
 
 _ERROR_TEXT_LIMIT = 1_000
 _MAX_SHOWN_ERRORS = 2_000
 _DROP_REPORT_INTERVAL_S = 1.0
-_FLUSH_S = 1.0
-_OPEN_RETRY_S = 1.0
+_FLUSH_TIMEOUT_S = 1.0
+_OPEN_RETRY_DELAY_S = 1.0
 _MAX_QUEUED = 1_000
-_PUBLISHED_BY = "nep_published_by"
+_PUBLISHED_BY_ATTRIBUTE = "nep_published_by"
 _ERROR_LEVELS = ("error", "critical")
 _ALIASES = {"warn": "warning", "fatal": "critical", "err": "error", "trace": "debug"}
 
@@ -100,7 +100,7 @@ class LogRecord:
         text, stamp = fields.get("text"), _int_or_none(fields.get("stamp_ns"))
         return cls(
             level_of(fields.get("level")),
-            "" if text is None else bounded_str(text, TEXT_LIMIT),
+            "" if text is None else bounded_str(text, MAX_TEXT_LENGTH),
             _short_text(fields.get("name")),
             _short_text(fields.get("node")),
             stamp if stamp is not None and 0 < stamp < 1 << 63 else stamp_ns or 0,
@@ -138,9 +138,9 @@ class ShownErrors:
             del self._shown[next(iter(self._shown))]
         return True
 
-    def new_in(self, payload: object) -> list[LogRecord]:
+    def new_records(self, payload: object) -> list[LogRecord]:
         """Return the errors of a latched list that were not shown yet, oldest first."""
-        given = payload[-LAST_ERRORS:] if isinstance(payload, list) else []
+        given = payload[-MAX_LAST_ERRORS:] if isinstance(payload, list) else []
         records = sorted(map(LogRecord.from_plain, given), key=lambda record: record.stamp_ns)
         return [record for record in records if record.stamp_ns and self.is_new(record)]
 
@@ -181,8 +181,8 @@ class LogHandler(logging.Handler):
         open_publisher: Callable[[], LogPublisher],
         *,
         open_errors: Callable[[], LogPublisher] | None = None,
-        rate_hz: float = RATE_HZ,
-        burst: int = BURST,
+        rate_hz: float = MAX_RATE_HZ,
+        burst: int = MAX_BURST,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__()
@@ -193,7 +193,7 @@ class LogHandler(logging.Handler):
         self._node = node
         self._open = open_publisher
         self._open_errors = open_errors
-        self._errors: deque[dict[str, object]] = deque(maxlen=LAST_ERRORS)
+        self._errors: deque[dict[str, object]] = deque(maxlen=MAX_LAST_ERRORS)
         self._errors_publisher: LogPublisher | None = None
         self._rate_hz, self._burst, self._clock = rate_hz, burst, clock
         self._tokens, self._counted_at = float(burst), clock()
@@ -206,15 +206,18 @@ class LogHandler(logging.Handler):
         watch(self)
 
     @property
-    def left_out(self) -> int:
+    def unreported_drops(self) -> int:
         """Number of dropped records that are not reported yet."""
         return self._dropped
 
     def emit(self, record: logging.LogRecord) -> None:
         """Queue a record for the handler's thread."""
-        if getattr(record, _PUBLISHED_BY, None) is self or threading.current_thread() is self._thread:
+        if (
+            getattr(record, _PUBLISHED_BY_ATTRIBUTE, None) is self
+            or threading.current_thread() is self._thread
+        ):
             return  # received twice (also through the root logger), or caused by publishing itself
-        setattr(record, _PUBLISHED_BY, self)
+        setattr(record, _PUBLISHED_BY_ATTRIBUTE, self)
         with self._has_work:
             if self._is_closed:
                 return
@@ -239,7 +242,7 @@ class LogHandler(logging.Handler):
             self._queue.append(plain)
             self._has_work.notify()
 
-    def close(self, timeout_s: float = _FLUSH_S) -> None:
+    def close(self, timeout_s: float = _FLUSH_TIMEOUT_S) -> None:
         """Publish queued records within `timeout_s` seconds and close. Idempotent."""
         with self._has_work:
             self._is_closed = True
@@ -273,8 +276,8 @@ class LogHandler(logging.Handler):
         text = record.getMessage()
         if record.exc_info and record.exc_info[0] is not None:
             text += "\n" + "".join(traceback.format_exception(*record.exc_info)).rstrip()
-        if len(text) > TEXT_LIMIT:
-            text = _("{text}… ({count} characters)").format(text=text[:TEXT_LIMIT], count=len(text))
+        if len(text) > MAX_TEXT_LENGTH:
+            text = _("{text}… ({count} characters)").format(text=text[:MAX_TEXT_LENGTH], count=len(text))
         return LogRecord(
             _level_name(record.levelno),
             text,
@@ -325,7 +328,9 @@ class LogHandler(logging.Handler):
                 return None
             except NepError:
                 with self._has_work:
-                    if self._is_closed or self._has_work.wait_for(lambda: self._is_closed, _OPEN_RETRY_S):
+                    if self._is_closed or self._has_work.wait_for(
+                        lambda: self._is_closed, _OPEN_RETRY_DELAY_S
+                    ):
                         return None
 
     def _next_batch(self) -> list[dict[str, object]] | None:

@@ -27,9 +27,9 @@ else:
     asyncio = lazy_module("asyncio")
 
 
-_LOOP_CHECK_S = 1.0
+_LOOP_CHECK_INTERVAL_S = 1.0
 """Interval in seconds for detecting a loop that was closed without the shutdown of `asyncio.run`."""
-_JOIN_S = 5.0
+_JOIN_TIMEOUT_S = 5.0
 
 Call = Callable[[], None]
 
@@ -48,7 +48,7 @@ def _forked() -> None:
     _waits.clear()
 
 
-forks.in_child(_forked)
+forks.call_in_child(_forked)
 
 
 def loop_wait() -> LoopWait:
@@ -64,7 +64,7 @@ def loop_wait() -> LoopWait:
 
 
 @coroutine
-def give_way() -> Generator[None, None, None]:
+def yield_to_loop() -> Generator[None, None, None]:
     """Let other coroutines of the loop run."""
     yield
 
@@ -83,7 +83,7 @@ class LoopWait:
         self._requests: deque[tuple[bool, SubscriberTransport]] = deque()
         self._is_stopped = False
         self._thread = threading.Thread(target=self._run, name="nep-async", daemon=True)
-        self._shutdown_hook = self._until_shutdown()
+        self._shutdown_hook = self._close_at_shutdown()
 
     def start(self) -> None:
         """Start the thread. The loop closes it at shutdown (`asyncio.run`)."""
@@ -119,9 +119,9 @@ class LoopWait:
         self._is_stopped = True
         self._wait.wake()
         if threading.current_thread() is not self._thread:
-            self._thread.join(_JOIN_S)
+            self._thread.join(_JOIN_TIMEOUT_S)
 
-    async def _until_shutdown(self) -> AsyncGenerator[None, None]:
+    async def _close_at_shutdown(self) -> AsyncGenerator[None, None]:
         # asyncio.run closes asynchronous generators at shutdown, this one among them.
         try:
             yield
@@ -143,7 +143,7 @@ class LoopWait:
     def _run(self) -> None:
         try:
             while not self._is_stopped:
-                ready = self._wait.wait(_LOOP_CHECK_S)
+                ready = self._wait.wait(_LOOP_CHECK_INTERVAL_S)
                 ready += self._apply_requests()
                 if not self._notify_loop(ready):
                     return

@@ -24,16 +24,32 @@ from nep.backends.base import (
     SubscriberSpec,
     SubscriberTransport,
     Transport,
-    backend_named,
+    find_backend,
 )
-from nep.backends.connection import Configuration, Direct, Hybrid, checked_mode, checked_port, for_messages
+from nep.backends.connection import (
+    Configuration,
+    Direct,
+    Hybrid,
+    parse_port,
+    require_topic_support,
+    validate_mode,
+)
 from nep.errors import BadTopicError, ClosedError, WrongTypeError
 from nep.i18n import _
 from nep.messages.image_codec import ImageFormat
-from nep.messages.queue import MAX_MESSAGES, Keep
-from nep.nodes.arguments import at_least, flag, function, limit, one_of, period, seconds, text
+from nep.messages.queue import MAX_MESSAGES, QueuePolicy
+from nep.nodes.arguments import (
+    check_at_least,
+    check_bool,
+    check_choice,
+    check_function,
+    check_optional_time_limit,
+    check_period,
+    check_time_limit,
+    check_type_name,
+)
 from nep.nodes.async_spinning import spin as spin_in_loop
-from nep.nodes.backend_checks import codec_with, history_for, is_pattern_for, quality_for
+from nep.nodes.backend_checks import check_history, check_quality, codec_with_image_format, is_pattern_for
 from nep.nodes.executor import spin_all
 from nep.nodes.log_handler import LogHandler, new_log_handler
 from nep.nodes.publisher import Publisher
@@ -41,23 +57,23 @@ from nep.nodes.subscriber import Subscriber
 from nep.nodes.timer import Timer
 from nep.nodes.typed import MsgType, codec_of, name_of, new_subscriber, sink_of
 from nep.nodes.work import Callback, Work
-from nep.patterns.parameters.owned import MSG_TYPE, Parameters, place_of
+from nep.patterns.parameters.owned import MSG_TYPE, Parameters, parameters_topic
 from nep.patterns.parameters.remote import RemoteParameters, node_with_parameters
 from nep.patterns.services.owned import ServiceRegistry
 from nep.patterns.services.service_node import ServiceNode
 from nep.protocol.graph_view import GraphView
 from nep.protocol.requests import NodeRecord, id_from, node_id_from
-from nep.protocol.service_wire import PREFIX
+from nep.protocol.service_wire import SERVICE_PREFIX
 from nep.protocol.wire import check_node_name, check_topic
 from nep.system import forks
-from nep.system.addresses import checked_host
+from nep.system.addresses import check_host
 from nep.system.computer import computer_id
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-FLUSH_S = 2.0
+FLUSH_TIMEOUT_S = 2.0
 """Time in seconds that closing waits for published messages to be delivered."""
 
 _FINALIZER_PRIORITY = 10
@@ -121,10 +137,10 @@ class Node(ServiceNode):
         """Id in the graph: 16 hexadecimal digits, new at each start of the program."""
         self._key = key
         self._numbers = itertools.count(1)
-        self._backend = backend_named(text("transport", transport))
+        self._backend = find_backend(check_type_name("transport", transport))
         self._master = self._backend.master(master)
-        self._wait_s = seconds("wait_s", wait_s)
-        self._is_strict = flag("strict", strict)
+        self._wait_s = check_optional_time_limit("wait_s", wait_s)
+        self._is_strict = check_bool("strict", strict)
         self._lock = threading.RLock()
         self._publishers: set[Publisher] = set()
         self._subscribers: set[Subscriber] = set()
@@ -149,7 +165,7 @@ class Node(ServiceNode):
         )
         self._work = Work(name, self._transport, time.monotonic, self._services)
         _open_nodes.add(self)
-        _close_with_worker()
+        _register_worker_close()
         forks.watch(self)
 
     # ---- configurations
@@ -168,7 +184,7 @@ class Node(ServiceNode):
             transport: Ignored; the node's transport is used.
         """
         is_own = master_ip == "127.0.0.1" or self._backend.name == "memory"
-        return Hybrid(self._master if is_own else self._backend.master(master_ip), checked_mode(mode))
+        return Hybrid(self._master if is_own else self._backend.master(master_ip), validate_mode(mode))
 
     def broker(self, mode: str = "many2many") -> Hybrid:
         """Return `hybrid(mode=mode)`. Name used by the original module up to 0.5.2."""
@@ -203,11 +219,11 @@ class Node(ServiceNode):
             ValueError: Invalid generation or wire.
         """
         return Direct(
-            checked_host(ip),
-            checked_port(port),
-            checked_mode(mode),
-            one_of("generation", generation, ("A", "B")),
-            one_of("wire", wire, ("original", "native", "tcp")),
+            check_host(ip),
+            parse_port(port),
+            validate_mode(mode),
+            check_choice("generation", generation, ("A", "B")),
+            check_choice("wire", wire, ("original", "native", "tcp")),
         )
 
     # ---- publishers and subscribers
@@ -251,23 +267,23 @@ class Node(ServiceNode):
             ClosedError: The node is closed.
             ValueError: An argument is invalid.
         """
-        connected = for_messages(self._resolve_configuration(configuration))
-        history_length = max(history_for(self._backend, history, connected), 1 if latched is True else 0)
+        connected = require_topic_support(self._resolve_configuration(configuration))
+        history_length = max(check_history(self._backend, history, connected), 1 if latched is True else 0)
         number = next(self._numbers)
         spec = PublisherSpec(
             id_from(self._key, number),
             _check_user_topic(topic),
             name_of(msg_type),
-            codec_with(codec_of(self._backend, msg_type), image),
-            flag("latched", latched) or history_length > 0,
+            codec_with_image_format(codec_of(self._backend, msg_type), image),
+            check_bool("latched", latched) or history_length > 0,
             connected,
             self._wait_s,
             number,
-            flag("batch", batch),
-            quality_for(self._backend, qos),
+            check_bool("batch", batch),
+            check_quality(self._backend, qos),
             history_length,
         )
-        transport = self._open_transport().publisher(spec)
+        transport = self._open_transport().create_publisher(spec)
         publisher = Publisher(transport, spec, self._publishers.discard, is_strict=self._is_strict)
         with self._lock:
             self._publishers.add(publisher)
@@ -283,7 +299,7 @@ class Node(ServiceNode):
         msg_type: MsgType = "json",
         configuration: Configuration | None = None,
         *,
-        keep: Keep = "all",
+        keep: QueuePolicy = "all",
         max_messages: int = MAX_MESSAGES,
         sink: Sink | None = None,
         qos: str = "",
@@ -319,16 +335,17 @@ class Node(ServiceNode):
             id_from(self._key, number),
             _check_user_topic(topic),
             name_of(msg_type),
-            for_messages(self._resolve_configuration(configuration)),
+            require_topic_support(self._resolve_configuration(configuration)),
             self._wait_s,
-            one_of("keep", keep, ("all", "latest")),
-            at_least("max_messages", max_messages, 1),
+            check_choice("keep", keep, ("all", "latest")),
+            check_at_least("max_messages", max_messages, 1),
             sink=sink_of(msg_type, sink),
             number=number,
-            qos=quality_for(self._backend, qos),
-            is_pattern=flag("wildcards", wildcards) and is_pattern_for(self._backend, topic, configuration),
+            qos=check_quality(self._backend, qos),
+            is_pattern=check_bool("wildcards", wildcards)
+            and is_pattern_for(self._backend, topic, configuration),
         )
-        return self._add_subscriber(self._open_transport().subscriber(spec), spec, msg_type)
+        return self._add_subscriber(self._open_transport().create_subscriber(spec), spec, msg_type)
 
     def new_callback(
         self,
@@ -337,7 +354,7 @@ class Node(ServiceNode):
         callback: Callable[[Any], object],
         configuration: Configuration | None = None,
         *,
-        keep: Keep = "all",
+        keep: QueuePolicy = "all",
         max_messages: int = MAX_MESSAGES,
         with_message: bool = False,
         qos: str = "",
@@ -366,22 +383,22 @@ class Node(ServiceNode):
             ValueError: An argument is invalid.
         """
         transport = self._open_transport()
-        function("callback", callback)
-        flag("with_message", with_message)
+        check_function("callback", callback)
+        check_bool("with_message", with_message)
         number = next(self._numbers)
         spec = SubscriberSpec(
             id_from(self._key, number),
             _check_user_topic(topic),
             name_of(msg_type),
-            for_messages(self._resolve_configuration(configuration)),
+            require_topic_support(self._resolve_configuration(configuration)),
             self._wait_s,
-            one_of("keep", keep, ("all", "latest")),
-            at_least("max_messages", max_messages, 1),
+            check_choice("keep", keep, ("all", "latest")),
+            check_at_least("max_messages", max_messages, 1),
             number=number,
-            qos=quality_for(self._backend, qos),
+            qos=check_quality(self._backend, qos),
             is_pattern=is_pattern_for(self._backend, topic, configuration),
         )
-        incoming = transport.subscriber(spec)
+        incoming = transport.create_subscriber(spec)
         subscriber = self._add_subscriber(incoming, spec, msg_type)
         self._work.add_callback(Callback(subscriber, incoming, callback, with_message))
         return subscriber
@@ -418,7 +435,7 @@ class Node(ServiceNode):
             NepError: No node or several nodes match, or the node has no parameters.
         """
         found = node_with_parameters(self.graph(), node)
-        return RemoteParameters(self.new_client(place_of(found), timeout_s=timeout_s))
+        return RemoteParameters(self.new_client(parameters_topic(found), timeout_s=timeout_s))
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
         """Open the publisher and server for this node's parameters. Internal; used by `Parameters`."""
@@ -478,7 +495,7 @@ class Node(ServiceNode):
             ValueError: The period is invalid.
         """
         self._open_transport()
-        return self._work.new_timer(period("period_s", period_s), function("callback", callback))
+        return self._work.new_timer(check_period("period_s", period_s), check_function("callback", callback))
 
     def spin(self, timeout_s: float | None = None) -> None:
         """Run callbacks, timers and servers in this thread until `stop_spin` or `close` is called.
@@ -492,7 +509,7 @@ class Node(ServiceNode):
         Raises:
             ClosedError: This is a forked child process, also if a callback forked it.
         """
-        self._work.spin(seconds("timeout_s", timeout_s))
+        self._work.spin(check_optional_time_limit("timeout_s", timeout_s))
 
     async def spin_async(self, timeout_s: float | None = None) -> None:
         """Run callbacks, timers and servers in the running asyncio event loop; otherwise as `spin`.
@@ -503,7 +520,7 @@ class Node(ServiceNode):
         Args:
             timeout_s: Time limit in seconds; None for no limit.
         """
-        await spin_in_loop(self._work, seconds("timeout_s", timeout_s))
+        await spin_in_loop(self._work, check_optional_time_limit("timeout_s", timeout_s))
 
     def stop_spin(self) -> None:
         """End the current `spin` or `spin_async`, or the next one. Thread-safe; also for callbacks."""
@@ -536,10 +553,10 @@ class Node(ServiceNode):
         Raises:
             MasterUnreachable: The master did not reply in time.
         """
-        seconds("timeout_s", timeout_s)
+        check_optional_time_limit("timeout_s", timeout_s)
         return self._open_transport().graph(self.hybrid(), timeout_s)
 
-    def close(self, timeout_s: float = FLUSH_S) -> None:
+    def close(self, timeout_s: float = FLUSH_TIMEOUT_S) -> None:
         """Unregister and close everything created on this node. Idempotent.
 
         Published messages are delivered first; those that can't be delivered in time are logged as a warning.
@@ -549,7 +566,7 @@ class Node(ServiceNode):
         Args:
             timeout_s: Time limit for the delivery in seconds.
         """
-        limit("timeout_s", timeout_s)
+        check_time_limit("timeout_s", timeout_s)
         _close((self,), timeout_s)
 
     def _close_log(self, timeout_s: float) -> None:
@@ -577,7 +594,7 @@ class Node(ServiceNode):
         deadline = time.monotonic() + timeout_s
         self._services.finish_calls(timeout_s / 2)
         self._transport.close(max(0.0, deadline - time.monotonic()))
-        self._services.end(max(0.0, deadline - time.monotonic()))
+        self._services.stop_threads(max(0.0, deadline - time.monotonic()))
 
     def forked(self) -> None:
         """Mark the node as closed in a forked child process. See `nep.system.forks`."""
@@ -614,9 +631,10 @@ class Node(ServiceNode):
 
 def _check_user_topic(topic: str) -> str:
     # Service names start with a reserved prefix.
-    if check_topic(topic).startswith(PREFIX):
+    if check_topic(topic).startswith(SERVICE_PREFIX):
         raise BadTopicError(
-            topic, _("names that start with '{prefix}' are reserved for services").format(prefix=PREFIX)
+            topic,
+            _("names that start with '{prefix}' are reserved for services").format(prefix=SERVICE_PREFIX),
         )
     return topic
 
@@ -641,7 +659,7 @@ def spin(*nodes: Node, timeout_s: float | None = None) -> None:
     if not nodes or not all(isinstance(each, Node) for each in nodes):
         raise WrongTypeError(_("'spin' requires at least one node"))
     works = dict.fromkeys(each._work for each in nodes)  # noqa: SLF001 - private to this module
-    spin_all(tuple(works), seconds("timeout_s", timeout_s))
+    spin_all(tuple(works), check_optional_time_limit("timeout_s", timeout_s))
 
 
 def _close(nodes: Sequence[Node], timeout_s: float) -> None:
@@ -656,10 +674,10 @@ def _close(nodes: Sequence[Node], timeout_s: float) -> None:
 
 
 def _close_all() -> None:
-    _close(tuple(_open_nodes), FLUSH_S)
+    _close(tuple(_open_nodes), FLUSH_TIMEOUT_S)
 
 
-def _close_with_worker() -> None:
+def _register_worker_close() -> None:
     # A forked worker of `multiprocessing` skips the interpreter's exit handlers, so closing is registered
     # with `multiprocessing` itself. It forgets registrations made before it starts: register when a node is
     # created.

@@ -15,17 +15,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from nep.backends.base import (
-    KnowsSubscribers,
     PublisherSpec,
     PublisherTransport,
-    PublishesQuickly,
-    QuickPublish,
+    PublishHooks,
+    SupportsQuickPublish,
+    SupportsSubscriberIds,
 )
 from nep.errors import ClosedError, EncodeError, WireError
 from nep.i18n import _
-from nep.messages.codecs import JsonEncoder, ordinary
-from nep.messages.encoded import Encoded, encoded
-from nep.nodes.arguments import limit
+from nep.messages.codecs import JsonEncoder, fast_encoder
+from nep.messages.encoded import Encoded, new_encoded
+from nep.nodes.arguments import check_time_limit
 from nep.protocol.wire import extension_part
 from nep.system.log_rarely import is_logged
 from nep.text import escaped, shortened
@@ -76,7 +76,7 @@ class Publisher:
         self._is_latched = spec.is_latched
         self.is_closed = False
         """True if the publisher or its node was closed."""
-        if isinstance(transport, PublishesQuickly) and (encode := ordinary(spec.codec)) is not None:
+        if isinstance(transport, SupportsQuickPublish) and (encode := fast_encoder(spec.codec)) is not None:
             self._install_fast_publish(transport, encode)
 
     @property
@@ -106,7 +106,7 @@ class Publisher:
         The subscriber of a program that doesn't respond stays connected after its node was removed from the
         graph. Empty for back ends that can't identify subscribers.
         """
-        if self._is_forked or not isinstance(self._transport, KnowsSubscribers):
+        if self._is_forked or not isinstance(self._transport, SupportsSubscriberIds):
             return frozenset()
         return self._transport.subscriber_ids
 
@@ -155,7 +155,7 @@ class Publisher:
         if strict or self._is_strict:
             self._publish_strictly(payload)
             return
-        if self.is_closed or not (self._transport.is_heard or self._is_latched):
+        if self.is_closed or not (self._transport.has_subscribers or self._is_latched):
             self._skip(payload)
             return
         try:
@@ -183,16 +183,16 @@ class Publisher:
             self._check(payload)  # raises a more specific error
             raise self._rejected.error(payload, error, self._spec.codec.name) from error
         self._rejected.resolve()
-        if self._transport.is_heard or self._is_latched:
+        if self._transport.has_subscribers or self._is_latched:
             self._transport.send(encoded_payload)
         else:
             self._transport.skip()
 
-    def _install_fast_publish(self, transport: PublishesQuickly, encode: Callable[[Any], bytes]) -> None:
+    def _install_fast_publish(self, transport: SupportsQuickPublish, encode: Callable[[Any], bytes]) -> None:
         # Replaces self.publish; payloads that the fast path can't handle fall back to Publisher.publish.
         on_null = None if self._json_encoder is None else self._json_encoder.check_for_nan
         kind = bytes if self._spec.codec.name == "bytes" else None
-        fast_publish = transport.quick_publish(QuickPublish(self, kind, encode, on_null, self.publish))
+        fast_publish = transport.quick_publish(PublishHooks(self, kind, encode, on_null, self.publish))
         fast_publish.__doc__ = Publisher.publish.__doc__
         setattr(self, "publish", fast_publish)  # noqa: B010 - mypy rejects the assignment to a method
 
@@ -207,10 +207,10 @@ class Publisher:
             EncodeError: The data is not bytes, or the extension is not a map.
             ClosedError: The publisher is closed.
         """
-        if self.is_closed or not (self._transport.is_heard or self._is_latched):
+        if self.is_closed or not (self._transport.has_subscribers or self._is_latched):
             self._skip(Encoded(data, extension))
         else:
-            self._send(encoded((data, extension)))
+            self._send(new_encoded((data, extension)))
 
     def refuse(self, payload: object, error: Exception) -> None:
         """Count and report a payload that the caller failed to encode with `error`, as `publish` does."""
@@ -295,7 +295,7 @@ class Publisher:
         numbers = np.dtype(dtype)
         sides = (shape,) if isinstance(shape, int) else tuple(shape)
         size = math.prod(sides) * numbers.itemsize
-        memory = self._transport.lend(size) if size > 0 else None
+        memory = self._transport.borrow_memory(size) if size > 0 else None
         if memory is None:
             return np.empty(sides, numbers)
         lent: NDArray[Any] = np.frombuffer(memory, numbers).reshape(sides)
@@ -303,7 +303,7 @@ class Publisher:
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Deliver published messages within `timeout_s` seconds and unregister. Idempotent."""
-        limit("timeout_s", timeout_s)
+        check_time_limit("timeout_s", timeout_s)
         if not self.is_closed:
             self.is_closed = True
             try:
@@ -381,7 +381,7 @@ class RejectedPayloads:
         now = self._clock()
         if self._located[0] != reason and (now >= self._locate_at or not self._located[0]):
             self._locate_at = now + _VALIDATE_INTERVAL_S  # finding the path may take long
-            place = "" if getattr(error, "place", "") else _escaped_path_of(payload, self._encode)
+            place = "" if getattr(error, "place", "") else _escaped_unencodable_path(payload, self._encode)
             self._located = (reason, f"{reason}; it is at '{place}'" if place else reason)
         sentence = self._located[1] if self._located[0] == reason else reason
         if is_logged(self.count):
@@ -396,7 +396,7 @@ class RejectedPayloads:
         """Return the exception to raise for a payload, with the path of the value that can't be encoded."""
         if not isinstance(error, EncodeError):
             error = EncodeError(codec, type(payload).__name__, _error_text(error))
-        place = error.place or _escaped_path_of(payload, self._encode)
+        place = error.place or _escaped_unencodable_path(payload, self._encode)
         if not place or error.place:
             return error
         return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{place}'", place)
@@ -424,18 +424,18 @@ def check_sendable(payload: Encoded) -> None:
         extension_part(payload.extension)
 
 
-def _escaped_path_of(payload: object, encode: Callable[[object], Encoded]) -> str:
+def _escaped_unencodable_path(payload: object, encode: Callable[[object], Encoded]) -> str:
     try:
         return (
             ""
             if isinstance(payload, Encoded)
-            else escaped(shortened(path_of(payload, encode), _MAX_TEXT_LENGTH))
+            else escaped(shortened(unencodable_path(payload, encode), _MAX_TEXT_LENGTH))
         )
     except Exception:  # noqa: BLE001 - keys of any class may raise anything
         return ""
 
 
-def path_of(payload: object, encode: Callable[[object], Encoded]) -> str:
+def unencodable_path(payload: object, encode: Callable[[object], Encoded]) -> str:
     """Return the path of the first value that can't be encoded, such as "pose.x" or "joints[3]".
 
     Returns "" for the payload itself, or if no such value is among the first ten thousand.

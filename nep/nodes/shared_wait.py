@@ -9,7 +9,7 @@ from contextlib import suppress
 from nep.backends.base import SubscriberTransport
 from nep.errors import TooManyFilesError
 from nep.i18n import _
-from nep.system.descriptors import is_lack, limit, opened
+from nep.system.descriptors import descriptor_limit, is_descriptor_shortage, open_descriptor_count
 from nep.system.wakeup import Waker
 
 _POLL_INTERVAL_S = 0.01
@@ -41,8 +41,10 @@ class SharedWait:
             self._selector = selectors.DefaultSelector()
         except OSError as error:
             self._waker.close()
-            if is_lack(error.errno):
-                raise TooManyFilesError(_("a waiting thread"), opened(), limit()) from error
+            if is_descriptor_shortage(error.errno):
+                raise TooManyFilesError(
+                    _("a waiting thread"), open_descriptor_count(), descriptor_limit()
+                ) from error
             raise
         self._selector.register(self._waker.fd, selectors.EVENT_READ)
         self._armed: dict[SubscriberTransport, _ReadyCallback] = {}

@@ -8,11 +8,11 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from nep.backends.base import GivesPayloads, SubscriberSpec, SubscriberTransport
+from nep.backends.base import SubscriberSpec, SubscriberTransport, SupportsPayloads
 from nep.errors import ClosedError, DecodeError
 from nep.messages.codecs import codec_for
 from nep.messages.message import UNDECODED, Message
-from nep.nodes.arguments import seconds
+from nep.nodes.arguments import check_optional_time_limit
 from nep.nodes.async_reading import AsyncMessages, AsyncReader
 from nep.system.log_rarely import is_logged
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-SLICE_S = 0.1
+WAIT_SLICE_S = 0.1
 """Maximum duration of a single wait in seconds, because on Windows Ctrl+C doesn't interrupt a wait."""
 
 _NO_PAYLOADS: deque[Any] = deque()
@@ -52,7 +52,7 @@ class Subscriber:
         self._transport = transport
         self._spec = spec
         self._ready = transport.ready
-        self._payload_source = transport if isinstance(transport, GivesPayloads) else None
+        self._payload_source = transport if isinstance(transport, SupportsPayloads) else None
         self.payloads = _NO_PAYLOADS if self._payload_source is None else self._payload_source.payloads
         """Decoded payloads to be read next, for callers that don't need the messages."""
         self._empty = codec_for(spec.msg_type).empty
@@ -113,7 +113,7 @@ class Subscriber:
         except TypeError:
             is_wrong = True
         if is_wrong:
-            seconds("timeout_s", timeout_s)
+            check_optional_time_limit("timeout_s", timeout_s)
         payloads, ready = self.payloads, self._ready
         if payloads:
             try:
@@ -191,7 +191,7 @@ class Subscriber:
         except TypeError:
             is_wrong = True
         if is_wrong:
-            seconds("timeout_s", timeout_s)
+            check_optional_time_limit("timeout_s", timeout_s)
         self.want_messages()
         return self._receive(timeout_s)
 
@@ -219,7 +219,7 @@ class Subscriber:
                 pass
         if self._transport.is_closed or (timeout_s is not None and timeout_s <= 0.0):
             return self._poll()
-        wait_s = SLICE_S if timeout_s is None or timeout_s > SLICE_S else timeout_s
+        wait_s = WAIT_SLICE_S if timeout_s is None or timeout_s > WAIT_SLICE_S else timeout_s
         message = self._transport.receive(wait_s)
         return message or self._receive_after_slice(None if timeout_s is None else timeout_s - wait_s)
 
@@ -228,7 +228,7 @@ class Subscriber:
         while True:
             if self._transport.is_closed:
                 raise self._closed_error()
-            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+            left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 return None
             message = self._transport.receive(left)
@@ -240,14 +240,14 @@ class Subscriber:
 
         Cancelling loses no message.
         """
-        return await self._async_reader.receive(seconds("timeout_s", timeout_s))
+        return await self._async_reader.receive(check_optional_time_limit("timeout_s", timeout_s))
 
     async def listen_async(self, timeout_s: float | None = None) -> tuple[bool, object]:
         """Wait for the next payload as `listen` does, in an asyncio event loop.
 
         Waits without limit by default.
         """
-        limit = seconds("timeout_s", timeout_s)
+        limit = check_optional_time_limit("timeout_s", timeout_s)
         deadline = None if limit is None else time.monotonic() + limit
         while True:
             message = await self.receive_async(limit)

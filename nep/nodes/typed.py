@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from nep.backends.base import Backend, Sink, SubscriberSpec, SubscriberTransport
 from nep.messages.codecs import Codec
 from nep.messages.message import Message
-from nep.nodes.arguments import function, seconds
+from nep.nodes.arguments import check_function, check_optional_time_limit
 from nep.nodes.subscriber import Subscriber
-from nep.system.arguments import text
+from nep.system.arguments import check_type_name
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -28,7 +28,11 @@ MsgType = str | type
 
 def name_of(msg_type: object) -> str:
     """Return the registered name of a message type. Raises `ValueError`."""
-    return typed.message_type(msg_type).name if isinstance(msg_type, type) else text("msg_type", msg_type)
+    return (
+        typed.message_type(msg_type).name
+        if isinstance(msg_type, type)
+        else check_type_name("msg_type", msg_type)
+    )
 
 
 def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
@@ -42,8 +46,8 @@ def codec_of(backend: Backend, msg_type: MsgType) -> Codec:
 def sink_of(msg_type: MsgType, sink: Sink | None) -> Sink | None:
     """Return a sink that passes messages with typed payloads to `sink`. Raises `ValueError`."""
     if sink is None or not isinstance(msg_type, type):
-        return None if sink is None else function("sink", sink)
-    give, reader = function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
+        return None if sink is None else check_function("sink", sink)
+    give, reader = check_function("sink", sink), typed.TypedReader(typed.message_type(msg_type))
     return lambda messages: give([reader.typed(each) for each in messages])
 
 
@@ -73,7 +77,7 @@ class TypedSubscriber(Subscriber):
 
     def listen(self, block_mode: bool = False, *, timeout_s: float | None = None) -> tuple[bool, object]:
         """Return (True, payload) for the next message, or (False, None) if there is none."""
-        seconds("timeout_s", timeout_s)
+        check_optional_time_limit("timeout_s", timeout_s)
         return self._wait_and_listen(block_mode, timeout_s)
 
     def receive(self, timeout_s: float | None = None) -> Message | None:

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from itertools import chain
 from typing import Any, NamedTuple
 
-from nep.backends.base import SubscriberTransport, Transport, Wakes
+from nep.backends.base import SubscriberTransport, Transport, Wakeable
 from nep.errors import ClosedError, DecodeError, NepError
 from nep.i18n import _
-from nep.nodes.subscriber import SLICE_S, Subscriber
+from nep.nodes.subscriber import WAIT_SLICE_S, Subscriber
 from nep.nodes.timer import Timer, next_due
 from nep.patterns.services.owned import ServiceRegistry
 from nep.system.arguments import is_coroutine_function
@@ -46,7 +46,7 @@ class Work:
         self._node_name = node_name
         self._lock = threading.Lock()
         self._is_stopped = threading.Event()
-        self._watchers: tuple[Wakes, ...] = ()
+        self._watchers: tuple[Wakeable, ...] = ()
         self._coroutine = ""
         """Description of a callback that needs an event loop, or ""."""
 
@@ -114,12 +114,12 @@ class Work:
         for each in self._watchers:
             each.wake()
 
-    def watch(self, watcher: Wakes) -> None:
+    def watch(self, watcher: Wakeable) -> None:
         """Register an object that `wake` also wakes."""
         with self._lock:
             self._watchers = (*self._watchers, watcher)
 
-    def unwatch(self, watcher: Wakes) -> None:
+    def unwatch(self, watcher: Wakeable) -> None:
         """Unregister an object that `watch` registered."""
         with self._lock:
             self._watchers = tuple(each for each in self._watchers if each is not watcher)
@@ -272,12 +272,12 @@ class Work:
     # ---- waiting
 
     @property
-    def waiting(self) -> list[SubscriberTransport]:
+    def waiting_subscribers(self) -> list[SubscriberTransport]:
         """Transports of the open subscribers that have a callback."""
         return [each[1] for each in self.callbacks if not each[1].is_closed]
 
     @property
-    def due_s(self) -> float:
+    def until_next_timer_s(self) -> float:
         """Seconds until the first timer is due; infinite without timers."""
         return next_due(self.timers) - self.clock()
 
@@ -297,13 +297,13 @@ class Work:
         is_stopped = self._is_stopped.is_set
         try:
             while not is_stopped() and not self.is_closed:
-                left = SLICE_S if deadline is None else min(SLICE_S, deadline - self.clock())
+                left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - self.clock())
                 if left <= 0.0:
                     return
                 if self._run_until(self.clock() + left):
                     continue
                 if self.timers:
-                    left = min(left, self.due_s)
+                    left = min(left, self.until_next_timer_s)
                 if left > 0.0:
                     self._wait(left)
             self.check_not_forked()

@@ -14,23 +14,23 @@ from typing import NamedTuple
 
 from nep.errors import WireError
 from nep.i18n import _
-from nep.messages.codecs import codec_numbered
-from nep.protocol.wire import BATCH, Header, Parts, pack_quickly, split
+from nep.messages.codecs import codec_by_number
+from nep.protocol.wire import BATCH, Header, Parts, pack_header, split
 
 __all__ = [
     "BATCH",
-    "BATCH_FORM",
+    "BATCH_FORM_FLAG",
     "BATCH_MAX",
     "BatchEntry",
     "batch_part",
     "check_batch",
     "entries",
     "read_parts",
-    "table_of",
+    "table_struct",
     "unknown_codec",
 ]
 
-BATCH_FORM = BATCH << 16
+BATCH_FORM_FLAG = BATCH << 16
 """Flag `BATCH`, shifted to its position in the result of `form_of`."""
 BATCH_MAX = 256
 """Maximum number of messages in a batch; larger batches are rejected."""
@@ -54,7 +54,7 @@ class BatchEntry(NamedTuple):
 
 
 @cache
-def table_of(count: int) -> struct.Struct:
+def table_struct(count: int) -> struct.Struct:
     """Return the format of a batch's table: number of messages, all sizes, all time stamps."""
     return struct.Struct(f"<I{count}I{count}Q")
 
@@ -79,8 +79,8 @@ def batch_part(
     """
     sizes = [*map(len, payloads)]
     count = len(sizes)
-    table = table_of(count).pack(count, *sizes, *stamps_ns)
-    header = pack_quickly(form | BATCH_FORM, len(table) + sum(sizes), seq, stamps_ns[0], publisher)
+    table = table_struct(count).pack(count, *sizes, *stamps_ns)
+    header = pack_header(form | BATCH_FORM_FLAG, len(table) + sum(sizes), seq, stamps_ns[0], publisher)
     return b"".join((topic, header, table, *payloads))
 
 
@@ -95,7 +95,7 @@ def entries(body: bytes) -> list[BatchEntry]:
             len(body),
             code="batch-count",
         )
-    table = table_of(count)
+    table = table_struct(count)
     if len(body) < table.size:
         raise WireError(_("the table of a batch is incomplete"), len(body), code="batch-table")
     numbers = table.unpack_from(body)
@@ -131,13 +131,13 @@ def read_parts(parts: Sequence[bytes | memoryview]) -> list[Parts]:
         WireError: The parts violate the specification. The rules are checked in the order of docs/wire.md.
     """
     one = split(parts)
-    found = [one] if not one.header.flags & BATCH else _messages_of(one)
-    if codec_numbered(one.header.codec) is None:
+    found = [one] if not one.header.flags & BATCH else _split_batch(one)
+    if codec_by_number(one.header.codec) is None:
         raise unknown_codec(one.header.codec)
     return found
 
 
-def _messages_of(one: Parts) -> list[Parts]:
+def _split_batch(one: Parts) -> list[Parts]:
     body = bytes(one.payload)
     check_batch(one.header, body)
     return [

@@ -118,7 +118,7 @@ class ClockSamples:
             return None
         return best.offset_ns, best.uncertainty_at(now.steady_ns)
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Discard all samples, because another master may have another clock."""
         self._samples.clear()
 

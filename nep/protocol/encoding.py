@@ -28,15 +28,16 @@ from nep.protocol.requests import (
     AddSubscriber,
     Done,
     Found,
+    GraphReply,
     Join,
     Leave,
     Listen,
-    Look,
     Ping,
     Probe,
-    PublisherCame,
-    PublisherGone,
+    PublisherAdded,
+    PublisherRemoved,
     Push,
+    QueryGraph,
     Refused,
     RemovePublisher,
     RemoveSubscriber,
@@ -45,11 +46,10 @@ from nep.protocol.requests import (
     Reply,
     ReportMissing,
     Request,
-    Seen,
 )
 
 T = TypeVar("T")
-_PLAIN = frozenset({str, int, float, bool, bytes, type(None)})
+_PLAIN_TYPES = frozenset({str, int, float, bool, bytes, type(None)})
 
 _REQUESTS: Mapping[str, type[Request]] = {
     "join": Join,
@@ -61,28 +61,28 @@ _REQUESTS: Mapping[str, type[Request]] = {
     "renew": Renew,
     "missing": ReportMissing,
     "listen": Listen,
-    "look": Look,
+    "look": QueryGraph,
     "ping": Ping,
 }
-_ANSWERS: Mapping[str, type[Reply | Push]] = {
+_REPLIES: Mapping[str, type[Reply | Push]] = {
     "done": Done,
     "added": Added,
     "found": Found,
     "renewed": Renewed,
-    "seen": Seen,
+    "seen": GraphReply,
     "refused": Refused,
-    "publisher+": PublisherCame,
-    "publisher-": PublisherGone,
+    "publisher+": PublisherAdded,
+    "publisher-": PublisherRemoved,
     "probe": Probe,
 }
 _REQUEST_NAMES = {kind: name for name, kind in _REQUESTS.items()}
-_ANSWER_NAMES = {kind: name for name, kind in _ANSWERS.items()}
-_MISSING = lazy("'{field}' is missing")
+_REPLY_NAMES = {kind: name for name, kind in _REPLIES.items()}
+_MISSING_FIELD = lazy("'{field}' is missing")
 _WRONG_TYPE = lazy("'{field}' must be '{wanted}', not '{given}'")
 _NOT_A_LIST = lazy("'{field}' must be a list, not '{given}'")
 _NOT_A_MAP = lazy("'{field}' must be a map, not '{given}'")
-_LARGE_BYTES = 50_000
-_SMALL_BYTES = 4096
+_LARGE_BODY_BYTES = 50_000
+_SMALL_BODY_BYTES = 4096
 _MAX_LISTS, _MAX_LIST_LENGTH = 50_000, 20_000
 """Maximum number and length of lists and maps in a request. A joining node has at most 5,000 records."""
 _VIEW_PREFIX = b"\x83\xa2is\xa4seen\xa2re"
@@ -105,7 +105,7 @@ def decode_request(body: bytes) -> ReceivedRequest:
     """Decode a request. Never raises: errors are returned, so that every sender gets a reply."""
     call = 0
     try:
-        if len(body) < _SMALL_BYTES:
+        if len(body) < _SMALL_BODY_BYTES:
             envelope = _envelope(body, unpack)
         else:
             envelope = _envelope(body, lambda body: unpack_bounded(body, _MAX_LISTS, _MAX_LIST_LENGTH))
@@ -121,7 +121,7 @@ def decode_request(body: bytes) -> ReceivedRequest:
         return ReceivedRequest(call, error)
 
 
-class AnswerEncoder:
+class ReplyEncoder:
     """Encoder of replies and pushes. Caches the encoded nodes and topics of a graph until they change."""
 
     def __init__(self) -> None:
@@ -130,11 +130,11 @@ class AnswerEncoder:
 
     def encode(self, answer: Reply | Push, call: int = 0) -> bytes:
         """Encode a reply to `call`, or a push."""
-        if isinstance(answer, Seen):
+        if isinstance(answer, GraphReply):
             return self._encode_view(answer, call)
-        return pack_saturated({"is": _ANSWER_NAMES[type(answer)], "re": call, "what": write(answer)})
+        return pack_saturated({"is": _REPLY_NAMES[type(answer)], "re": call, "what": write(answer)})
 
-    def _encode_view(self, answer: Seen, call: int) -> bytes:
+    def _encode_view(self, answer: GraphReply, call: int) -> bytes:
         view = answer.view
         header = msgpack.Packer().pack_map_header
         other_fields: dict[str, object] = {
@@ -186,12 +186,12 @@ def _packable_value(value: object) -> object:
     return clamp_int(value) if isinstance(value, int) else vars(value)
 
 
-def encode_answer(answer: Reply | Push, call: int = 0) -> bytes:
+def encode_reply(answer: Reply | Push, call: int = 0) -> bytes:
     """Encode a reply to `call`, or a push."""
-    return AnswerEncoder().encode(answer, call)
+    return ReplyEncoder().encode(answer, call)
 
 
-def call_of_view(body: bytes) -> int | None:
+def call_of_graph_reply(body: bytes) -> int | None:
     """Return the call number of a graph reply without decoding it, or None for other bodies.
 
     Decoding a graph of thousands of topics takes 0.1 s.
@@ -205,18 +205,18 @@ def call_of_view(body: bytes) -> int | None:
     return number if isinstance(number, int) and number > 0 else None
 
 
-def decode_answer(body: bytes) -> tuple[int, Reply | Push]:
+def decode_reply(body: bytes) -> tuple[int, Reply | Push]:
     """Decode a reply or push; return (call, answer). The call number of a push is 0. Raises `WireError`."""
-    if len(body) < _LARGE_BYTES:
-        return _decode_answer(body)
-    with collecting_later():
-        return _decode_answer(body)
+    if len(body) < _LARGE_BODY_BYTES:
+        return _decode_reply(body)
+    with gc_disabled():
+        return _decode_reply(body)
 
 
-def _decode_answer(body: bytes) -> tuple[int, Reply | Push]:
+def _decode_reply(body: bytes) -> tuple[int, Reply | Push]:
     envelope = _envelope(body, unpack)
     name, call = envelope.get("is"), envelope.get("re", 0)
-    kind = _ANSWERS.get(name) if isinstance(name, str) else None
+    kind = _REPLIES.get(name) if isinstance(name, str) else None
     if kind is None or not isinstance(call, int):
         raise WireError(_("unknown reply '{name}'").format(name=name), code="answer")
     return call, read(kind, envelope.get("what", {}))
@@ -234,7 +234,7 @@ def _envelope(body: bytes, unpack_it: Callable[[bytes], object]) -> Mapping[str,
 
 
 @contextmanager
-def collecting_later() -> Iterator[None]:
+def gc_disabled() -> Iterator[None]:
     """Disable garbage collection within the context, which halves the time to build a large graph.
 
     Affects the whole process, so use it for milliseconds only.
@@ -253,14 +253,14 @@ def collecting_later() -> Iterator[None]:
 
 def write(value: object) -> object:
     """Convert a value to maps, lists and scalars. Fields that have their default value are left out."""
-    if type(value) in _PLAIN:
+    if type(value) in _PLAIN_TYPES:
         return value
     if is_dataclass(value) and not isinstance(value, type):
         out: dict[str, object] = {}
         for name, default in _fields_of(type(value)):
             item = getattr(value, name)
             if default is MISSING or item != default:
-                out[name] = item if type(item) in _PLAIN else write(item)
+                out[name] = item if type(item) in _PLAIN_TYPES else write(item)
         return out
     if isinstance(value, Mapping):
         return {key: write(item) for key, item in value.items()}
@@ -288,7 +288,7 @@ def read(kind: type[T], value: object) -> T:
         return cast("T", _reader(hint)(value))
     except _MismatchError as mismatch:
         where = ".".join((kind.__name__, *reversed(mismatch.path)))
-        code = "field-missing" if mismatch.words == _MISSING else "field-type"
+        code = "field-missing" if mismatch.words == _MISSING_FIELD else "field-type"
         raise WireError(_(mismatch.words).format(field=where, **mismatch.values), code=code) from None
 
 
@@ -304,7 +304,7 @@ class _MismatchError(Exception):
         self.path: list[str] = []
 
 
-def make_frozen(kind: type[T], every_field: dict[str, object]) -> T:
+def create_frozen(kind: type[T], every_field: dict[str, object]) -> T:
     """Create a frozen dataclass from a dict of all its fields, in a fifth of the constructor's time.
 
     The dataclass takes ownership of `every_field`, which must not be changed afterwards.
@@ -320,19 +320,19 @@ Reader = Callable[[object], object]
 @cache
 def _reader(hint: Any) -> Reader:  # noqa: ANN401 - a type hint is any object
     if isinstance(hint, type) and is_dataclass(hint):
-        return _of_dataclass(hint)
+        return _dataclass_reader(hint)
     origin, args = get_origin(hint), get_args(hint)
     if origin in {UnionType, Union}:
         inner = _reader(next(arg for arg in args if arg is not type(None)))
         return lambda value: None if value is None else inner(value)
     if origin is tuple:
-        return _of_tuple(_reader(args[0]))
+        return _tuple_reader(_reader(args[0]))
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        return _of_mapping(_reader(args[0]), _reader(args[1]))
-    return _of_plain(hint)
+        return _mapping_reader(_reader(args[0]), _reader(args[1]))
+    return _plain_reader(hint)
 
 
-def _of_plain(hint: type) -> Reader:
+def _plain_reader(hint: type) -> Reader:
     def parse(value: object) -> object:
         if hint is float and isinstance(value, int) and not isinstance(value, bool):
             return float(value)
@@ -343,7 +343,7 @@ def _of_plain(hint: type) -> Reader:
     return parse
 
 
-def _of_tuple(item: Reader) -> Reader:
+def _tuple_reader(item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, list | tuple):
             raise _MismatchError(_NOT_A_LIST, given=type(value).__name__)
@@ -352,7 +352,7 @@ def _of_tuple(item: Reader) -> Reader:
     return parse
 
 
-def _of_mapping(key: Reader, item: Reader) -> Reader:
+def _mapping_reader(key: Reader, item: Reader) -> Reader:
     def parse(value: object) -> object:
         if not isinstance(value, Mapping):
             raise _MismatchError(_NOT_A_MAP, given=type(value).__name__)
@@ -361,11 +361,16 @@ def _of_mapping(key: Reader, item: Reader) -> Reader:
     return parse
 
 
-def _of_dataclass(kind: type) -> Reader:
+def _dataclass_reader(kind: type) -> Reader:
     hints = get_type_hints(kind)
     # the usual type of a value, which needs no further call
     readers = [
-        (each.name, hints[each.name] if hints[each.name] in _PLAIN else None, _reader(hints[each.name]), each)
+        (
+            each.name,
+            hints[each.name] if hints[each.name] in _PLAIN_TYPES else None,
+            _reader(hints[each.name]),
+            each,
+        )
         for each in fields(kind)
     ]
     read_fast = _fast_reader(kind, hints)
@@ -389,7 +394,7 @@ def _of_dataclass(kind: type) -> Reader:
                 except _MismatchError as mismatch:
                     mismatch.path.append(name)
                     raise
-        return make_frozen(kind, found)
+        return create_frozen(kind, found)
 
     return parse
 
@@ -418,7 +423,7 @@ def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, ob
                 fields_of_it[name] = reader(value[name])
         except (LookupError, _MismatchError):
             return None
-        fresh: object = make_frozen(kind, fields_of_it)
+        fresh: object = create_frozen(kind, fields_of_it)
         return fresh
 
     return read_fast
@@ -426,9 +431,9 @@ def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, ob
 
 def _plain_types(hint: Any) -> frozenset[type]:  # noqa: ANN401 - a type hint is any object
     # Types whose values are used unchanged; empty if values must be parsed.
-    if hint in _PLAIN:
+    if hint in _PLAIN_TYPES:
         return frozenset({hint})
-    if get_origin(hint) in {UnionType, Union} and set(get_args(hint)) <= _PLAIN:
+    if get_origin(hint) in {UnionType, Union} and set(get_args(hint)) <= _PLAIN_TYPES:
         return frozenset(get_args(hint))
     return frozenset()
 
@@ -438,6 +443,6 @@ def _default(field: Field[Any]) -> object:
         return field.default
     if field.default_factory is not MISSING:
         return field.default_factory()
-    mismatch = _MismatchError(_MISSING)
+    mismatch = _MismatchError(_MISSING_FIELD)
     mismatch.path.append(field.name)
     raise mismatch

@@ -157,7 +157,7 @@ class RemotePublisher:
 
 
 @dataclass(frozen=True)
-class Expected:
+class ExpectedSubscriber:
     """Registered subscriber that a new publisher waits for."""
 
     id: int
@@ -283,7 +283,7 @@ class Listen:
 
 
 @dataclass(frozen=True)
-class Look:
+class QueryGraph:
     """Request for the whole graph. Reply: `Seen`."""
 
 
@@ -303,7 +303,7 @@ Request = (
     | ReportMissing
     | ReportAlerts
     | Listen
-    | Look
+    | QueryGraph
     | Ping
 )
 
@@ -312,7 +312,7 @@ Request = (
 
 
 @dataclass(frozen=True)
-class _FromMaster:
+class _MasterMessage:
     """Base class of replies and pushes.
 
     Attributes:
@@ -325,12 +325,12 @@ class _FromMaster:
 
 
 @dataclass(frozen=True)
-class Done(_FromMaster):
+class Done(_MasterMessage):
     """Request executed; also the reply to a ping."""
 
 
 @dataclass(frozen=True)
-class Added(_FromMaster):
+class Added(_MasterMessage):
     """Publisher registered.
 
     Attributes:
@@ -340,13 +340,13 @@ class Added(_FromMaster):
             to them, too.
     """
 
-    expected: tuple[Expected, ...] = ()
-    hung: tuple[Expected, ...] = ()
+    expected: tuple[ExpectedSubscriber, ...] = ()
+    hung: tuple[ExpectedSubscriber, ...] = ()
     hosts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class Found(_FromMaster):
+class Found(_MasterMessage):
     """Subscriber registered, or node joined.
 
     Attributes:
@@ -369,7 +369,7 @@ class TopicPublishers:
 
 
 @dataclass(frozen=True)
-class Renewed(_FromMaster):
+class Renewed(_MasterMessage):
     """Lease renewed.
 
     Attributes:
@@ -395,14 +395,14 @@ class Renewed(_FromMaster):
 
 
 @dataclass(frozen=True)
-class Seen(_FromMaster):
+class GraphReply(_MasterMessage):
     """Reply with the whole graph."""
 
     view: GraphView
 
 
 @dataclass(frozen=True)
-class Refused(_FromMaster):
+class Refused(_MasterMessage):
     """Request rejected. `reason` is a sentence in the master's language.
 
     `code` is independent of the language; docs/wire.md lists the codes. Older masters send none ("").
@@ -412,14 +412,14 @@ class Refused(_FromMaster):
     code: str = ""
 
 
-Reply = Done | Added | Found | Renewed | Seen | Refused
+Reply = Done | Added | Found | Renewed | GraphReply | Refused
 
 
 # ---- pushes
 
 
 @dataclass(frozen=True)
-class PublisherCame(_FromMaster):
+class PublisherAdded(_MasterMessage):
     """Notification of a new publisher on a subscribed topic, or of a publisher's new endpoints.
 
     `is_new` is True if the publisher was just created and has not sent anything, False if it rejoined or
@@ -431,7 +431,7 @@ class PublisherCame(_FromMaster):
 
 
 @dataclass(frozen=True)
-class PublisherGone(_FromMaster):
+class PublisherRemoved(_MasterMessage):
     """Notification that a publisher of a subscribed topic is no longer registered.
 
     `is_closed` is True if the publisher unregistered; `last_seq` was then its last message. Otherwise its
@@ -445,17 +445,17 @@ class PublisherGone(_FromMaster):
 
 
 @dataclass(frozen=True)
-class Probe(_FromMaster):
+class Probe(_MasterMessage):
     """Test of the connection to a node that missed a renewal. Ignored by the receiver."""
 
 
-Push = PublisherCame | PublisherGone | Probe
+Push = PublisherAdded | PublisherRemoved | Probe
 
 
 def node_of(request: Request) -> str | None:
     """Return the id of the node in whose name a request is sent, or None."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id
-    if isinstance(request, ReportAlerts | Listen | Look | Ping):
+    if isinstance(request, ReportAlerts | Listen | QueryGraph | Ping):
         return None
     return request.node_id

@@ -22,8 +22,8 @@ from nep.i18n import _
 from nep.protocol.wire import check_topic
 from nep.text import bounded_str, escaped, shortened
 
-PREFIX = "nep.service:"
-SURVEY = "survey:"
+SERVICE_PREFIX = "nep.service:"
+SURVEY_PREFIX = "survey:"
 """Prefix of a survey's service name. The master lists its respondents as servers of that service."""
 SERVICE_TYPE = "service"
 """Message type and codec under which the master lists servers and clients."""
@@ -36,9 +36,9 @@ _VERSION = 1
 _HEADER = struct.Struct("<BBHIQ")  # version, kind, codec, timeout_ms, number
 HEADER_BYTES = _HEADER.size
 _TIMEOUT_MAX_MS = 2**32 - 1
-_JSON = 1
+_JSON_CODEC = 1
 _MAX_CLASS_LENGTH, _MAX_REASON_LENGTH = 100, 2000
-_FAILURE = b'{"nep_error":'
+_ERROR_PREFIX = b'{"nep_error":'
 
 
 class CallKind(IntEnum):
@@ -55,7 +55,7 @@ class Reply(NamedTuple):
 
     kind: CallKind
     data: bytes | memoryview
-    codec: int = _JSON
+    codec: int = _JSON_CODEC
 
 
 class CallHeader(NamedTuple):
@@ -67,7 +67,7 @@ class CallHeader(NamedTuple):
     data: bytes | memoryview
 
 
-class ReadAnswer(NamedTuple):
+class ReceivedReply(NamedTuple):
     """Parsed reply, as a client receives it. `number` is None if it replies to the oldest call."""
 
     number: int | None
@@ -78,7 +78,7 @@ class Framing(Protocol):
     """Wire format of calls and replies."""
 
     @property
-    def in_order(self) -> bool:
+    def is_in_order(self) -> bool:
         """True if replies have no numbers and arrive in the order of the calls."""
 
     def call(
@@ -89,15 +89,15 @@ class Framing(Protocol):
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
         """Parse a call. Raises `WireError`."""
 
-    def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:
+    def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
         """Encode a reply."""
 
-    def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
+    def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
         """Parse a reply. Raises `WireError`."""
 
 
 class _Native:
-    in_order = False
+    is_in_order = False
 
     def call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
@@ -107,22 +107,22 @@ class _Native:
         return [_HEADER.pack(_VERSION, CallKind.CALL, codec, limit_ms, number), data]
 
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
-        kind, codec, limit_ms, number, data = _read(parts)
+        kind, codec, limit_ms, number, data = _read_frame(parts)
         if kind != CallKind.CALL:
             raise WireError(_("it is not a service call"), code="call-kind")
         return CallHeader(number, codec, limit_ms / 1000 if limit_ms else None, data)
 
-    def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:
+    def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
         return [_HEADER.pack(_VERSION, reply.kind, reply.codec, 0, number), reply.data]
 
-    def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
-        kind, codec, _limit, number, data = _read(parts)
+    def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
+        kind, codec, _limit, number, data = _read_frame(parts)
         if kind not in {CallKind.ANSWER, CallKind.ERROR, CallKind.REFUSED}:
             raise WireError(_("it is not a service reply"), code="call-kind")
-        return ReadAnswer(number, Reply(CallKind(kind), data, codec))
+        return ReceivedReply(number, Reply(CallKind(kind), data, codec))
 
 
-def _read(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int, bytes | memoryview]:
+def _read_frame(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int, bytes | memoryview]:
     if len(parts) != 2 or len(parts[0]) != _HEADER.size:
         reason = _("a call must have two parts, the first of {size} bytes").format(size=_HEADER.size)
         raise WireError(reason, code="call-parts")
@@ -136,7 +136,7 @@ def _read(parts: Sequence[bytes | memoryview]) -> tuple[int, int, int, int, byte
 
 
 class _Original:
-    in_order = True
+    is_in_order = True
 
     def call(
         self,
@@ -148,18 +148,18 @@ class _Original:
         return [b"", data]
 
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
-        return CallHeader(0, _JSON, None, _single_part(parts))
+        return CallHeader(0, _JSON_CODEC, None, _single_part(parts))
 
     # not in this format
-    def answer(self, number: int, reply: Reply) -> list[bytes | memoryview]:  # noqa: ARG002
+    def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:  # noqa: ARG002
         return [b"", reply.data]
 
-    def read_answer(self, parts: Sequence[bytes | memoryview]) -> ReadAnswer:
+    def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
         data = _single_part(parts)
-        is_failure = bytes(data[: len(_FAILURE)]) == _FAILURE
-        name, _reason = read_failure(data) if is_failure else ("", "")
+        is_failure = bytes(data[: len(_ERROR_PREFIX)]) == _ERROR_PREFIX
+        name, _reason = read_error_reply(data) if is_failure else ("", "")
         kind = CallKind.ANSWER if not is_failure else CallKind.ERROR if name else CallKind.REFUSED
-        return ReadAnswer(None, Reply(kind, data))
+        return ReceivedReply(None, Reply(kind, data))
 
 
 def _single_part(parts: Sequence[bytes | memoryview]) -> bytes | memoryview:
@@ -176,7 +176,7 @@ ORIGINAL: Framing = _Original()
 """Framing of the original NEP's `client` and `server`: JSON over REQ and REP."""
 
 
-def failure(kind: CallKind, name: str, reason: str) -> Reply:
+def error_reply(kind: CallKind, name: str, reason: str) -> Reply:
     """Return an error reply.
 
     Args:
@@ -193,7 +193,7 @@ def _bounded(text: str, most: int) -> str:
     return shortened(text, most).encode("utf-8", "replace").decode()
 
 
-def read_failure(data: bytes | memoryview) -> tuple[str, str]:
+def read_error_reply(data: bytes | memoryview) -> tuple[str, str]:
     """Return the class name and message of an error reply. Accepts any untrusted data."""
     try:
         content = orjson.loads(data)
@@ -208,11 +208,11 @@ def read_failure(data: bytes | memoryview) -> tuple[str, str]:
 def check_service(name: str) -> str:
     """Validate a service name and return it. Raises `BadTopicError`."""
     check_topic(name)
-    if name.startswith(PREFIX):
-        raise BadTopicError(name, _("omit '{prefix}'; nep adds it").format(prefix=PREFIX))
-    if name.startswith(SURVEY):
+    if name.startswith(SERVICE_PREFIX):
+        raise BadTopicError(name, _("omit '{prefix}'; nep adds it").format(prefix=SERVICE_PREFIX))
+    if name.startswith(SURVEY_PREFIX):
         raise BadTopicError(
-            name, _("names that start with '{prefix}' are reserved for surveys").format(prefix=SURVEY)
+            name, _("names that start with '{prefix}' are reserved for surveys").format(prefix=SURVEY_PREFIX)
         )
     check_topic(topic_of(name))
     return name
@@ -221,15 +221,19 @@ def check_service(name: str) -> str:
 def check_survey(name: str) -> str:
     """Validate the name of a survey and return the name of its service. Raises `BadTopicError`."""
     check_service(name)
-    check_topic(topic_of(f"{SURVEY}{name}"))
-    return f"{SURVEY}{name}"
+    check_topic(topic_of(f"{SURVEY_PREFIX}{name}"))
+    return f"{SURVEY_PREFIX}{name}"
 
 
 def topic_of(service: str) -> str:
     """Return the topic under which the master lists the servers and clients of a service."""
-    return f"{PREFIX}{service}"
+    return f"{SERVICE_PREFIX}{service}"
 
 
 def service_of(topic: str) -> str | None:
     """Return the service that is listed under a topic, or None for any other topic."""
-    return topic.removeprefix(PREFIX) if topic.startswith(PREFIX) and len(topic) > len(PREFIX) else None
+    return (
+        topic.removeprefix(SERVICE_PREFIX)
+        if topic.startswith(SERVICE_PREFIX) and len(topic) > len(SERVICE_PREFIX)
+        else None
+    )

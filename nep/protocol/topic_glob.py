@@ -15,7 +15,7 @@ def is_glob(word: str) -> bool:
     return any(letter in word for letter in "*?")
 
 
-def widened(pattern: str) -> str:
+def widened_pattern(pattern: str) -> str:
     """Return a subscriber's pattern that matches all topics of a glob pattern, and possibly others.
 
     Exception: topics with an empty level in the middle, which are not used.

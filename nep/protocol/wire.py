@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 from nep.errors import BadNameError, BadTopicError, WireError
 from nep.i18n import _
-from nep.messages.nesting import packed_is_too_deep, too_deep
+from nep.messages.nesting import packed_is_too_deep, too_deep_reason
 from nep.messages.packing import pack, unpack
-from nep.text import control_in
+from nep.text import first_control
 
 VERSION = 1
 HEADER_BYTES = 32
@@ -45,16 +45,16 @@ OFFER = 32
 
 HELLO = b"\xffhello/"
 """Prefix of a hello filter. 0xff sorts after all UTF-8, so the hello filter is set after the topic filter."""
-HELLO_ONE = b"\xffhello1/"
+HELLO_ONE_PART = b"\xffhello1/"
 """Prefix of a hello filter, level 1: the subscriber also reads messages of one part."""
-HELLO_TELLS = b"\xffhello2/"
+HELLO_ACKNOWLEDGES = b"\xffhello2/"
 """Prefix of a hello filter, level 2: the subscriber also acknowledges echoes with the last message read."""
 HELLO_BATCHES = b"\xffhello3/"
 """Prefix of a hello filter, level 3: the subscriber also reads batches (`nep.protocol.batch`)."""
-_HELLOS = (HELLO_BATCHES, HELLO_TELLS, HELLO_ONE, HELLO)
-READ = b"\xffread/"
+_HELLOS = (HELLO_BATCHES, HELLO_ACKNOWLEDGES, HELLO_ONE_PART, HELLO)
+ACKNOWLEDGEMENT = b"\xffread/"
 """Prefix of the filter that acknowledges an echo. It is removed immediately after it was set."""
-SHARES = b"\xffshares/"
+ACCEPTANCE = b"\xffshares/"
 """Prefix of the filter that accepts an offer of shared memory. It is removed immediately after it was set."""
 
 _HEX = re.compile(rb"[0-9a-fA-F]{16}")
@@ -95,14 +95,14 @@ def form_of(codec: int, flags: int) -> int:
     return VERSION | codec << 8 | flags << 16
 
 
-pack_quickly: Callable[[int, int, int, int, int], bytes] = _FAST_HEADER.pack
+pack_header: Callable[[int, int, int, int, int], bytes] = _FAST_HEADER.pack
 """Fast encoder for a header: (form, size, seq, stamp_ns, publisher). Sizes above `SIZE_MAX` are sent as 0."""
-unpack_quickly: Callable[[bytes], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack
+unpack_header: Callable[[bytes], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack
 """Fast decoder for a header, without validation: (form, size, seq, stamp_ns, publisher).
 
 Raises `struct.error`.
 """
-unpack_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack_from
+unpack_header_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack_from
 """Fast decoder for a header at an offset, like `unpack_quickly`."""
 
 
@@ -126,7 +126,7 @@ def check_topic(topic: str) -> str:
             raise BadTopicError(
                 topic, _("the character '{ascii}' is not allowed").format(ascii=ascii(letter)[1:-1])
             )
-    if control := control_in(topic):
+    if control := first_control(topic):
         raise BadTopicError(topic, _("the character '{control}' is not allowed").format(control=control))
     return topic
 
@@ -138,7 +138,7 @@ def check_node_name(name: str) -> str:
     """
     if not isinstance(name, str):
         raise BadNameError(str(name), _("a node name must be a 'str'"))
-    if control := control_in(name):
+    if control := first_control(name):
         raise BadNameError(name, _("the character '{control}' is not allowed").format(control=control))
     size = len(name.encode("utf-8"))
     if not 1 <= size <= NODE_NAME_MAX_BYTES:
@@ -168,11 +168,11 @@ class Hello(NamedTuple):
     subscriber: int
     topic: str
     one_part: bool
-    tells: bool = False
+    acknowledges: bool = False
     batches: bool = False
 
 
-class Read(NamedTuple):
+class Acknowledgement(NamedTuple):
     """Parsed acknowledgement of all messages up to `seq`; the subscriber accepts `bound_bytes` in flight."""
 
     subscriber: int
@@ -181,7 +181,7 @@ class Read(NamedTuple):
     bound_bytes: int
 
 
-class Shares(NamedTuple):
+class OfferAcceptance(NamedTuple):
     """Parsed acceptance of shared memory of a publisher."""
 
     subscriber: int
@@ -196,7 +196,9 @@ def hello_part(
 
     Each ability includes the previous ones: `one_part`, `tells`, `batches`.
     """
-    begin = HELLO_BATCHES if batches else HELLO_TELLS if tells else HELLO_ONE if one_part else HELLO
+    begin = (
+        HELLO_BATCHES if batches else HELLO_ACKNOWLEDGES if tells else HELLO_ONE_PART if one_part else HELLO
+    )
     return begin + f"{subscriber:016x}/{topic}".encode()
 
 
@@ -215,26 +217,26 @@ def parse_hello(part: bytes) -> Hello | None:
         return None
 
 
-def read_part(read: Read) -> bytes:
+def acknowledgement_part(read: Acknowledgement) -> bytes:
     """Return the filter that acknowledges all messages up to one."""
-    return READ + b"/".join(b"%016x" % number for number in read)
+    return ACKNOWLEDGEMENT + b"/".join(b"%016x" % number for number in read)
 
 
-def parse_read(part: bytes) -> Read | None:
+def parse_acknowledgement(part: bytes) -> Acknowledgement | None:
     """Parse an acknowledgement; return None for anything else."""
-    numbers = _numbers_after(READ, part, 4)
-    return None if numbers is None else Read(*numbers)
+    numbers = _numbers_after(ACKNOWLEDGEMENT, part, 4)
+    return None if numbers is None else Acknowledgement(*numbers)
 
 
-def shares_part(shares: Shares) -> bytes:
+def acceptance_part(shares: OfferAcceptance) -> bytes:
     """Return the filter that accepts an offer of shared memory."""
-    return SHARES + b"/".join(b"%016x" % number for number in shares)
+    return ACCEPTANCE + b"/".join(b"%016x" % number for number in shares)
 
 
-def parse_shares(part: bytes) -> Shares | None:
+def parse_acceptance(part: bytes) -> OfferAcceptance | None:
     """Parse an acceptance of shared memory; return None for anything else."""
-    numbers = _numbers_after(SHARES, part, 3)
-    return None if numbers is None else Shares(*numbers)
+    numbers = _numbers_after(ACCEPTANCE, part, 3)
+    return None if numbers is None else OfferAcceptance(*numbers)
 
 
 def _numbers_after(begin: bytes, part: bytes, count: int) -> list[int] | None:
@@ -283,7 +285,7 @@ def read_extension(part: bytes | memoryview) -> Mapping[str, object]:
         reason = _("the extension is not valid msgpack: {error}").format(error=error)
         raise WireError(reason, len(part), code="extension") from error
     if packed_is_too_deep(part, value):
-        raise WireError(too_deep(), len(part), code="extension")
+        raise WireError(too_deep_reason(), len(part), code="extension")
     if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
         raise WireError(_("the extension is not a map with string keys"), len(part), code="extension")
     return value
@@ -302,7 +304,7 @@ def join(
     return topic_part(topic), flagged.pack(), payload, extension_part(extension)
 
 
-def apart(part: bytes) -> tuple[bytes, bytes, bytes]:
+def split_single_part(part: bytes) -> tuple[bytes, bytes, bytes]:
     """Split a message of one part into topic, header and payload. Raises `WireError` if it is too short."""
     cut = part.find(b"\0") + 1
     if not cut or len(part) < cut + HEADER_BYTES:
@@ -329,7 +331,7 @@ def split(parts: Sequence[bytes | memoryview]) -> Parts:
     """
     if not parts:
         raise WireError(_("a message must have 3 or 4 parts, but this one has none"), code="part-count")
-    first, *rest = apart(bytes(parts[0])) if len(parts) == 1 else parts
+    first, *rest = split_single_part(bytes(parts[0])) if len(parts) == 1 else parts
     topic = _topic_in(bytes(first))
     header, payload, extension = split_rest(rest, is_one_part=len(parts) == 1)
     return Parts(topic, header, payload, extension)

@@ -47,7 +47,7 @@ class Bookmarks:
         """File with the bookmarks that are not notes."""
         self._is_damaged = False
         notes: list[Bookmark] = []
-        for at_ns, value in recording.said("notes"):
+        for at_ns, value in recording.entries("notes"):
             text = value.get("text") if isinstance(value, dict) else None
             if isinstance(text, str) and len(notes) < MAX_BOOKMARKS:
                 notes.append(Bookmark(at_ns, text[:_MAX_NAME_LENGTH], is_note=True))
@@ -121,7 +121,7 @@ class Bookmarks:
             if self.path.stat().st_size > _MAX_FILE_BYTES:
                 raise ValueError("size")
             content = orjson.loads(self.path.read_bytes())
-            return [_bookmark(each) for each in content["bookmarks"]][:MAX_BOOKMARKS]
+            return [_parse_bookmark(each) for each in content["bookmarks"]][:MAX_BOOKMARKS]
         except FileNotFoundError:
             return []
         except (OSError, ValueError, TypeError, KeyError):
@@ -154,7 +154,7 @@ class Bookmarks:
         self._sort()
 
 
-def _bookmark(plain: object) -> Bookmark:
+def _parse_bookmark(plain: object) -> Bookmark:
     # Raises `ValueError`.
     at_ns = plain.get("at_ns") if isinstance(plain, dict) else None
     name = plain.get("name") if isinstance(plain, dict) else None

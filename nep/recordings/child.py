@@ -50,31 +50,31 @@ from nep.recordings.recorder import Recorder, TopicSelection
 from nep.recordings.ring import FlightRecorder, RingStatus
 from nep.recordings.writer import RecordingStatus, RecordingWriter
 
-FIGURES_S = 1.0
+STATS_INTERVAL_S = 1.0
 _MAX_LINE_BYTES = 1_000_000
 _MAX_SECONDS = 1e9
 _RUN_ROLES = ("runs", "alarms")
 """Roles that the command "say" accepts; the recorder itself writes the others."""
 _MAX_COPIES = 4
 """Maximum number of concurrent copies of the ring; each reads and writes at full disk speed."""
-Tell = Callable[[Mapping[str, object]], object]
+EventCallback = Callable[[Mapping[str, object]], object]
 
 
 @dataclass(frozen=True)
-class _OneRecording:
+class _ActiveRecording:
     """Current recording. Stops at the time `until` (of the clock) or at `most_bytes`, if set."""
 
     writer: RecordingWriter
     recorder: Recorder
     path: str
-    until: float | None
-    most_bytes: int | None
+    stop_at: float | None
+    max_bytes: int | None
 
-    def limit(self, now: float) -> str:
+    def reached_limit(self, now: float) -> str:
         # "time", "size" or "".
-        if self.until is not None and now >= self.until:
+        if self.stop_at is not None and now >= self.stop_at:
             return "time"
-        is_full = self.most_bytes is not None and self.writer.status.size_bytes >= self.most_bytes
+        is_full = self.max_bytes is not None and self.writer.status.size_bytes >= self.max_bytes
         return "size" if is_full else ""
 
 
@@ -84,16 +84,16 @@ class RecorderService:
     Args:
         node: Node that subscribes to the topics; stays open.
         tell: Called with events, from any thread, one at a time.
-        figures_s: Interval between "figures" events in seconds.
+        stats_interval_s: Interval between "figures" events in seconds.
         clock: Monotonic clock in seconds.
     """
 
     def __init__(
         self,
         node: Node,
-        tell: Tell,
+        tell: EventCallback,
         *,
-        figures_s: float = FIGURES_S,
+        stats_interval_s: float = STATS_INTERVAL_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Initialize the service; the node is not closed with it."""
@@ -102,7 +102,7 @@ class RecorderService:
         self._tell_lock = threading.Lock()
         self._lock = threading.RLock()
         """Lock that is held while a recording or the ring starts or stops."""
-        self._recording: _OneRecording | None = None
+        self._recording: _ActiveRecording | None = None
         self._ring: tuple[FlightRecorder, Recorder] | None = None
         self._copies: list[threading.Thread] = []
         self._is_ending = False
@@ -113,14 +113,14 @@ class RecorderService:
             "note": self._note,
             "say": self._write_entry,
             "ring": self._start_ring,
-            "keep": self._keep,
-            "end_ring": self._end_ring,
+            "keep": self._save_ring,
+            "end_ring": self._stop_ring,
         }
-        self._figures_s = figures_s
-        self._thread = threading.Thread(target=self._report_figures, name="recorder-figures", daemon=True)
+        self._stats_interval_s = stats_interval_s
+        self._thread = threading.Thread(target=self._report_stats, name="recorder-figures", daemon=True)
         self._thread.start()
 
-    def order(self, line: bytes) -> None:
+    def execute(self, line: bytes) -> None:
         """Execute the command in a line. Errors are reported as events, not raised."""
         try:
             order = orjson.loads(line)
@@ -129,7 +129,7 @@ class RecorderService:
         op = order.get("op") if isinstance(order, dict) else None
         carry_out = self._commands.get(op) if isinstance(op, str) else None
         if carry_out is None or not isinstance(order, dict):
-            self._problem(str(op), _("unknown command"))
+            self._report_problem(str(op), _("unknown command"))
             return
         path = order.get("path")
         with self._lock:
@@ -139,10 +139,10 @@ class RecorderService:
         try:
             work()
         except (NepError, OSError) as error:
-            self._problem(op, str(error), path)
+            self._report_problem(op, str(error), path)
         except (TypeError, ValueError, KeyError, OverflowError) as error:
             words = _("the command is invalid: {error}").format(error=error)
-            self._problem(op, words, path)
+            self._report_problem(op, words, path)
 
     def close(self) -> None:
         """Stop all recording and finish the file. Errors are reported as events, not raised."""
@@ -153,14 +153,14 @@ class RecorderService:
             thread.join()
         with self._lock:
             self._report_errors("stop", "", lambda: self._stop({}))
-            self._report_errors("end_ring", "", lambda: self._end_ring({}))
+            self._report_errors("end_ring", "", lambda: self._stop_ring({}))
 
     def report(self, event: str, **content: object) -> None:
         """Send an event to the parent process."""
         with self._tell_lock:
             self._report({"event": event, **content})
 
-    def _problem(self, op: str, sentence: str, path: str = "") -> None:
+    def _report_problem(self, op: str, sentence: str, path: str = "") -> None:
         self.report("problem", op=op, sentence=sentence, path=path)
 
     def _wake_on_failure(self, _reason: str) -> None:
@@ -172,11 +172,11 @@ class RecorderService:
     def _record(self, order: Mapping[str, Any]) -> None:
         path = _text(order, "path")
         if self._recording is not None:
-            self._problem("record", _("a recording is already running"), path)
+            self._report_problem("record", _("a recording is already running"), path)
             return
         selection = _selection(order)
         seconds, most_bytes = order.get("seconds"), order.get("size_bytes")
-        until = None if seconds is None else self._clock() + _positive(seconds)
+        until = None if seconds is None else self._clock() + _checked_duration_s(seconds)
         if most_bytes is not None and (type(most_bytes) is not int or most_bytes < 1):
             raise ValueError("size_bytes")
         writer = RecordingWriter(
@@ -191,7 +191,7 @@ class RecorderService:
             with suppress(OSError):  # the file is empty
                 Path(path).unlink()
             raise
-        self._recording = _OneRecording(writer, recorder, path, until, most_bytes)
+        self._recording = _ActiveRecording(writer, recorder, path, until, most_bytes)
         self._check_now.set()  # the limit may be reached before the next figures
         self.report("recording", path=path)
 
@@ -200,7 +200,7 @@ class RecorderService:
             return
         ended, self._recording = self._recording, None
         ended.recorder.close()
-        self.report("ended", path=ended.path, status=_plain(ended.writer.close()), limit=limit)
+        self.report("ended", path=ended.path, status=_status_to_plain(ended.writer.close()), limit=limit)
 
     def _note(self, order: Mapping[str, Any]) -> None:
         if self._recording is not None:
@@ -218,7 +218,7 @@ class RecorderService:
 
     def _start_ring(self, order: Mapping[str, Any]) -> None:
         if self._ring is not None:
-            self._problem("ring", _("the flight recorder is already on"))
+            self._report_problem("ring", _("the flight recorder is already on"))
             return
         selection = _selection(order)
         ring = FlightRecorder(
@@ -235,21 +235,21 @@ class RecorderService:
         self._ring = (ring, recorder)
         self.report("ring")
 
-    def _keep(self, order: Mapping[str, Any]) -> None:
+    def _save_ring(self, order: Mapping[str, Any]) -> None:
         # Copies in a thread, so that commands are still served.
         path = _text(order, "path")
         if self._ring is None:
-            self._problem("keep", _("the flight recorder is off"), path)
+            self._report_problem("keep", _("the flight recorder is off"), path)
             return
         self._copies = [each for each in self._copies if each.is_alive()]
         if len(self._copies) >= _MAX_COPIES:
-            self._problem("keep", _("the last seconds are already being saved"), path)
+            self._report_problem("keep", _("the last seconds are already being saved"), path)
             return
         ring = self._ring[0]
         seconds, note = float(order.get("seconds", 60.0)), _text(order, "note", "")
 
         def copy() -> None:
-            kept = ring.keep(path, seconds, note)
+            kept = ring.save(path, seconds, note)
             self.report(
                 "kept", path=path, message_count=kept.message_count, duration_s=kept.duration_s, note=note
             )
@@ -258,7 +258,7 @@ class RecorderService:
         self._copies.append(threading.Thread(target=work, name="recorder-keep", daemon=True))
         self._copies[-1].start()
 
-    def _end_ring(self, _order: Mapping[str, Any]) -> None:
+    def _stop_ring(self, _order: Mapping[str, Any]) -> None:
         if self._ring is None:
             return
         (ring, recorder), self._ring = self._ring, None
@@ -266,11 +266,11 @@ class RecorderService:
             thread.join()
         recorder.close()
         ring.close()
-        self.report("ring_ended", status=_plain(ring.status))
+        self.report("ring_ended", status=_status_to_plain(ring.status))
 
     # ---- once a second
 
-    def _report_figures(self) -> None:
+    def _report_stats(self) -> None:
         while True:
             self._check_now.wait(self._wait_s())
             self._check_now.clear()
@@ -281,28 +281,28 @@ class RecorderService:
             if recording is not None or ring is not None:
                 self.report(
                     "figures",
-                    recording=None if recording is None else _plain(recording.writer.status),
-                    ring=None if ring is None else _plain(ring[0].status),
+                    recording=None if recording is None else _status_to_plain(recording.writer.status),
+                    ring=None if ring is None else _status_to_plain(ring[0].status),
                     free_bytes=None if recording is None else _free_bytes(recording.path),
                 )
 
     def _wait_s(self) -> float:
         # Until the next figures, or the end of the recording if that is earlier.
         recording = self._recording
-        if recording is None or recording.until is None:
-            return self._figures_s
-        return max(0.0, min(self._figures_s, recording.until - self._clock()))
+        if recording is None or recording.stop_at is None:
+            return self._stats_interval_s
+        return max(0.0, min(self._stats_interval_s, recording.stop_at - self._clock()))
 
     def _stop_finished(self) -> None:
         # Stops what has failed or reached its limit.
         with self._lock:
             recording = self._recording
             if recording is not None:
-                limit = recording.limit(self._clock())
+                limit = recording.reached_limit(self._clock())
                 if limit or recording.writer.problem:
                     self._report_errors("stop", recording.path, lambda: self._stop({}, limit))
             if self._ring is not None and self._ring[0].status.problem:
-                self._report_errors("end_ring", "", lambda: self._end_ring({}))
+                self._report_errors("end_ring", "", lambda: self._stop_ring({}))
 
 
 def _free_bytes(path: str) -> int | None:
@@ -312,11 +312,11 @@ def _free_bytes(path: str) -> int | None:
     return None
 
 
-def _plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
+def _status_to_plain(status: RecordingStatus | RingStatus) -> dict[str, object]:
     return asdict(status)
 
 
-def _positive(seconds: object) -> float:
+def _checked_duration_s(seconds: object) -> float:
     # Raises `ValueError`.
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not 0.0 < seconds < _MAX_SECONDS:
         raise ValueError(_("{given} is not a time").format(given=seconds))
@@ -324,10 +324,10 @@ def _positive(seconds: object) -> float:
 
 
 def _selection(order: Mapping[str, Any]) -> TopicSelection:
-    return TopicSelection(_texts(order, "topics"), _texts(order, "left_out"))
+    return TopicSelection(_text_list(order, "topics"), _text_list(order, "left_out"))
 
 
-def _texts(order: Mapping[str, Any], key: str) -> tuple[str, ...]:
+def _text_list(order: Mapping[str, Any], key: str) -> tuple[str, ...]:
     value = order.get(key, [])
     if not isinstance(value, list) or not all(isinstance(each, str) for each in value):
         raise TypeError(key)
@@ -341,7 +341,7 @@ def _text(order: Mapping[str, Any], key: str, default: str | None = None) -> str
     return value
 
 
-def _lines(stream: IO[bytes]) -> Iterator[bytes]:
+def _read_lines(stream: IO[bytes]) -> Iterator[bytes]:
     # A line longer than any command is replaced by an empty one, which is not a command.
     is_inside = False
     while line := stream.readline(_MAX_LINE_BYTES):
@@ -367,7 +367,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     out = sys.stdout.buffer
 
-    def tell(event: Mapping[str, object]) -> None:
+    def write_event(event: Mapping[str, object]) -> None:
         try:
             out.write(orjson.dumps(event) + b"\n")
             out.flush()
@@ -375,12 +375,12 @@ def main(arguments: list[str] | None = None) -> None:
             return
 
     node = Node(f"nep-recorder-{os.getpid()}", options.transport, master=options.master, wait_s=None)
-    service = RecorderService(node, tell)
+    service = RecorderService(node, write_event)
     _stop_on_signals()
     service.report("ready")
     try:
-        for line in _lines(sys.stdin.buffer):
-            service.order(line)
+        for line in _read_lines(sys.stdin.buffer):
+            service.execute(line)
     except KeyboardInterrupt:
         pass
     finally:

@@ -22,7 +22,7 @@ from nep.recordings.reader import Recording
 _MAX_ENTRIES = 100_000
 _COPIED_ROLES = frozenset({"notes", "runs", "alarms", "alerts"})
 _FLUSH_INTERVAL_NS = 500_000_000
-_FIGURES_INTERVAL_NS = 1_000_000_000
+_STATS_INTERVAL_NS = 1_000_000_000
 _OWN_METADATA = frozenset({"nep.recording", "nep.figures"})
 
 
@@ -49,7 +49,7 @@ def copy_part(
     writer = FileWriter(path, is_new=False, profile=recording.facts.profile)
     try:
         copy = _Copy(recording, writer, topics, copied)
-        for raw in recording.file.raw(*span, copy.channels):
+        for raw in recording.file.read_raw(*span, copy.channels):
             copy.add(raw)
         copy.finish()
     except BaseException:
@@ -72,16 +72,16 @@ class _Copy:
             if role in _COPIED_ROLES:
                 self._roles[channel] = role
             elif role is None and definition.topic in topics:
-                self._numbers[channel] = self._number(channel)
+                self._numbers[channel] = self._channel_number(channel)
         self.channels = frozenset((*self._roles, *self._numbers))
         writer.define(dict.fromkeys(self._numbers.values()))
-        self._figures = _Figures(recording) if recording.figures() else None
+        self._figures = _StatsCounter(recording) if recording.stats() else None
         self._last_entries: dict[tuple[str, str], object] = {}
         self._entry_count = 0
         self._chunk_ns: int | None = None
         self._last_ns = 0
 
-    def _number(self, channel: int) -> int:
+    def _channel_number(self, channel: int) -> int:
         number = self._writer.table.number(self._recording.facts.channels[channel])
         if number is None:
             raise RecordingError(str(self._path), _("it has too many channels"))
@@ -92,14 +92,14 @@ class _Copy:
             self._copy_entry(raw)
             return
         self._last_ns = raw.log_ns
-        self._put(self._numbers[raw.channel], raw)
+        self._write_message(self._numbers[raw.channel], raw)
         self.count += 1
         self._copied()
         if self._figures is not None:
             self._figures.add(raw)
-            self._write_figures(raw.log_ns)
+            self._write_stats(raw.log_ns)
 
-    def _put(self, number: int, raw: RawMessage) -> None:
+    def _write_message(self, number: int, raw: RawMessage) -> None:
         self._writer.add(number, (raw.log_ns, raw.publish_ns), raw.sequence, b"", bytes(raw.data))
         if self._chunk_ns is None:
             self._chunk_ns = raw.log_ns
@@ -121,9 +121,9 @@ class _Copy:
             self._last_entries[role, id] = value
         if self._entry_count < _MAX_ENTRIES:
             self._entry_count += 1
-            self._put(self._number(raw.channel), raw)
+            self._write_message(self._channel_number(raw.channel), raw)
 
-    def _write_figures(self, at_ns: int, *, is_final: bool = False) -> None:
+    def _write_stats(self, at_ns: int, *, is_final: bool = False) -> None:
         record = None if self._figures is None else self._figures.record(at_ns, is_final=is_final)
         number = None if record is None else self._writer.table.number(own_channel("figures"))
         if record is not None and number is not None:
@@ -131,25 +131,25 @@ class _Copy:
 
     def finish(self) -> None:
         recording, writer = self._recording, self._writer
-        self._write_figures(self._last_ns, is_final=True)
+        self._write_stats(self._last_ns, is_final=True)
         writer.flush()
-        if self._figures is not None or recording.words:
+        if self._figures is not None or recording.recorder_metadata:
             words = {
                 "started_ns": str(writer.start_ns or 0),
                 "ended_ns": str(writer.end_ns),
-                "note": recording.words.get("note", ""),
+                "note": recording.recorder_metadata.get("note", ""),
                 "end": "",
             }
             writer.add_metadata("nep.recording", words)
         if self._figures is not None:
-            writer.add_metadata("nep.figures", self._figures.plain())
+            writer.add_metadata("nep.figures", self._figures.to_plain())
         for name, values in recording.facts.metadata:
             if name not in _OWN_METADATA:
                 writer.add_metadata(name, values)
         writer.finish()
 
 
-class _Figures:
+class _StatsCounter:
     """Counter of the lost and late messages within the part."""
 
     def __init__(self, recording: Recording) -> None:
@@ -167,18 +167,18 @@ class _Figures:
     def record(self, at_ns: int, *, is_final: bool) -> bytes | None:
         # Changed counts once a second; all of them at the end.
         if self._next_ns is None:
-            self._next_ns = at_ns + _FIGURES_INTERVAL_NS
+            self._next_ns = at_ns + _STATS_INTERVAL_NS
         if not is_final and at_ns < self._next_ns:
             return None
-        self._next_ns = at_ns + _FIGURES_INTERVAL_NS
+        self._next_ns = at_ns + _STATS_INTERVAL_NS
         counters = dict(self._counters) if is_final else dict(changed(self._counters))
-        plain = {topic: each.figures().to_plain() for topic, each in counters.items()}
+        plain = {topic: each.stats().to_plain() for topic, each in counters.items()}
         for each in counters.values():
             each.is_changed = False
         return orjson.dumps({"topics": plain, "is_final": is_final})
 
-    def plain(self) -> dict[str, str]:
+    def to_plain(self) -> dict[str, str]:
         return {
-            topic: orjson.dumps(each.figures().to_plain()).decode()
+            topic: orjson.dumps(each.stats().to_plain()).decode()
             for topic, each in sorted(self._counters.items())
         }

@@ -20,7 +20,7 @@ from nep.errors import DecodeError, RecordingError, RecordingsUnavailableError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.copy_part import copy_part
-from nep.recordings.film import Container, Film, available_container, frame_of
+from nep.recordings.film import Container, VideoFile, available_container, frame_of
 from nep.recordings.formats.destination import disk_error
 from nep.recordings.reader import RecordedMessage, Recording
 from nep.system.replace_file import replace_file
@@ -54,11 +54,11 @@ class Part:
     topics: Collection[str] | None = None
 
 
-ALL_OF_IT = Part()
+FULL_RECORDING = Part()
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedFile:
     """Exported file or folder.
 
     Attributes:
@@ -71,18 +71,18 @@ class Exported:
     topic: str
     path: Path
     count: int
-    unreadable: int
+    undecodable_count: int
 
 
 def export(
     recording: Recording,
     kind: str,
     folder: Path,
-    part: Part = ALL_OF_IT,
+    part: Part = FULL_RECORDING,
     *,
     fps: float = _FPS,
     progress: Progress | None = None,
-) -> list[Exported]:
+) -> list[ExportedFile]:
     """Export a recording to files in a folder, which is created if needed.
 
     A video is written as .avi if this computer can't write MP4.
@@ -107,16 +107,19 @@ def export(
         raise ValueError(_("unknown format '{kind}'").format(kind=kind))
     topics, counted = _suitable_topics(recording, kind, part, progress)
     if kind == "mcap":
-        return [_mcap(recording, folder, replace(part, topics=topics), counted)]
+        return [_write_mcap(recording, folder, replace(part, topics=topics), counted)]
     make: Callable[[_Source, Path, float], int]
     exported, used_names = [], set[str]()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if kind == "mp4":
             container = available_container(_opencv(), folder)
-            make, suffix = partial(_film, container=container), container.suffix
+            make, suffix = partial(_write_video, container=container), container.suffix
         else:
-            make, suffix = {"csv": _csv, "parquet": _parquet, "pictures": _pictures}[kind], _SUFFIXES[kind]
+            make, suffix = (
+                {"csv": _write_csv, "parquet": _write_parquet, "pictures": _write_pictures}[kind],
+                _SUFFIXES[kind],
+            )
         for topic in topics:
             path = folder / _file_name(topic, used_names, suffix)
             if path.exists():
@@ -129,13 +132,13 @@ def export(
             except BaseException:
                 _remove(unfinished)
                 raise
-            exported.append(Exported(topic, path, count, source.unreadable))
+            exported.append(ExportedFile(topic, path, count, source.unreadable))
     except OSError as error:
         raise disk_error(folder, error) from error
     return exported
 
 
-def takes(kind: str, codec: str) -> bool:
+def can_export(kind: str, codec: str) -> bool:
     """Return True if messages of a codec can be exported to a format."""
     if kind in {"pictures", "mp4"}:
         return codec == "image"
@@ -149,7 +152,7 @@ def _suitable_topics(
     topics = [
         name
         for name, each in recording.topics.items()
-        if (part.topics is None or name in part.topics) and takes(kind, each.codec)
+        if (part.topics is None or name in part.topics) and can_export(kind, each.codec)
     ]
     if not topics:
         reason = {
@@ -240,7 +243,7 @@ class _Source:
         self.unreadable = 0
         for each in self.messages(is_counted=is_counted):
             try:
-                values = flattened(each.message.payload)
+                values = flatten(each.message.payload)
             except (DecodeError, RecursionError):
                 self.unreadable += 1
                 continue
@@ -268,7 +271,7 @@ def _encodable(text: str) -> str:
     return text if text.isascii() else text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-def flattened(payload: object) -> dict[str, object]:
+def flatten(payload: object) -> dict[str, object]:
     """Return the scalar values of a payload by field path, such as "pose.x" and "joints[3]".
 
     The key for a scalar payload is "value".
@@ -313,7 +316,7 @@ def _columns(source: _Source) -> dict[str, set[type]]:
 # ---- MCAP
 
 
-def _mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) -> Exported:
+def _write_mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) -> ExportedFile:
     # Copies bytes, sequence numbers, times, and the recorder's own entries. Raises `RecordingError`.
     path = folder / f"{recording.path.stem}.mcap"
     unfinished = path.with_name(f"{path.name}.part")
@@ -332,13 +335,13 @@ def _mcap(recording: Recording, folder: Path, part: Part, counted: _Progress) ->
         if isinstance(error, OSError):
             raise disk_error(path, error) from error
         raise
-    return Exported("", path, count, 0)
+    return ExportedFile("", path, count, 0)
 
 
 # ---- tables
 
 
-def _csv(source: _Source, path: Path, _fps: float) -> int:
+def _write_csv(source: _Source, path: Path, _fps: float) -> int:
     columns = list(_columns(source))
     count = 0
     with path.open("x", encoding="utf-8", newline="") as file:
@@ -358,7 +361,7 @@ def _cell(value: object) -> object:
     return value
 
 
-def _parquet(source: _Source, path: Path, _fps: float) -> int:
+def _write_parquet(source: _Source, path: Path, _fps: float) -> int:
     try:
         import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - optional and heavy
         import pyarrow.parquet as pq  # type: ignore[import-untyped]  # noqa: PLC0415
@@ -379,7 +382,7 @@ def _parquet(source: _Source, path: Path, _fps: float) -> int:
         rows: list[dict[str, object]] = []
 
         def write() -> None:
-            table = {name: [_as(kinds[name], row.get(name)) for row in rows] for name in kinds}
+            table = {name: [_convert(kinds[name], row.get(name)) for row in rows] for name in kinds}
             writer.write_table(pa.table(table, schema=schema))
             rows.clear()
 
@@ -405,7 +408,7 @@ def _kind_of(name: str, types: set[type]) -> str:
     return "text"
 
 
-def _as(kind: str, value: object) -> object:
+def _convert(kind: str, value: object) -> object:
     # Values that don't fit, such as ints beyond 64 bits, are left out.
     if value is None:
         return None
@@ -423,7 +426,7 @@ def _as(kind: str, value: object) -> object:
 # ---- images
 
 
-def _pictures(source: _Source, path: Path, _fps: float) -> int:
+def _write_pictures(source: _Source, path: Path, _fps: float) -> int:
     # JPEG and PNG files unchanged; raw images as PNG, or raw where PNG lacks the number type.
     path.mkdir()
     count = 0
@@ -464,10 +467,10 @@ def _opencv() -> Any:  # noqa: ANN401 - a module
     return cv2
 
 
-def _film(source: _Source, path: Path, fps: float, container: Container) -> int:
+def _write_video(source: _Source, path: Path, fps: float, container: Container) -> int:
     # Constant frame rate in recording time: each frame is the newest image.
     opencv = _opencv()
-    film = Film(opencv, path, fps, container)
+    film = VideoFile(opencv, path, fps, container)
     count = 0
     try:
         for each in source.messages():

@@ -21,7 +21,14 @@ from nep.errors import ClosedError
 from nep.recordings.formats.channels import ChannelDefinition
 from nep.recordings.formats.compression import check_packages
 from nep.recordings.formats.destination import disk_error
-from nep.recordings.formats.index import AttachedFile, Damage, FileIndex, read_chunk, read_entries, read_index
+from nep.recordings.formats.index import (
+    AttachedFile,
+    CorruptRange,
+    FileIndex,
+    read_chunk,
+    read_entries,
+    read_index,
+)
 from nep.recordings.formats.limits import ReadBudget
 from nep.recordings.formats.records import ChunkInfo, RawMessage, messages_in
 
@@ -79,10 +86,10 @@ class RawFile(Protocol):
         """Properties of the file."""
 
     @property
-    def damage(self) -> Sequence[Damage]:
+    def corruption(self) -> Sequence[CorruptRange]:
         """Unreadable pieces of the file found so far."""
 
-    def raw(
+    def read_raw(
         self,
         start_ns: int | None,
         end_ns: int | None,
@@ -109,7 +116,7 @@ class RawFile(Protocol):
     ) -> dict[int, Sequence[int]]:
         """Return the number of messages by channel in each of ``buckets`` equal parts of [start, end)."""
 
-    def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
+    def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
         """Return the numbers of the chunks that contain messages of these channels, in order."""
 
     def close(self) -> None:
@@ -175,7 +182,7 @@ class FileReader:
         self.path = Path(path)
         self._lock = threading.RLock()
         self._budget = budget
-        self._damaged: dict[int, Damage] = {}
+        self._damaged: dict[int, CorruptRange] = {}
         self._unreadable: set[int] = set()
         self._cache: OrderedDict[int, _LoadedChunk] = OrderedDict()
         self._cache_bytes, self._cached_bytes = cache_bytes, 0
@@ -217,7 +224,7 @@ class FileReader:
         if counts is None or len(self._chunks) <= _MAX_COUNTED_CHUNKS:
             counts = {}
             for at in range(len(self._chunks)):
-                for channel, count in self._counts(at).items():
+                for channel, count in self._chunk_counts(at).items():
                     counts[channel] = counts.get(channel, 0) + count
         return FileFacts(
             index.definitions.channels,
@@ -239,12 +246,12 @@ class FileReader:
         return self._facts
 
     @property
-    def damage(self) -> Sequence[Damage]:
+    def corruption(self) -> Sequence[CorruptRange]:
         """Unreadable pieces of the file found so far."""
         with self._lock:
             return tuple(
                 sorted(
-                    (*self._index.damage, *self._damaged.values()),
+                    (*self._index.corruption, *self._damaged.values()),
                     key=lambda each: (each.start_ns, each.offset),
                 )
             )
@@ -255,7 +262,7 @@ class FileReader:
 
     # ---- reading
 
-    def raw(
+    def read_raw(
         self,
         start_ns: int | None,
         end_ns: int | None,
@@ -272,8 +279,8 @@ class FileReader:
             messages.sort(key=_log_ns)  # usually sorted, which costs no time
             following = numbers[at + 1] if at + 1 < len(numbers) else None
             limit = 2**64 if following is None else self._starts[following]
-            held += self._size(number)
-            if following is None or held + self._size(following) > _MAX_HELD_BYTES:
+            held += self._chunk_size(number)
+            if following is None or held + self._chunk_size(following) > _MAX_HELD_BYTES:
                 limit = 2**64
             until = 0 if pending else bisect_left(messages, limit, key=_log_ns)
             yield from messages[:until]
@@ -286,7 +293,7 @@ class FileReader:
             if not pending:
                 held = 0
 
-    def _size(self, number: int) -> int:
+    def _chunk_size(self, number: int) -> int:
         return self._chunks[number].uncompressed_bytes
 
     def _chunks_in(
@@ -368,7 +375,7 @@ class FileReader:
         record = next(messages_in(chunk.data, offset), None)
         if not isinstance(record, RawMessage) or record.channel != channel:
             return None
-        return self._detached(record, chunk)
+        return self._detach(record, chunk)
 
     # ---- counts
 
@@ -388,23 +395,23 @@ class FileReader:
         span = end_ns - start_ns
         for number in range(first, last):
             chunk = self._chunks[number]
-            for channel, count in self._counts(number).items():
+            for channel, count in self._chunk_counts(number).items():
                 if channel not in channels:
                     continue
                 counts = result.setdefault(channel, [0] * buckets)
                 if not is_exact:
-                    _spread(counts, (start_ns, end_ns), (chunk.start_ns, chunk.end_ns), count)
+                    _distribute(counts, (start_ns, end_ns), (chunk.start_ns, chunk.end_ns), count)
                     continue
                 for log_ns, _offset in self._entries(number, channel):
                     if start_ns <= log_ns < end_ns:
                         counts[(log_ns - start_ns) * buckets // span] += 1
         return dict(result)
 
-    def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
+    def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
         """Return the numbers of the chunks with messages of these channels. See `RawFile.pieces_of`."""
         return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
 
-    def _counts(self, number: int) -> Mapping[int, int]:
+    def _chunk_counts(self, number: int) -> Mapping[int, int]:
         # Reads the chunk if it has no indexes.
         chunk = self._chunks[number]
         counts = chunk.counts
@@ -444,9 +451,9 @@ class FileReader:
         chunk = self._chunk(number)
         if chunk is not None:
             for each in chunk.messages(self._chunks[number], channels):
-                yield self._detached(each, chunk)
+                yield self._detach(each, chunk)
 
-    def _detached(self, raw: RawMessage, chunk: _LoadedChunk) -> RawMessage:
+    def _detach(self, raw: RawMessage, chunk: _LoadedChunk) -> RawMessage:
         if len(chunk.data) <= _LARGE_CHUNK_BYTES:
             return raw
         return raw._replace(data=memoryview(bytes(raw.data)))
@@ -464,11 +471,11 @@ class FileReader:
             info = self._chunks[number]
             if self._budget is not None:
                 self._budget.spend(max(info.length, info.uncompressed_bytes))
-            self._make_room(info.uncompressed_bytes)
+            self._evict_chunks(info.uncompressed_bytes)
             try:
                 chunk = _LoadedChunk(read_chunk(self._file, info))
             except (ValueError, OSError) as error:
-                self._damaged[number] = self._damage_of(info)
+                self._damaged[number] = self._corrupt_range(info)
                 if isinstance(error, ValueError):  # an I/O error may be temporary
                     self._unreadable.add(number)
                 return None
@@ -477,7 +484,7 @@ class FileReader:
             self._cached_bytes += len(chunk.data)
             return chunk
 
-    def _damage_of(self, info: ChunkInfo) -> Damage:
+    def _corrupt_range(self, info: ChunkInfo) -> CorruptRange:
         counts = info.counts
         own = {
             number
@@ -486,9 +493,9 @@ class FileReader:
         }
         is_known = len(counts) == info.channel_count > 0
         count = sum(many for channel, many in counts.items() if channel not in own) if is_known else None
-        return Damage(info.offset, info.length, info.start_ns, info.end_ns, count)
+        return CorruptRange(info.offset, info.length, info.start_ns, info.end_ns, count)
 
-    def _make_room(self, size: int) -> None:
+    def _evict_chunks(self, size: int) -> None:
         while self._cache and self._cached_bytes + size > self._cache_bytes:
             self._cached_bytes -= len(self._cache.popitem(last=False)[1].data)
 
@@ -510,7 +517,7 @@ class FileReader:
         self.close()
 
 
-def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], count: int) -> None:
+def _distribute(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], count: int) -> None:
     # Distributes messages evenly over the chunk's time.
     (start, end), (chunk_start, chunk_end), buckets = whole, chunk, len(counts)
     first = (chunk_start - start) * buckets // (end - start)
@@ -520,7 +527,7 @@ def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], c
             counts[first] += count
         return
 
-    def until(at: int) -> int:
+    def count_until(at: int) -> int:
         if at < first:
             return 0
         if at >= last:
@@ -529,9 +536,9 @@ def _spread(counts: list[int], whole: tuple[int, int], chunk: tuple[int, int], c
         return count * (part_end - chunk_start) // (chunk_end - chunk_start)
 
     shown = range(max(0, first), min(last, buckets - 1) + 1)
-    before = until(shown.start - 1)
+    before = count_until(shown.start - 1)
     for at in shown:
-        total = until(at)
+        total = count_until(at)
         counts[at] += total - before
         before = total
 

@@ -17,7 +17,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.system.replace_file import replace_file
 
-MAX_S = 86_400.0
+MAX_DURATION_S = 86_400.0
 """Maximum duration in seconds; an image from another day would cause millions of frames."""
 _TRIAL_SIZE_PX = (64, 48)
 
@@ -30,7 +30,7 @@ class Container:
     fourcc: str
     api: str
 
-    def writer(self, opencv: Any, path: Path, fps: float, size: tuple[int, int]) -> Any:  # noqa: ANN401
+    def new_writer(self, opencv: Any, path: Path, fps: float, size: tuple[int, int]) -> Any:  # noqa: ANN401
         """Create an OpenCV writer for a file; check `isOpened` of the writer."""
         code = opencv.VideoWriter_fourcc(*self.fourcc)
         return opencv.VideoWriter(str(path), getattr(opencv, self.api), code, fps, size)
@@ -47,7 +47,9 @@ def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401
     """
     with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as trial:
         for container in CONTAINERS:
-            writer = container.writer(opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TRIAL_SIZE_PX)
+            writer = container.new_writer(
+                opencv, Path(trial) / f"trial{container.suffix}", 30.0, _TRIAL_SIZE_PX
+            )
             is_open = writer.isOpened()
             writer.release()
             if is_open:
@@ -70,7 +72,7 @@ def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
     return frame[:, :, :3].copy()
 
 
-class Film:
+class VideoFile:
     """Video file with a constant frame rate. The first image determines the frame size."""
 
     def __init__(
@@ -97,11 +99,11 @@ class Film:
         if self._film is None:
             height, width = frame.shape[:2]
             self._size = (width // 2 * 2 or 2, height // 2 * 2 or 2)
-            self._film = self._container.writer(self._opencv, self._written, self._fps, self._size)
+            self._film = self._container.new_writer(self._opencv, self._written, self._fps, self._size)
             if not self._film.isOpened():
                 raise RecordingError(str(self._path), _("OpenCV can't write videos on this computer"))
             self._start_ns = log_ns
-        if log_ns - self._start_ns > MAX_S * 1e9:
+        if log_ns - self._start_ns > MAX_DURATION_S * 1e9:
             raise RecordingError(str(self._path), _("its images span more than a day; choose a shorter part"))
         until = int((log_ns - self._start_ns) * self._fps / 1e9)
         while self._last is not None and self._frames < until:

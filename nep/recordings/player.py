@@ -24,8 +24,8 @@ from nep.programs.robots.moving import (
     DESCRIPTION_TYPE,
     MovingTopics,
     RobotControls,
-    controls_in,
     described_name,
+    parse_controls,
 )
 from nep.recordings.reader import RecordedMessage, Recording
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = [
     "SPEED_MAX",
     "SPEED_MIN",
-    "Due",
+    "DueMessages",
     "Playback",
     "Player",
     "PlayerStatus",
@@ -83,7 +83,7 @@ class PlayerStatus:
 
 
 @dataclass(frozen=True)
-class Due:
+class DueMessages:
     """Messages that are due now.
 
     Attributes:
@@ -143,28 +143,28 @@ class Playback:
         """Start to play; from the beginning if the position is at the end."""
         if not self._is_playing:
             if self._is_at_end():
-                self.begin()
+                self.rewind()
             self._is_playing = True
-            self._anchor_here()
+            self._set_anchor()
 
     def pause(self) -> None:
         """Pause the playback at the current position."""
         if self._is_playing:
             self._is_playing = False
-            self._anchor_here()
+            self._set_anchor()
 
     def seek(self, at_ns: int) -> None:
         """Move to a time. The newest message of each topic at or before that time becomes due at once."""
         at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
-        self._show_and_read_from(at_ns, at_ns)
+        self._jump_to(at_ns, at_ns)
 
-    def _show_and_read_from(self, shown_ns: int, at_ns: int) -> None:
+    def _jump_to(self, shown_ns: int, at_ns: int) -> None:
         # The state at `shown_ns` becomes due at once, later messages at their time.
         self._position_ns, self._shown_ns = at_ns, shown_ns
         newest = self._recording.newest(shown_ns, self._topics)
-        self._jump = [self._renamed(each.message) for each in sorted(newest.values(), key=_log_ns)]
+        self._jump = [self._rename(each.message) for each in sorted(newest.values(), key=_log_ns)]
         self._read_from(shown_ns + 1)
-        self._anchor_here()
+        self._set_anchor()
 
     def step(self, topic: str, *, forward: bool = True) -> bool:
         """Move to the next or previous message of a topic, and pause; return False if there is none."""
@@ -176,7 +176,7 @@ class Playback:
         self.seek(found.log_ns)
         return True
 
-    def choose(self, topics: Collection[str]) -> Sequence[Message]:
+    def select_topics(self, topics: Collection[str]) -> Sequence[Message]:
         """Replace the topics to play.
 
         Returns:
@@ -185,11 +185,11 @@ class Playback:
         new = set(topics) if self._topics is None else set(topics).difference(self._topics)
         self._topics = frozenset(topics)
         if self._jump is not None:
-            self._show_and_read_from(self._shown_ns, self._position_ns)
+            self._jump_to(self._shown_ns, self._position_ns)
             return ()
         self._read_from(self._from_ns)
         newest = self._recording.newest(self._from_ns - 1, new) if new else {}
-        return [self._renamed(each.message) for each in sorted(newest.values(), key=_log_ns)]
+        return [self._rename(each.message) for each in sorted(newest.values(), key=_log_ns)]
 
     @property
     def speed(self) -> float:
@@ -205,7 +205,7 @@ class Playback:
                 )
             )
         self._speed = speed
-        self._anchor_here()
+        self._set_anchor()
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
         """Repeat a part of the recording, or the whole recording. Raises `ValueError` for an empty part."""
@@ -221,19 +221,19 @@ class Playback:
                 self.seek(start_ns)
         self._is_looping = True
 
-    def end_loop(self) -> None:
+    def clear_loop(self) -> None:
         """Stop repeating, and play beyond the end of the part."""
         self._is_looping, self._loop = False, None
 
-    def once(self) -> None:
+    def play_once(self) -> None:
         """Stop repeating; playback ends at the end of the part."""
         self._is_looping = False
 
-    def begin(self) -> None:
+    def rewind(self) -> None:
         """Move before the first message of the part without making messages due at once."""
         self._position_ns, self._jump = self._first_ns(), None
         self._read_from(self._position_ns)
-        self._anchor_here()
+        self._set_anchor()
 
     # ---- timing
 
@@ -249,27 +249,27 @@ class Playback:
             self._is_looping,
         )
 
-    def advance(self) -> Due:
+    def advance(self) -> DueMessages:
         """Return the messages that are due. Call this again within `wait_s` seconds."""
         if self._jump is not None:
             messages, self._jump = self._jump, None
-            return Due(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
+            return DueMessages(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
         if not self._is_playing:
-            return Due((), is_jump=False, wait_s=None)
+            return DueMessages((), is_jump=False, wait_s=None)
         target = min(self._target(), self._last_ns())
-        due = self._due(target)
+        due = self._pop_due(target)
         if len(due) >= _MAX_BATCH and self._next is not None and self._next.log_ns <= target:
             self._position_ns = due[-1].log_ns
-            self._anchor_here(is_measured=False)
+            self._set_anchor(is_measured=False)
         else:
             self._position_ns = target
-        self._measure()
+        self._record_progress()
         if self._position_ns >= self._last_ns():
             self._handle_end()
-        messages = [self._renamed(each.message) for each in due]
-        return Due(messages, False, self._wait_s(), [each.log_ns for each in due])
+        messages = [self._rename(each.message) for each in due]
+        return DueMessages(messages, False, self._wait_s(), [each.log_ns for each in due])
 
-    def shown_first(self, topics: Collection[str]) -> Sequence[Message]:
+    def messages_at_start(self, topics: Collection[str]) -> Sequence[Message]:
         """Return the messages at the start of the part if a jump has already shown them.
 
         For sinks that ignore jumps: these messages are not due again, so such a sink would miss them when
@@ -279,7 +279,7 @@ class Playback:
         if self._position_ns != first_ns or self._from_ns != first_ns + 1:
             return ()
         messages = self._recording.read(first_ns, first_ns + 1, topics)
-        return [self._renamed(each.message) for each in messages]
+        return [self._rename(each.message) for each in messages]
 
     def _target(self) -> int:
         now = self._clock()
@@ -291,7 +291,7 @@ class Playback:
             return limit
         return max(target, self._position_ns)
 
-    def _due(self, until_ns: int) -> list[RecordedMessage]:
+    def _pop_due(self, until_ns: int) -> list[RecordedMessage]:
         due: list[RecordedMessage] = []
         while self._next is not None and self._next.log_ns <= until_ns and len(due) < _MAX_BATCH:
             due.append(self._next)
@@ -305,7 +305,7 @@ class Playback:
 
     def _handle_end(self) -> None:
         if self._is_looping and self._last_ns() > self._first_ns():
-            self._show_and_read_from(self._first_ns() - 1, self._first_ns())
+            self._jump_to(self._first_ns() - 1, self._first_ns())
         elif self._next is None or self._next.log_ns > self._last_ns():
             self._is_playing = False
             self._progress.clear()
@@ -334,12 +334,12 @@ class Playback:
         self._upcoming = self._recording.read(at_ns, None, self._topics)
         self._next = next(self._upcoming, None)
 
-    def _anchor_here(self, *, is_measured: bool = True) -> None:
+    def _set_anchor(self, *, is_measured: bool = True) -> None:
         self._anchor = (self._clock(), self._position_ns)
         if is_measured:
             self._progress.clear()
 
-    def _measure(self) -> None:
+    def _record_progress(self) -> None:
         now = self._clock()
         self._progress.append((now, self._position_ns))
         while len(self._progress) > 2 and self._progress[0][0] < now - _SPEED_WINDOW_S:
@@ -351,7 +351,7 @@ class Playback:
         (started, from_ns), (now, to_ns) = self._progress[0], self._progress[-1]
         return (to_ns - from_ns) / 1e9 / (now - started) if now > started else None
 
-    def _renamed(self, message: Message) -> Message:
+    def _rename(self, message: Message) -> Message:
         # Applies `remap`.
         new = self._remap.get(message.topic)
         if new is None:
@@ -381,7 +381,7 @@ def moving_topics(recording: Recording) -> MovingTopics:
     robots = dict[RobotControls, None]()
     for _at, message in recording.read(topics=described) if described else ():
         with suppress(NepError):
-            found = controls_in(message.payload, described_name(message.topic))
+            found = parse_controls(message.payload, described_name(message.topic))
             if found is not None and len(robots) < _MAX_DESCRIPTIONS:
                 robots[found] = None
     typed = (each.name for each in recording.topics.values() if each.msg_type in _COMMAND_TYPES)
@@ -429,7 +429,7 @@ class Player:
         self._thread = threading.Thread(target=self._run, name="recording-player", daemon=True)
         self._thread.start()
 
-    def order(self, change: Callable[[Playback], object]) -> PlayerStatus:
+    def apply(self, change: Callable[[Playback], object]) -> PlayerStatus:
         """Change the playback and return its state: `player.order(Playback.play)`. Exceptions propagate."""
         with self._lock:
             change(self._playback)

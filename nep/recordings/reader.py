@@ -13,8 +13,8 @@ import orjson
 from nep.messages.message import Message
 from nep.recordings.file_reader import CACHE_BYTES, FileFacts, FileReader, RawFile
 from nep.recordings.formats.channels import ChannelDecoder, ChannelDefinition, Role
-from nep.recordings.formats.figures import TopicFigures, read_figures
-from nep.recordings.formats.index import Damage
+from nep.recordings.formats.figures import TopicStats, parse_stats
+from nep.recordings.formats.index import CorruptRange
 from nep.recordings.formats.records import RawMessage
 
 if TYPE_CHECKING:
@@ -154,17 +154,17 @@ class Recording:
         return self.facts.size_bytes
 
     @property
-    def damage(self) -> Sequence[Damage]:
+    def corruption(self) -> Sequence[CorruptRange]:
         """Unreadable pieces of the file found so far."""
-        return self.file.damage
+        return self.file.corruption
 
     @property
-    def damaged_chunks(self) -> int:
+    def corrupt_range_count(self) -> int:
         """Number of unreadable pieces found so far."""
-        return len(self.file.damage)
+        return len(self.file.corruption)
 
     @property
-    def words(self) -> Mapping[str, str]:
+    def recorder_metadata(self) -> Mapping[str, str]:
         """Metadata written by the recorder, as far as known: "note", "end", "started_ns", "ended_ns"."""
         metadata: dict[str, str] = {}
         for name, values in self.facts.metadata:
@@ -172,51 +172,51 @@ class Recording:
                 metadata.update(values)
         return metadata
 
-    def figures(self) -> dict[str, TopicFigures]:
+    def stats(self) -> dict[str, TopicStats]:
         """Return the recorder's counts by topic; empty for recordings of other programs.
 
         A complete recording has the counts in its metadata. Otherwise they are collected from the recorder's
         entries, which are written once a second.
         """
-        totals: dict[str, TopicFigures] = {}
+        totals: dict[str, TopicStats] = {}
         for name, values in self.facts.metadata:
             if name == "nep.figures":
                 for topic, text in values.items():
-                    known = read_figures(text)
+                    known = parse_stats(text)
                     if known is not None:
                         totals[topic] = known
         if totals:
             return totals
-        for _log_ns, each in self.figures_over_time():
+        for _log_ns, each in self.stats_over_time():
             totals.update(each)
         return totals
 
-    def figure_pieces(self) -> Sequence[int]:
+    def stats_chunks(self) -> Sequence[int]:
         """Return the pieces of the file that contain counts, sorted by time, without reading them."""
-        return self.file.pieces_of(self._channels_with("figures"))
+        return self.file.chunks_with(self._channels_with("figures"))
 
-    def figures_over_time(
+    def stats_over_time(
         self, pieces: Collection[int] | None = None
-    ) -> Iterator[tuple[int, dict[str, TopicFigures]]]:
+    ) -> Iterator[tuple[int, dict[str, TopicStats]]]:
         """Iterate over (time, changed counts by topic), to locate losses in time.
 
         Args:
             pieces: Pieces to read, from `figure_pieces`; None for the whole file.
         """
-        for log_ns, value in self.said("figures", pieces):
+        for log_ns, value in self.entries("figures", pieces):
             topics = value.get("topics") if isinstance(value, dict) else None
             if isinstance(topics, dict):
-                parsed = {str(topic): read_figures(each) for topic, each in topics.items()}
+                parsed = {str(topic): parse_stats(each) for topic, each in topics.items()}
                 yield log_ns, {topic: each for topic, each in parsed.items() if each is not None}
 
-    def said(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
+    def entries(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
         """Iterate over (time, value) of the recorder's own entries of a role, such as "alerts" or "notes".
 
         Args:
             role: Role of the entries.
             pieces: Pieces of the file to read; None for the whole file.
         """
-        for raw in self.file.raw(None, None, self._channels_with(role), pieces):
+        for raw in self.file.read_raw(None, None, self._channels_with(role), pieces):
             try:
                 yield raw.log_ns, orjson.loads(raw.data)
             except orjson.JSONDecodeError:
@@ -255,7 +255,7 @@ class Recording:
 
         Arguments are those of `read`.
         """
-        return self.file.raw(start_ns, end_ns, self._channels(topics))
+        return self.file.read_raw(start_ns, end_ns, self._channels(topics))
 
     def _channels(self, topics: Collection[str] | None) -> set[int]:
         if topics is None:
@@ -264,7 +264,7 @@ class Recording:
 
     def newest(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, RecordedMessage]:
         """Return the newest message of each topic at or before `at_ns`; topics without one are omitted."""
-        wanted = [topic for topic in self._named(topics) if self.topics[topic].message_count]
+        wanted = [topic for topic in self._known_topics(topics) if self.topics[topic].message_count]
         found = self.file.newest(at_ns, [self._channels_of[topic] for topic in wanted])
         return {
             topic: RecordedMessage(raw.log_ns, self._decoders[raw.channel].message(raw))
@@ -272,7 +272,7 @@ class Recording:
             if raw is not None
         }
 
-    def _named(self, topics: Collection[str] | None) -> list[str]:
+    def _known_topics(self, topics: Collection[str] | None) -> list[str]:
         return (
             list(self._channels_of)
             if topics is None

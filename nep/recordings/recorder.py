@@ -15,7 +15,7 @@ from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
 from nep.programs.robots.moving import DESCRIPTION_TYPE
 from nep.protocol.graph_view import GraphView
-from nep.protocol.topic_glob import glob_matches, is_glob, widened
+from nep.protocol.topic_glob import glob_matches, is_glob, widened_pattern
 from nep.protocol.wire import check_topic
 from nep.recordings.formats.channels import Role
 
@@ -27,7 +27,7 @@ _GRAPH_POLL_S = 1.0
 _MASTER_TIMEOUT_S = 0.5
 """Time limit of requests to the master in seconds, so that a missing master does not delay the recorder."""
 _MAX_CACHED_TOPICS = 20_000
-_ALL = "**"
+_ALL_TOPICS = "**"
 
 
 class _Writer(Protocol):
@@ -50,30 +50,30 @@ class TopicSelection:
     """
 
     topics: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
+    excluded: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for each in (*self.topics, *self.left_out):
+        for each in (*self.topics, *self.excluded):
             check_topic(each)
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Minimal set of topics and patterns that covers the selection."""
         chosen: list[str] = []
-        for each in map(widened, self.topics or (_ALL,)):
+        for each in map(widened_pattern, self.topics or (_ALL_TOPICS,)):
             if not any(glob_matches(other, each) for other in chosen):
                 chosen = [*(other for other in chosen if not glob_matches(each, other)), each]
         return tuple(chosen)
 
     def has(self, topic: str) -> bool:
         """Return True if a topic is selected."""
-        if any(glob_matches(each, topic) for each in self.left_out):
+        if any(glob_matches(each, topic) for each in self.excluded):
             return False
         return not self.topics or any(glob_matches(each, topic) for each in self.topics)
 
-    def leaves_out(self, topic: str) -> bool:
+    def is_excluded(self, topic: str) -> bool:
         """Return True if a topic is explicitly excluded."""
-        return any(glob_matches(each, topic) for each in self.left_out)
+        return any(glob_matches(each, topic) for each in self.excluded)
 
 
 class Recorder:
@@ -138,11 +138,11 @@ class Recorder:
 
     def _record(self, number: int, messages: Sequence[Message]) -> None:
         # With overlapping subscriptions the first one counts.
-        own_messages = [each for each in messages if self._owner(each.topic) == number]
+        own_messages = [each for each in messages if self._owning_subscription(each.topic) == number]
         if own_messages:
             self._writer.post(own_messages)
 
-    def _owner(self, topic: str) -> int:
+    def _owning_subscription(self, topic: str) -> int:
         # -1 if the topic is not selected.
         known = self._owners.get(topic)
         if known is None:
@@ -170,7 +170,7 @@ class Recorder:
         self._last_alerts = alerts
         for name, topic in graph.topics.items():
             # descriptions are recorded in any case, unless excluded explicitly
-            is_description = topic.msg_type == DESCRIPTION_TYPE and not self._selection.leaves_out(name)
+            is_description = topic.msg_type == DESCRIPTION_TYPE and not self._selection.is_excluded(name)
             is_chosen = self._selection.has(name)
             is_heard = is_chosen and (self._has_patterns or name in self._subscriptions)
             if is_heard or not (is_chosen or is_description) or name in self._exact or not topic.publishers:

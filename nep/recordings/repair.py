@@ -20,7 +20,7 @@ import orjson
 from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.recordings.formats.channels import ChannelDecoder
-from nep.recordings.formats.compression import check_packages, decompressed, decompressed_part
+from nep.recordings.formats.compression import check_packages, decompress, decompress_partial
 from nep.recordings.formats.destination import disk_error
 from nep.recordings.formats.index import MAX_RECORD_BYTES, Definitions, RecordCounter, read_chunk, read_index
 from nep.recordings.formats.limits import open_budget
@@ -41,10 +41,10 @@ from nep.recordings.formats.records import (
     read_message_index,
     read_record,
 )
-from nep.recordings.formats.walk import Place
+from nep.recordings.formats.walk import RecordLocation
 from nep.system.replace_file import replace_file
 
-_WINDOW = 4_000_000
+_WINDOW_BYTES = 4_000_000
 _CHUNK_PATTERN = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
 """Pattern of a chunk's opcode, followed by a length below 2^39."""
 _FLUSH_BYTES = 1_000_000
@@ -74,10 +74,10 @@ class RepairReport:
     discarded_bytes: int
     lost_s: float
     duration_s: float
-    damaged_places: int
+    damaged_range_count: int
 
     @property
-    def is_whole(self) -> bool:
+    def is_complete(self) -> bool:
         """True if nothing was lost, because the file was undamaged but not closed properly."""
         return not self.discarded_bytes and not self.discarded
 
@@ -89,11 +89,11 @@ class _Counts:
     discarded_bytes: int = 0
     is_unknown: bool = False
     """True if the number of lost messages is unknown."""
-    damaged_places: int = 0
+    damaged_range_count: int = 0
     last_ns: int = 0
     """Time of the end of the recording in ns, as far as known."""
-    figures: dict[str, object] = field(default_factory=dict)
-    words: dict[str, str] = field(default_factory=dict)
+    stats: dict[str, object] = field(default_factory=dict)
+    recorder_metadata: dict[str, str] = field(default_factory=dict)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
 
 
@@ -134,7 +134,7 @@ def repair(
             repairer = _Repair(file, path, unfinished, progress or _no_progress)
             try:
                 counts = repairer.run()
-                first_ns, last_ns = _read_back(unfinished, repairer.writer)
+                first_ns, last_ns = _verify(unfinished, repairer.writer)
                 if not counts.recovered:
                     raise RecordingError(str(path), _("it has no message that can be decoded"))
                 replace_file(unfinished, target)
@@ -152,7 +152,7 @@ def repair(
         counts.discarded_bytes,
         max(0, counts.last_ns - last_ns) / 1e9,
         (last_ns - first_ns) / 1e9,
-        counts.damaged_places,
+        counts.damaged_range_count,
     )
 
 
@@ -160,7 +160,7 @@ def _no_progress(_done: int, _total: int) -> None:
     pass
 
 
-def _read_back(path: Path, writer: FileWriter) -> tuple[int, int]:
+def _verify(path: Path, writer: FileWriter) -> tuple[int, int]:
     # Verifies the new file; returns the times of its first and last message. Raises `RecordingError`.
     counts: dict[int, int] = {}
     with path.open("rb") as file:
@@ -213,7 +213,7 @@ class _Repair:
         offset = len(MAGIC)
         while offset + HEAD_BYTES <= self._size:
             self._progress(offset, self._size)
-            place = self._place(offset)
+            place = self._record_location(offset)
             if place is not None:
                 self._others.add(place.opcode)
             if place is not None and place.opcode == Opcode.DATA_END:
@@ -221,21 +221,21 @@ class _Repair:
             if place is not None and self._copy(place):
                 offset += HEAD_BYTES + place.length
                 continue
-            offset = self._skip_damage(offset)
+            offset = self._skip_corruption(offset)
         else:
             self._discard_bytes(max(0, self._size - offset))
         self._finish()
         self._progress(self._size, self._size)
         return self._counts
 
-    def _place(self, offset: int) -> Place | None:
+    def _record_location(self, offset: int) -> RecordLocation | None:
         # The record may be truncated.
         self._file.seek(offset)
         opcode, length = RECORD_HEAD.unpack(self._file.read(HEAD_BYTES))
         known = 0 < opcode <= Opcode.DATA_END or opcode >= 0x80
-        return Place(offset, opcode, length) if known and length < 2**39 else None
+        return RecordLocation(offset, opcode, length) if known and length < 2**39 else None
 
-    def _copy(self, place: Place) -> bool:
+    def _copy(self, place: RecordLocation) -> bool:
         # False if it is not a whole record.
         end = place.offset + HEAD_BYTES + place.length
         if end > self._size:
@@ -248,9 +248,9 @@ class _Repair:
         if place.opcode == Opcode.MESSAGE_INDEX:
             self._count_lost(place)
         elif place.opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
-            self._define(place.opcode, self._content(place))
+            self._define(place.opcode, self._read_content(place))
         elif place.opcode == Opcode.METADATA:
-            self._copy_metadata(self._content(place))
+            self._copy_metadata(self._read_content(place))
         elif place.opcode == Opcode.MESSAGE:
             self._file.seek(place.offset)
             for record in messages_in(self._file.read(end - place.offset)):
@@ -261,15 +261,15 @@ class _Repair:
         # A damaged length would lead to arbitrary bytes.
         if offset + HEAD_BYTES > self._size:
             return True
-        return self._place(offset) is not None
+        return self._record_location(offset) is not None
 
-    def _content(self, place: Place) -> bytes:
+    def _read_content(self, place: RecordLocation) -> bytes:
         self._file.seek(place.offset + HEAD_BYTES)
         return self._file.read(place.length)
 
     def _define(self, opcode: int, content: bytes | memoryview) -> None:
         for number in self._definitions.add(opcode, content):
-            self._table.put(number, self._definitions.channels[number])
+            self._table.add_numbered(number, self._definitions.channels[number])
 
     def _copy_metadata(self, content: bytes) -> None:
         try:
@@ -277,17 +277,17 @@ class _Repair:
         except ValueError:
             return
         if record.name == "nep.recording":
-            self._counts.words.update(record.metadata)
+            self._counts.recorder_metadata.update(record.metadata)
         elif record.name == "nep.figures":
             for topic, text in record.metadata.items():
                 with suppress(orjson.JSONDecodeError):
-                    self._counts.figures[topic] = orjson.loads(text)
+                    self._counts.stats[topic] = orjson.loads(text)
         else:
             self._counts.metadata.append((record.name, record.metadata))
 
     # ---- chunks
 
-    def _copy_chunk_at(self, place: Place) -> bool:
+    def _copy_chunk_at(self, place: RecordLocation) -> bool:
         self._file.seek(place.offset)
         head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), place.length)
         self._damaged_chunk = None
@@ -296,12 +296,12 @@ class _Repair:
         self._file.seek(place.offset)
         record = memoryview(self._file.read(HEAD_BYTES + place.length))
         try:
-            chunk = decompressed(record[head.data_at :], head)
+            chunk = decompress(record[head.data_offset :], head)
         except ValueError:
             if not self._is_record_at(place.offset + HEAD_BYTES + place.length):
                 return False
             self._damaged_chunk = head
-            self._counts.damaged_places += 1
+            self._counts.damaged_range_count += 1
             self._counts.is_unknown = True  # until its message indexes are read
             self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
             self._discard_bytes(HEAD_BYTES + place.length)
@@ -319,7 +319,7 @@ class _Repair:
                 is_plain = False
                 break
             indexes.setdefault(each.channel, []).extend((each.log_ns, each.offset))
-            self._read_own(each)
+            self._read_entry(each)
         if not is_plain or not indexes:
             for each in messages_in(chunk):
                 self._copy_record(each)
@@ -338,7 +338,7 @@ class _Repair:
         packed = {number: pack_message_index(number, entries) for number, entries in indexes.items()}
         self.writer.copy_chunk(record, info, packed)
         self._counts.recovered += sum(
-            len(entries) // 2 for number, entries in indexes.items() if not self._is_own(number)
+            len(entries) // 2 for number, entries in indexes.items() if not self._is_recorder_channel(number)
         )
 
     def _copy_record(self, record: RawMessage | tuple[int, memoryview]) -> None:
@@ -350,11 +350,11 @@ class _Repair:
         if record.channel not in self._definitions.channels:
             self._counts.discarded += 1
             return
-        self._read_own(record)
+        self._read_entry(record)
         self.writer.add(
             record.channel, (record.log_ns, record.publish_ns), record.sequence, b"", bytes(record.data)
         )
-        if not self._is_own(record.channel):
+        if not self._is_recorder_channel(record.channel):
             self._counts.recovered += 1
         if self.writer.pending_bytes >= _FLUSH_BYTES:
             self.writer.flush()
@@ -362,22 +362,22 @@ class _Repair:
     def _role(self, channel: int) -> str:
         return dict(self._definitions.channels[channel].metadata).get("nep.role", "")
 
-    def _is_own(self, channel: int) -> bool:
+    def _is_recorder_channel(self, channel: int) -> bool:
         return bool(self._role(channel))
 
-    def _read_own(self, record: RawMessage) -> None:
+    def _read_entry(self, record: RawMessage) -> None:
         # The recorder's counts are written to the metadata of the new file, too.
         if self._role(record.channel) != "figures":
             return
         with suppress(orjson.JSONDecodeError, AttributeError):
-            self._counts.figures.update(orjson.loads(record.data).get("topics", {}))
+            self._counts.stats.update(orjson.loads(record.data).get("topics", {}))
 
-    def _count_lost(self, place: Place) -> None:
+    def _count_lost(self, place: RecordLocation) -> None:
         # The index of a damaged chunk has the number of its lost messages.
         if self._damaged_chunk is None:
             return
         with suppress(ValueError):
-            channel, entries = read_message_index(self._content(place))
+            channel, entries = read_message_index(self._read_content(place))
             known = self._definitions.channels.get(channel)
             if known is None or ChannelDecoder(known).role is None:
                 self._counts.discarded += len(entries)
@@ -388,10 +388,10 @@ class _Repair:
     def _discard_bytes(self, count: int) -> None:
         self._counts.discarded_bytes += count
 
-    def _skip_damage(self, offset: int) -> int:
+    def _skip_corruption(self, offset: int) -> int:
         # Returns the offset to continue at. Keeps whole messages of a chunk truncated by the end of the file.
-        found = next(self._whole_chunks(offset + 1), None)
-        self._counts.damaged_places += 1
+        found = next(self._complete_chunks(offset + 1), None)
+        self._counts.damaged_range_count += 1
         self._counts.is_unknown = True
         if found is None:
             copied = self._copy_truncated_chunk(offset)
@@ -401,20 +401,20 @@ class _Repair:
         return found
 
     def _find_chunk(self, offset: int) -> bool:
-        return next(self._whole_chunks(offset), None) is not None
+        return next(self._complete_chunks(offset), None) is not None
 
-    def _whole_chunks(self, offset: int) -> Iterator[int]:
+    def _complete_chunks(self, offset: int) -> Iterator[int]:
         # Offsets of chunks with a valid CRC.
         while offset + CHUNK_HEAD_BYTES <= self._size:
             self._file.seek(offset)
-            window = self._file.read(_WINDOW)
+            window = self._file.read(_WINDOW_BYTES)
             for match in _CHUNK_PATTERN.finditer(window):
                 at = match.start()
                 _opcode, length = RECORD_HEAD.unpack_from(window, at)
                 if offset + at + HEAD_BYTES + length > self._size:
                     continue
                 try:
-                    is_whole = self._is_whole(offset + at, length)
+                    is_whole = self._is_complete_chunk(offset + at, length)
                 except RecordingTooLargeError:  # too many places look like chunks
                     return
                 if is_whole:
@@ -422,15 +422,15 @@ class _Repair:
             offset += max(1, len(window) - CHUNK_HEAD_BYTES)
             self._progress(min(offset, self._size), self._size)
 
-    def _is_whole(self, offset: int, length: int) -> bool:
+    def _is_complete_chunk(self, offset: int, length: int) -> bool:
         self._file.seek(offset)
         head = chunk_head(self._file.read(CHUNK_HEAD_BYTES), length)
         if head is None or not head.crc:
             return False
-        self._search_budget.spend(head.data_bytes + min(head.uncompressed_bytes, _WINDOW))
-        self._file.seek(offset + head.data_at)
+        self._search_budget.spend(head.data_bytes + min(head.uncompressed_bytes, _WINDOW_BYTES))
+        self._file.seek(offset + head.data_offset)
         try:
-            decompressed(memoryview(self._file.read(head.data_bytes)), head)
+            decompress(memoryview(self._file.read(head.data_bytes)), head)
         except ValueError:
             return False
         return True
@@ -449,7 +449,7 @@ class _Repair:
         record = memoryview(self._file.read(HEAD_BYTES + length))
         self._counts.last_ns = max(self._counts.last_ns, head.end_ns)
         before = self._counts.recovered
-        for each in messages_in(decompressed_part(record[head.data_at :], head)):
+        for each in messages_in(decompress_partial(record[head.data_offset :], head)):
             if isinstance(each, RawMessage):
                 is_plausible = head.start_ns <= each.log_ns <= head.end_ns
                 if not is_plausible or each.channel not in self._definitions.channels:
@@ -462,14 +462,14 @@ class _Repair:
     def _finish(self) -> None:
         counts, writer = self._counts, self.writer
         writer.flush()
-        words = dict(counts.words)
+        words = dict(counts.recorder_metadata)
         words["repaired"] = "1"
         words["recovered"] = str(counts.recovered)
         words["discarded"] = "" if counts.is_unknown else str(counts.discarded)
         words["discarded_bytes"] = str(counts.discarded_bytes)
         writer.add_metadata("nep.recording", words)
-        if counts.figures:
-            figures = {topic: orjson.dumps(each).decode() for topic, each in counts.figures.items()}
+        if counts.stats:
+            figures = {topic: orjson.dumps(each).decode() for topic, each in counts.stats.items()}
             writer.add_metadata("nep.figures", figures)
         for name, values in counts.metadata:
             writer.add_metadata(name, values)

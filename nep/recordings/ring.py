@@ -23,9 +23,9 @@ from nep.errors import RecordingError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.recordings.formats.channels import Role
-from nep.recordings.formats.compression import decompressed
-from nep.recordings.formats.destination import USUAL_LIMITS, WriterLimits, disk_error
-from nep.recordings.formats.figures import TopicFigures, read_figures
+from nep.recordings.formats.compression import decompress
+from nep.recordings.formats.destination import DEFAULT_LIMITS, WriterLimits, disk_error
+from nep.recordings.formats.figures import TopicStats, parse_stats
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 from nep.recordings.formats.records import (
     HEAD_BYTES,
@@ -58,7 +58,7 @@ class RingStatus:
 
 
 @dataclass(frozen=True)
-class KeptRecording:
+class SavedRecording:
     """Recording that was saved by `keep`."""
 
     path: Path
@@ -71,8 +71,8 @@ class _Segment:
     """File of the ring; `users` is the number of recordings that are being copied from it."""
 
     writer: FileWriter
-    users: int = 0
-    is_unwanted: bool = False
+    user_count: int = 0
+    is_removed: bool = False
 
     @property
     def path(self) -> Path:
@@ -91,9 +91,9 @@ class _Segments:
         self._number = 0
         folder.mkdir(parents=True, exist_ok=True)
         _remove_stale_segments(folder)
-        self._all: list[_Segment] = [self._new()]
+        self._all: list[_Segment] = [self._new_segment()]
 
-    def _new(self) -> _Segment:
+    def _new_segment(self) -> _Segment:
         self._number += 1
         path = self._folder / f"{_PREFIX}{os.getpid()}-{id(self):x}-{self._number}.mcap"
         return _Segment(FileWriter(path, self.table, is_new=False, keeps_chunks=True))
@@ -102,14 +102,14 @@ class _Segments:
     def file(self) -> FileWriter:
         return self._all[-1].writer
 
-    def flushed(self) -> None:
+    def on_flushed(self) -> None:
         # Starts a new segment when this one has its share, and removes the oldest.
         writer = self._all[-1].writer
         if writer.start_ns is None:
             return
         is_old = writer.end_ns - writer.start_ns >= self._span_ns // _SEGMENT_COUNT
         if is_old or writer.size_bytes >= self._size_bytes // _SEGMENT_COUNT:
-            new = self._new()
+            new = self._new_segment()
             with self._lock:
                 self._all.append(new)
             writer.close()
@@ -127,8 +127,8 @@ class _Segments:
 
     def _remove_oldest_locked(self) -> None:
         oldest = self._all.pop(0)
-        oldest.is_unwanted = True
-        if not oldest.users:
+        oldest.is_removed = True
+        if not oldest.user_count:
             _remove(oldest.path)
 
     def check_file(self) -> None:
@@ -137,7 +137,7 @@ class _Segments:
             with self._lock:
                 if len(self._all) == 1:
                     raise RecordingError(str(self._folder), _("the disk is full"))
-                if self._all[0].users:  # removing it would free nothing until the copy is done
+                if self._all[0].user_count:  # removing it would free nothing until the copy is done
                     return
                 self._remove_oldest_locked()
 
@@ -151,12 +151,12 @@ class _Segments:
             for each in self._all:
                 with suppress(OSError):
                     each.writer.close()
-                each.is_unwanted = True
-                if not each.users:
+                each.is_removed = True
+                if not each.user_count:
                     _remove(each.path)
             self._all = self._all[-1:]
 
-    fail = finish
+    abort = finish
 
     def status(self) -> tuple[float, int]:
         with self._lock:
@@ -175,15 +175,15 @@ class _Segments:
             for segment in self._all:
                 chunks = [each for each in segment.writer.chunks or () if each.end_ns >= since]
                 if chunks:
-                    segment.users += 1
+                    segment.user_count += 1
                     segments.append((segment, chunks))
             return segments
 
     def release(self, segments: Sequence[tuple[_Segment, list[ChunkInfo]]]) -> None:
         with self._lock:
             for segment, _chunks in segments:
-                segment.users -= 1
-                if segment.is_unwanted and not segment.users:
+                segment.user_count -= 1
+                if segment.is_removed and not segment.user_count:
                     _remove(segment.path)
 
 
@@ -217,7 +217,7 @@ class FlightRecorder:
         seconds: float = 60.0,
         size_bytes: int = 2_000_000_000,
         clock: Callable[[], int] | None = None,
-        limits: WriterLimits = USUAL_LIMITS,
+        limits: WriterLimits = DEFAULT_LIMITS,
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
         """Start the ring.
@@ -239,7 +239,7 @@ class FlightRecorder:
         path = Path(folder)
         self._clock = LogClock() if clock is None else clock
         try:
-            self._segments = _Segments(path, seconds, size_bytes, limits.least_free_bytes)
+            self._segments = _Segments(path, seconds, size_bytes, limits.min_free_bytes)
         except OSError as error:
             raise disk_error(path, error) from error
         self._writer = RecordingWriter(
@@ -264,7 +264,7 @@ class FlightRecorder:
         status = self._writer.status
         return RingStatus(seconds, size_bytes, status.unkept, status.problem)
 
-    def keep(self, path: str | os.PathLike[str], seconds: float, note: str = "") -> KeptRecording:
+    def save(self, path: str | os.PathLike[str], seconds: float, note: str = "") -> SavedRecording:
         """Save the last seconds, up to the newest message, as a recording.
 
         The recording may start up to half a second earlier. The call takes as long as copying the bytes;
@@ -298,20 +298,20 @@ class FlightRecorder:
 
     def _copy_segments(
         self, target: Path, segments: Sequence[tuple[_Segment, list[ChunkInfo]]], note: str
-    ) -> KeptRecording:
+    ) -> SavedRecording:
         writer = FileWriter(target, self._segments.table)
         try:
-            figures = _FiguresInChunks(self._segments.table)
+            figures = _ChunkStats(self._segments.table)
             damaged = 0
             for segment, chunks in segments:
                 with segment.path.open("rb") as file:
                     for chunk in chunks:
-                        damaged += not _copy(file, chunk, writer, figures)
+                        damaged += not _copy_chunk(file, chunk, writer, figures)
             if damaged and writer.start_ns is None:
                 raise ValueError("nothing is left")
             words = {"note": note, "started_ns": str(writer.start_ns or 0), "ended_ns": str(writer.end_ns)}
             writer.add_metadata("nep.recording", {**words, "end": "", "kept": "1", "damaged": str(damaged)})
-            totals = figures.figures(writer.counts)
+            totals = figures.stats(writer.counts)
             if totals:
                 plain = {topic: orjson.dumps(each.to_plain()).decode() for topic, each in totals.items()}
                 writer.add_metadata("nep.figures", plain)
@@ -325,7 +325,7 @@ class FlightRecorder:
                 ) from error
             raise
         count = sum(each.received - each.unkept for each in totals.values())
-        return KeptRecording(target, count, (writer.end_ns - (writer.start_ns or writer.end_ns)) / 1e9)
+        return SavedRecording(target, count, (writer.end_ns - (writer.start_ns or writer.end_ns)) / 1e9)
 
     def close(self) -> None:
         """Stop the ring and delete its files. Idempotent."""
@@ -338,26 +338,26 @@ class FlightRecorder:
         self.close()
 
 
-def _copy(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _FiguresInChunks) -> bool:
+def _copy_chunk(file: BinaryIO, chunk: ChunkInfo, writer: FileWriter, figures: _ChunkStats) -> bool:
     # False if it was damaged on disk. Raises `OSError`.
     file.seek(chunk.offset)
     record = memoryview(file.read(chunk.length))
     if len(record) != chunk.length or record[0] != Opcode.CHUNK:
         return False
     head = chunk_head(record, chunk.length - HEAD_BYTES)
-    indexes = dict(_indexes(file.read(chunk.index_bytes)))
+    indexes = dict(_split_indexes(file.read(chunk.index_bytes)))
     if head is None or head.start_ns != chunk.start_ns or indexes.keys() != set(chunk.channels):
         return False
-    if figures.wants(chunk):
+    if figures.has_stats(chunk):
         try:
-            figures.read(decompressed(record[head.data_at :], head))
+            figures.read(decompress(record[head.data_offset :], head))
         except ValueError:
             return False
     writer.copy_chunk(record, chunk, indexes)
     return True
 
 
-def _indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
+def _split_indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
     # (channel, message index) of consecutive records.
     at = 0
     while at + HEAD_BYTES + 2 <= len(data):
@@ -367,18 +367,18 @@ def _indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += length
 
 
-class _FiguresInChunks:
+class _ChunkStats:
     """Counts of messages within the saved chunks, because the ring's counts start when the ring starts."""
 
     def __init__(self, table: ChannelTable) -> None:
         self._table = table
-        self._first: dict[str, TopicFigures] = {}
-        self._last: dict[str, TopicFigures] = {}
+        self._first: dict[str, TopicStats] = {}
+        self._last: dict[str, TopicStats] = {}
 
     def _role(self, channel: int) -> str:
         return dict(self._table.definitions[channel].metadata).get("nep.role", "")
 
-    def wants(self, chunk: ChunkInfo) -> bool:
+    def has_stats(self, chunk: ChunkInfo) -> bool:
         return any(self._role(each) == "figures" for each in chunk.channels)
 
     def read(self, records: bytes | memoryview) -> None:
@@ -386,12 +386,12 @@ class _FiguresInChunks:
             if not isinstance(record, RawMessage) or self._role(record.channel) != "figures":
                 continue
             for topic, plain in orjson.loads(record.data)["topics"].items():
-                figures = read_figures(plain)
+                figures = parse_stats(plain)
                 if figures is not None:
                     self._first.setdefault(topic, figures)
                     self._last[topic] = figures
 
-    def figures(self, counts: dict[int, int]) -> dict[str, TopicFigures]:
+    def stats(self, counts: dict[int, int]) -> dict[str, TopicStats]:
         counts_by_topic: dict[str, int] = {}
         for channel, count in counts.items():
             if not self._role(channel):
@@ -399,7 +399,7 @@ class _FiguresInChunks:
                 counts_by_topic[topic] = counts_by_topic.get(topic, 0) + count
         return {topic: self._difference(topic, count) for topic, count in counts_by_topic.items()}
 
-    def _difference(self, topic: str, count: int) -> TopicFigures:
-        nothing = TopicFigures()
-        difference = self._last.get(topic, nothing).since(self._first.get(topic, nothing))
+    def _difference(self, topic: str, count: int) -> TopicStats:
+        nothing = TopicStats()
+        difference = self._last.get(topic, nothing).difference(self._first.get(topic, nothing))
         return replace(difference, received=count + difference.unkept)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from nep.errors import RecordingError
 from nep.i18n import _
-from nep.recordings.formats.destination import USUAL_LIMITS, OneFile, WriterLimits, disk_error
+from nep.recordings.formats.destination import DEFAULT_LIMITS, OneFile, WriterLimits, disk_error
 from nep.recordings.formats.mcap_file import ChannelTable, FileWriter
 
 MIN_PART_BYTES = 100_000
@@ -23,15 +23,15 @@ class SplitFiles:
     A file ends with the chunk that reaches the size, so it may be larger by one chunk: 1 MB, or one message.
     """
 
-    def __init__(self, path: Path, part_bytes: int, limits: WriterLimits = USUAL_LIMITS) -> None:
+    def __init__(self, path: Path, part_bytes: int, limits: WriterLimits = DEFAULT_LIMITS) -> None:
         """Create the first file. Raises `RecordingError`."""
         self._path, self._part_bytes, self._limits = path, part_bytes, limits
         self._table = ChannelTable()
         self.paths: list[Path] = []
         """Files created so far."""
-        self._part = self._new()
+        self._part = self._new_file()
 
-    def _new(self) -> OneFile:
+    def _new_file(self) -> OneFile:
         path = part_path(self._path, len(self.paths) + 1)
         try:
             file = FileWriter(path, self._table)
@@ -40,7 +40,7 @@ class SplitFiles:
         except OSError as error:
             raise disk_error(path, error) from error
         self.paths.append(path)
-        return OneFile(file, self._limits.least_free_bytes)
+        return OneFile(file, self._limits.min_free_bytes)
 
     @property
     def file(self) -> FileWriter:
@@ -52,13 +52,13 @@ class SplitFiles:
         """True if the current file has reached its maximum size."""
         return self.file.size_bytes >= self._part_bytes
 
-    def flushed(self) -> None:
+    def on_flushed(self) -> None:
         """Do nothing."""
 
     def next_file(self) -> None:
         """Open the next file, and finish the current one."""
         full = self._part
-        self._part = self._new()
+        self._part = self._new_file()
         full.finish()
 
     def check_file(self) -> None:
@@ -69,6 +69,6 @@ class SplitFiles:
         """Finish the last file. Raises `OSError`."""
         self._part.finish()
 
-    def fail(self) -> None:
+    def abort(self) -> None:
         """Close the last file without a summary."""
-        self._part.fail()
+        self._part.abort()

@@ -30,8 +30,8 @@ from nep.recordings.formats.channels import (
     encoding_of,
     own_channel,
 )
-from nep.recordings.formats.destination import USUAL_LIMITS, Destination, OneFile, WriterLimits, disk_error
-from nep.recordings.formats.figures import MAX_TOPICS, TopicCounter, TopicFigures, changed
+from nep.recordings.formats.destination import DEFAULT_LIMITS, Destination, OneFile, WriterLimits, disk_error
+from nep.recordings.formats.figures import MAX_TOPICS, TopicCounter, TopicStats, changed
 from nep.recordings.formats.mcap_file import CHUNK_BYTES, FileWriter
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 MAX_PUBLISHER_CHANNELS = 10_000
 """Number of channels beyond which new publishers share one channel per topic."""
-_CLOSE_S = 30.0
+_CLOSE_TIMEOUT_S = 30.0
 _MAX_CACHED_KINDS = 10_000
 _MAX_LATCHED, _MAX_LATCHED_BYTES = 1_000, 16_000_000
 _OTHER_TOPICS = ""
@@ -81,7 +81,7 @@ class RecordingStatus:
     duration_s: float
     queued_bytes: int
     unkept: int
-    topics: Mapping[str, TopicFigures] = field(default_factory=dict)
+    topics: Mapping[str, TopicStats] = field(default_factory=dict)
     problem: str = ""
 
 
@@ -114,12 +114,12 @@ class _Part:
     bytes_before: int = 0
     repeated: int = 0
     """Number of latched messages that were repeated from earlier files."""
-    before: Mapping[str, TopicFigures] = field(default_factory=dict)
+    before: Mapping[str, TopicStats] = field(default_factory=dict)
     """Counts at the start of the file."""
     latched: dict[tuple[str, int | None], Message] = field(default_factory=dict)
     latched_bytes: int = 0
 
-    def keep(self, message: Message) -> None:
+    def store_latched(self, message: Message) -> None:
         # A latched message is repeated in the next file; bounded.
         key = (message.topic, message.publisher)
         old = self.latched.get(key)
@@ -130,11 +130,11 @@ class _Part:
             self.latched[key] = message
             self.latched_bytes += grown
 
-    def of(self, figures: Mapping[str, TopicFigures]) -> dict[str, TopicFigures]:
-        nothing = TopicFigures()
-        return {topic: each.since(self.before.get(topic, nothing)) for topic, each in figures.items()}
+    def stats_of_part(self, figures: Mapping[str, TopicStats]) -> dict[str, TopicStats]:
+        nothing = TopicStats()
+        return {topic: each.difference(self.before.get(topic, nothing)) for topic, each in figures.items()}
 
-    def following(self, figures: Mapping[str, TopicFigures], messages: int, size_bytes: int) -> _Part:
+    def next_part(self, figures: Mapping[str, TopicStats], messages: int, size_bytes: int) -> _Part:
         return _Part(
             self.number + 1,
             messages,
@@ -159,7 +159,7 @@ class RecordingWriter:
         *,
         note: str = "",
         clock: Callable[[], int] | None = None,
-        limits: WriterLimits = USUAL_LIMITS,
+        limits: WriterLimits = DEFAULT_LIMITS,
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
         """Create the file and start the thread.
@@ -181,7 +181,7 @@ class RecordingWriter:
         if isinstance(path, str | os.PathLike):
             whole = Path(path)
             try:
-                self._destination: Destination = OneFile(FileWriter(whole), limits.least_free_bytes)
+                self._destination: Destination = OneFile(FileWriter(whole), limits.min_free_bytes)
             except FileExistsError:
                 raise RecordingError(str(whole), _("the file already exists; choose another name")) from None
             except OSError as error:
@@ -200,7 +200,7 @@ class RecordingWriter:
         self._last_ns = 0
         self._counters: dict[str, TopicCounter] = {}
         self._known: dict[int, _KindCache] = {}
-        self._figures: dict[str, TopicFigures] = {}
+        self._figures: dict[str, TopicStats] = {}
         self._first_ns: int | None = None
         self._own_sequence = 0
         self._part = _Part()
@@ -305,7 +305,7 @@ class RecordingWriter:
         """Error that stopped the writer, or ""."""
         return self._problem
 
-    def close(self, timeout_s: float = _CLOSE_S) -> RecordingStatus:
+    def close(self, timeout_s: float = _CLOSE_TIMEOUT_S) -> RecordingStatus:
         """Write queued messages and finish the file. Idempotent.
 
         Returns:
@@ -355,8 +355,8 @@ class RecordingWriter:
                 self._lock.notify_all()
 
     def _write_until_closed(self) -> None:
-        flush_at = time.monotonic() + self._limits.flush_s
-        look_at = time.monotonic() + self._limits.figures_s
+        flush_at = time.monotonic() + self._limits.flush_interval_s
+        look_at = time.monotonic() + self._limits.stats_interval_s
         while True:
             with self._lock:
                 if not self._queue and not self._is_closing and self._flush_done >= self._flush_wanted:
@@ -368,13 +368,13 @@ class RecordingWriter:
             now = time.monotonic()
             if wanted > self._flush_done or now >= flush_at:
                 self._flush()
-                flush_at = now + self._limits.flush_s
+                flush_at = now + self._limits.flush_interval_s
                 with self._lock:
                     self._flush_done = wanted
                     self._lock.notify_all()
             if now >= look_at:
-                look_at = now + self._limits.figures_s
-                self._write_figures()
+                look_at = now + self._limits.stats_interval_s
+                self._write_stats()
                 self._destination.check_file()
             if is_closing and not self._queue:
                 return
@@ -382,7 +382,7 @@ class RecordingWriter:
     def _write_batch(self, batch: Sequence[tuple[int, Sequence[Message]] | _Entry]) -> None:
         for number, part in enumerate(batch):
             if isinstance(part, _Entry):
-                self._write_own(part.role, part.text)
+                self._write_own_entry(part.role, part.text)
                 size, count = len(part.text), 1
             else:
                 now, messages = part
@@ -406,7 +406,7 @@ class RecordingWriter:
         difference = message.kind.clock.difference
         log_ns = now
         if difference is not None and message.stamp_ns is not None:
-            log_ns = min(now, message.stamp_ns + difference.add_ns)
+            log_ns = min(now, message.stamp_ns + difference.offset_ns)
         log_ns = self._last_ns = max(self._last_ns, log_ns)
         if self._first_ns is None:
             # a latched message may be as old as its publisher; the recording starts at its receipt
@@ -423,12 +423,12 @@ class RecordingWriter:
         if channel is None:
             channel, encoding = self._channel(message, encoding, log_ns)
             if channel is None:
-                known.counter.leave_out(message.publisher, 1, message.size_bytes)
+                known.counter.count_skipped(message.publisher, 1, message.size_bytes)
                 return
             if not encoding.is_self_contained:
                 known.channels[key] = channel
         if message.kind.is_latched:
-            self._part.keep(message)
+            self._part.store_latched(message)
         file = self._destination.file
         file.add(channel, (log_ns, encoding.publish_ns), encoding.sequence, encoding.before, message.raw)
         known.counter.add(
@@ -458,7 +458,7 @@ class RecordingWriter:
         encoding = encoding_of(message, log_ns, is_self_contained=True)
         return table.number(definition_of(message, encoding)), encoding
 
-    def _write_own(self, role: Role, text: bytes) -> None:
+    def _write_own_entry(self, role: Role, text: bytes) -> None:
         self._own_sequence += 1
         now = self._last_ns = max(self._last_ns, self._clock())
         file = self._destination.file
@@ -470,19 +470,19 @@ class RecordingWriter:
     def _flush(self) -> None:
         file = self._destination.file
         file.flush()
-        self._count_file(file)
-        self._destination.flushed()
+        self._update_counts(file)
+        self._destination.on_flushed()
         if self._destination.is_full:
             self._start_next_file()
 
     def _start_next_file(self) -> None:
         # The counts of the full file are written before it is finished.
-        self._write_figures(all_of_them=True)
+        self._write_stats(all_of_them=True)
         file = self._destination.file
-        self._add_words(file, "")
+        self._add_metadata(file, "")
         self._destination.next_file()
-        self._count_file(file)
-        self._part = self._part.following(self._figures, self._message_count, self._size_bytes)
+        self._update_counts(file)
+        self._part = self._part.next_part(self._figures, self._message_count, self._size_bytes)
         for message in self._part.latched.values():  # each file must be playable alone
             encoding = encoding_of(message, self._last_ns)
             number, encoding = self._channel(message, encoding, self._last_ns)
@@ -491,36 +491,36 @@ class RecordingWriter:
                 self._destination.file.add(number, times, encoding.sequence, encoding.before, message.raw)
                 self._part.repeated += 1
 
-    def _write_figures(self, *, all_of_them: bool = False) -> None:
+    def _write_stats(self, *, all_of_them: bool = False) -> None:
         with self._lock:
             dropped, self._dropped_counts = self._dropped_counts, {}
         for (topic, publisher), (count, size) in dropped.items():
-            self._counter(topic).leave_out(publisher, count, size)
+            self._counter(topic).count_skipped(publisher, count, size)
         counters = dict(self._counters) if all_of_them else dict(changed(self._counters))
         if not counters:
             return
-        figures = {topic: counter.figures() for topic, counter in counters.items()}
+        figures = {topic: counter.stats() for topic, counter in counters.items()}
         for counter in counters.values():
             counter.is_changed = False
         with self._lock:
             self._figures = {**self._figures, **figures}
-        plain = {topic: each.to_plain() for topic, each in self._part.of(figures).items()}
-        self._write_own("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
+        plain = {topic: each.to_plain() for topic, each in self._part.stats_of_part(figures).items()}
+        self._write_own_entry("figures", orjson.dumps({"topics": plain, "is_final": all_of_them}))
 
     # ---- finishing
 
     def _finish(self, reason: str = "") -> None:
-        self._write_figures(all_of_them=True)
+        self._write_stats(all_of_them=True)
         file = self._destination.file
         file.flush()
-        self._count_file(file)
-        self._destination.flushed()
+        self._update_counts(file)
+        self._destination.on_flushed()
         file = self._destination.file
-        self._add_words(file, reason)
+        self._add_metadata(file, reason)
         self._destination.finish()
-        self._count_file(file)
+        self._update_counts(file)
 
-    def _add_words(self, file: FileWriter, reason: str) -> None:
+    def _add_metadata(self, file: FileWriter, reason: str) -> None:
         words = {
             "started_ns": str(self._started_ns),
             "ended_ns": str(self._last_ns or self._started_ns),
@@ -532,13 +532,13 @@ class RecordingWriter:
         file.add_metadata("nep.recording", words)
         plain = {
             topic: orjson.dumps(each.to_plain()).decode()
-            for topic, each in sorted(self._part.of(self._figures).items())
+            for topic, each in sorted(self._part.stats_of_part(self._figures).items())
         }
         if plain:
             file.add_metadata("nep.figures", plain)
-        self._count_file(file)
+        self._update_counts(file)
 
-    def _count_file(self, file: FileWriter) -> None:
+    def _update_counts(self, file: FileWriter) -> None:
         part = self._part
         own = sum(file.counts.get(each, 0) for each in self._own_numbers)
         with self._lock:
@@ -563,13 +563,13 @@ class RecordingWriter:
                 definition = file.table.definitions[number]
                 left = self._dropped_counts.setdefault((definition.topic, None), [0, 0])
                 left[0] += 0 if number in self._own_numbers else count
-        self._count_file(file)
+        self._update_counts(file)
         self._close_after_error()
         self._stop(error.reason)
 
     def _close_after_error(self) -> None:
         with suppress(OSError):  # a further error doesn't matter
-            self._destination.fail()
+            self._destination.abort()
 
     def _stop(self, reason: str) -> None:
         with self._lock:

@@ -29,15 +29,15 @@ MASTER_VARIABLE = "NEP_MASTER"
 DEFAULT_MASTER = "127.0.0.1:7780"
 _DEFAULT_PORT = 7780
 _HOST = re.compile(r"[\w.-]+|\*", re.ASCII)
-_NUMBERS = re.compile(r"[\d.]+", re.ASCII)
+_NUMERIC_HOST = re.compile(r"[\d.]+", re.ASCII)
 _PORT = re.compile(r"\d{1,5}", re.ASCII)
-_BYTE = re.compile(r"0*\d{1,3}", re.ASCII)
+_OCTET = re.compile(r"0*\d{1,3}", re.ASCII)
 _ENDPOINT = re.compile(r"tcp://[\w.-]{1,253}:(\d{1,5})|ipc://@nep-(\d{1,5})", re.ASCII)
 
-ANY = "0.0.0.0"  # noqa: S104 - bound only at a user's request
+ANY_HOST = "0.0.0.0"  # noqa: S104 - bound only at a user's request
 """IPv4 address that stands for all interfaces of a computer."""
-_RETRY_S = 5.0
-_SLICE_S = 0.1
+_RETRY_INTERVAL_S = 5.0
+_WAIT_SLICE_S = 0.1
 _LOCAL_NAMES = frozenset({"localhost", "*"})
 """Host names of this computer that need no resolution; a master listening at "*" is local, too."""
 _TUNNEL_PREFIXES = ("docker", "br-", "veth", "virbr", "tun", "tap", "wg", "utun", "vmnet")
@@ -56,7 +56,7 @@ def master_address(address: str | None = None) -> str:
         )
     chosen = (address or os.environ.get(MASTER_VARIABLE) or DEFAULT_MASTER).removeprefix("tcp://")
     if _is_ipv6(chosen):
-        checked_host(chosen)
+        check_host(chosen)
     host, colon, port = chosen.rpartition(":")
     if not colon:
         chosen, host, port = f"{chosen}:{_DEFAULT_PORT}", chosen, str(_DEFAULT_PORT)
@@ -69,7 +69,7 @@ def master_address(address: str | None = None) -> str:
     return chosen
 
 
-def checked_host(host: object) -> str:
+def check_host(host: object) -> str:
     """Validate a host to connect to or bind, and return it: an IPv4 address, a host name, or "*".
 
     Raises `NepError` if the host is invalid.
@@ -112,10 +112,10 @@ def _is_port(word: str) -> bool:
 
 
 def _is_valid_host(host: str) -> bool:
-    if not _NUMBERS.fullmatch(host):
+    if not _NUMERIC_HOST.fullmatch(host):
         return True
     numbers = host.split(".")
-    return len(numbers) == 4 and all(_BYTE.fullmatch(each) and int(each[-3:]) < 256 for each in numbers)
+    return len(numbers) == 4 and all(_OCTET.fullmatch(each) and int(each[-3:]) < 256 for each in numbers)
 
 
 def is_endpoint(endpoint: str) -> bool:
@@ -160,13 +160,13 @@ def own_addresses() -> tuple[OwnAddress, ...]:
 
 def has_address(host: str) -> bool:
     """Return True if an interface of this computer currently has the IP address `host`."""
-    if host == ANY or ipaddress.ip_address(host).is_loopback:
+    if host == ANY_HOST or ipaddress.ip_address(host).is_loopback:
         return True
     addresses = (each.address for group in psutil.net_if_addrs().values() for each in group)
     return host in addresses
 
 
-def nearest(endpoints: Sequence[str], master: str) -> str:
+def reachable_endpoint(endpoints: Sequence[str], master: str) -> str:
     """Return the first of a publisher's endpoints that this program can reach, or "" if none is reachable.
 
     If the master's address is a loopback address, this program runs on the master's computer and prefers
@@ -182,7 +182,7 @@ def nearest(endpoints: Sequence[str], master: str) -> str:
         return (local or [*endpoints, ""])[0]
     for endpoint in endpoints:
         address = endpoint.removeprefix("tcp://")
-        if host_of(address) == ANY:
+        if host_of(address) == ANY_HOST:
             return f"tcp://{host_of(master)}:{address.rpartition(':')[2]}"
         if not is_loopback(address):
             return endpoint
@@ -201,7 +201,7 @@ def _is_tunnel(interface: str) -> bool:
 # ---- name resolution
 
 
-def look_up(host: str) -> str:
+def resolve_host(host: str) -> str:
     """Resolve a host name to its first IPv4 address.
 
     Can block for half a minute. Raises `OSError` or `UnicodeError` if the name can't be resolved.
@@ -209,13 +209,13 @@ def look_up(host: str) -> str:
     return str(socket.getaddrinfo(host, None, socket.AF_INET, socket.SOCK_STREAM)[0][4][0])
 
 
-def in_numbers(address: str) -> str:
+def resolve_address(address: str) -> str:
     """Return an address with its host name resolved to an IPv4 address. Blocks; raises `NepError`."""
     host = host_of(address)
-    if _is_number(host):
+    if _is_numeric(host):
         return address
     try:
-        return f"{look_up(host)}:{address.rpartition(':')[2]}"
+        return f"{resolve_host(host)}:{address.rpartition(':')[2]}"
     except (OSError, UnicodeError) as error:
         raise NepError(
             _("unknown computer '{host}'; check the spelling, or use its IP address").format(host=host)
@@ -236,7 +236,7 @@ class MasterName:
     """
 
     def __init__(
-        self, address: str, on_change: Callable[[str], None], look_up: Callable[[str], str] = look_up
+        self, address: str, on_change: Callable[[str], None], look_up: Callable[[str], str] = resolve_host
     ) -> None:
         self.known = ""
         """Address with a numeric host, or "" until the name is resolved."""
@@ -248,7 +248,7 @@ class MasterName:
         self._is_failure_logged = False
         self._resolved = threading.Event()
         host = "127.0.0.1" if self._host in _LOCAL_NAMES else self._host
-        if _is_number(host):
+        if _is_numeric(host):
             self.known = f"{host}:{self._port}"
             self._resolved.set()
 
@@ -261,9 +261,9 @@ class MasterName:
             now: Current time of the monotonic clock in seconds.
         """
         is_asking = self._thread is not None and self._thread.is_alive()
-        if _is_number(self._host) or self._host in _LOCAL_NAMES or is_asking or now < self._retry_at:
+        if _is_numeric(self._host) or self._host in _LOCAL_NAMES or is_asking or now < self._retry_at:
             return
-        self._retry_at = now + _RETRY_S
+        self._retry_at = now + _RETRY_INTERVAL_S
         thread = threading.Thread(target=self._resolve, name=f"nep-name-{self._host}", daemon=True)
         try:
             thread.start()
@@ -275,7 +275,7 @@ class MasterName:
         """Wait until the name is resolved; return False after the time limit (None: no limit)."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._resolved.is_set():
-            left = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
+            left = _WAIT_SLICE_S if deadline is None else min(_WAIT_SLICE_S, deadline - time.monotonic())
             if left <= 0.0:
                 return False
             self._resolved.wait(left)
@@ -298,7 +298,7 @@ class MasterName:
         self._resolved.set()
 
 
-def _is_number(host: str) -> bool:
+def _is_numeric(host: str) -> bool:
     try:
         ipaddress.IPv4Address(host)
     except ValueError:

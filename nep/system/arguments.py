@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar, cast
 
 from nep.errors import WrongTypeError
-from nep.i18n import _, listed
-from nep.text import control_in, escaped, shortened
+from nep.i18n import _, format_list
+from nep.text import escaped, first_control, shortened
 
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
@@ -21,13 +21,15 @@ _MAX_SECONDS = sys.float_info.max
 """Maximum time limit in seconds. Larger ints overflow a float, so they count as no limit."""
 
 
-def text(name: str, value: object) -> str:
+def check_type_name(name: str, value: object) -> str:
     """Validate the name of a message type and return it. Raises `ValueError`."""
     if not isinstance(value, str):
-        raise WrongTypeError(_("{name} must be a 'str', not '{kind}'").format(name=name, kind=_kind(value)))
+        raise WrongTypeError(
+            _("{name} must be a 'str', not '{kind}'").format(name=name, kind=_type_name(value))
+        )
     if not value:
         raise ValueError(_("{name} is empty; use a name such as 'json'").format(name=name))
-    if len(value) > _MAX_LENGTH or control_in(value):
+    if len(value) > _MAX_LENGTH or first_control(value):
         shown = escaped(shortened(value, 40))
         raise ValueError(
             _("{name} is '{said}'; use at most {most} characters, without control characters").format(
@@ -37,117 +39,119 @@ def text(name: str, value: object) -> str:
     return value
 
 
-def flag(name: str, value: object) -> bool:
+def check_bool(name: str, value: object) -> bool:
     """Validate a bool and return it. Raises `ValueError`."""
     if not isinstance(value, bool):
         raise WrongTypeError(
-            _("{name} must be True or False, not {value}").format(name=name, value=_shown(value))
+            _("{name} must be True or False, not {value}").format(name=name, value=_bounded_repr(value))
         )
     return value
 
 
-def one_of(name: str, value: T, allowed: Sequence[T]) -> T:
+def check_choice(name: str, value: T, allowed: Sequence[T]) -> T:
     """Validate that a value is one of `allowed` and return it. Raises `ValueError`."""
     if value not in allowed:
         raise ValueError(
             _("{name} is {value}; use {choices}").format(
-                name=name, value=_shown(value), choices=listed([repr(each) for each in allowed], "or")
+                name=name,
+                value=_bounded_repr(value),
+                choices=format_list([repr(each) for each in allowed], "or"),
             )
         )
     return value
 
 
-def at_least(name: str, value: object, least: int) -> int:
+def check_at_least(name: str, value: object, least: int) -> int:
     """Validate an int of at least `least` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} must be a whole number of at least {least}, not {value}").format(
-                name=name, value=_shown(value), least=least
+                name=name, value=_bounded_repr(value), least=least
             )
         )
     if value < least:
         raise ValueError(
             _("{name} must be a whole number of at least {least}, not {value}").format(
-                name=name, value=_shown(value), least=least
+                name=name, value=_bounded_repr(value), least=least
             )
         )
     return value
 
 
-def within(name: str, value: object, least: int, most: int) -> int:
+def check_range(name: str, value: object, least: int, most: int) -> int:
     """Validate an int from `least` to `most` and return it. Raises `ValueError`."""
     if not isinstance(value, int) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} must be a whole number from {least} to {most}, not {value}").format(
-                name=name, value=_shown(value), least=least, most=most
+                name=name, value=_bounded_repr(value), least=least, most=most
             )
         )
     if not least <= value <= most:
         raise ValueError(
             _("{name} must be a whole number from {least} to {most}, not {value}").format(
-                name=name, value=_shown(value), least=least, most=most
+                name=name, value=_bounded_repr(value), least=least, most=most
             )
         )
     return value
 
 
-def seconds(name: str, value: object) -> float | None:
+def check_optional_time_limit(name: str, value: object) -> float | None:
     """Validate a non-negative time limit in seconds, or None, and return it. Raises `ValueError`."""
     if value is None:
         return None
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} must be a number of seconds (0 or greater) or None, not {value}").format(
-                name=name, value=_shown(value)
+                name=name, value=_bounded_repr(value)
             )
         )
     if not value >= 0.0:  # also NaN
         raise ValueError(
             _("{name} must be a number of seconds (0 or greater) or None, not {value}").format(
-                name=name, value=_shown(value)
+                name=name, value=_bounded_repr(value)
             )
         )
     return None if value > _MAX_SECONDS else value
 
 
-def period(name: str, value: object) -> float:
+def check_period(name: str, value: object) -> float:
     """Validate a positive, finite period in seconds and return it. Raises `ValueError`."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise WrongTypeError(
             _("{name} must be a number of seconds greater than 0, not {value}").format(
-                name=name, value=_shown(value)
+                name=name, value=_bounded_repr(value)
             )
         )
     if not 0.0 < value <= _MAX_SECONDS:  # also NaN
         raise ValueError(
             _("{name} must be a number of seconds greater than 0, not {value}").format(
-                name=name, value=_shown(value)
+                name=name, value=_bounded_repr(value)
             )
         )
     return value
 
 
-def limit(name: str, value: object) -> float:
+def check_time_limit(name: str, value: object) -> float:
     """Validate a non-negative time limit in seconds and return it. None is rejected. Raises `ValueError`."""
     if value is None:
         raise WrongTypeError(
             _("{name} must be a number of seconds (0 or greater), not None").format(name=name)
         )
-    return math.inf if seconds(name, value) is None else cast("float", value)
+    return math.inf if check_optional_time_limit(name, value) is None else cast("float", value)
 
 
-def function(name: str, value: F) -> F:
+def check_function(name: str, value: F) -> F:
     """Validate a callable and return it. Raises `ValueError`."""
     if not callable(value):
         raise WrongTypeError(
-            _("{name} must be a function, not '{kind}'").format(name=name, kind=_kind(value))
+            _("{name} must be a function, not '{kind}'").format(name=name, kind=_type_name(value))
         )
     return value
 
 
-def plain_function(name: str, value: F) -> F:
+def check_plain_function(name: str, value: F) -> F:
     """Validate a callable that is not a coroutine function, and return it. Raises `ValueError`."""
-    if is_coroutine_function(function(name, value)):
+    if is_coroutine_function(check_function(name, value)):
         raise ValueError(
             _("{name} is a coroutine function, which is not awaited here; use a regular function").format(
                 name=name
@@ -168,7 +172,7 @@ def is_coroutine_function(call: object) -> bool:
     )
 
 
-def _shown(value: object) -> str:
+def _bounded_repr(value: object) -> str:
     # Bounded `repr` of an untrusted value.
     try:
         return escaped(shortened(repr(value), _MAX_LENGTH))
@@ -176,5 +180,5 @@ def _shown(value: object) -> str:
         return type(value).__name__
 
 
-def _kind(value: object) -> str:
+def _type_name(value: object) -> str:
     return type(value).__name__

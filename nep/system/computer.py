@@ -21,13 +21,13 @@ def computer_id() -> str:
     Containers on one computer have the same id, because they share its clock; a virtual machine has a
     different one. The digits are a hash, so that the system's identifier is not published.
     """
-    name = clock_name()
+    name = system_identifier()
     return sha256(f"nep clock {name}".encode("utf-8", "replace")).hexdigest()[:16] if name else ""
 
 
-def clock_name() -> str:
+def system_identifier() -> str:
     """Return the system's own identifier (boot id, boot session or machine GUID), or "" if unknown."""
-    query = _NAME_QUERIES.get(sys.platform)
+    query = _IDENTIFIER_QUERIES.get(sys.platform)
     try:
         return "" if query is None else query()
     except (OSError, ValueError, AttributeError):
@@ -54,7 +54,7 @@ def _machine_guid() -> str:
         return f"{winreg.QueryValueEx(key, 'MachineGuid')[0]} {platform.node()}"
 
 
-_NAME_QUERIES: Mapping[str, Callable[[], str]] = {
+_IDENTIFIER_QUERIES: Mapping[str, Callable[[], str]] = {
     "linux": _boot_id,
     "darwin": _boot_session,
     "win32": _machine_guid,

@@ -6,7 +6,7 @@ import contextlib
 import faulthandler
 
 
-def say_where_it_crashes() -> None:
+def enable_crash_trace() -> None:
     """Make this process write the stacks of all threads to stderr on a segmentation fault or abort.
 
     Does nothing if stderr is missing.

@@ -13,29 +13,31 @@ import sys
 import threading
 
 from nep.errors import TooManyFilesError
-from nep.system.forks import in_child
+from nep.system.forks import call_in_child
 
-SPARE = 32
+RESERVED_DESCRIPTORS = 32
 """Number of descriptors reserved for accepted connections and files of the program."""
 _TARGET_LIMIT = 8192
-_FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
+_DESCRIPTOR_FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
 _NO_DESCRIPTOR_ERRNOS = frozenset({errno.EMFILE, errno.ENFILE})
 
 
-def is_lack(number: int | None) -> bool:
+def is_descriptor_shortage(number: int | None) -> bool:
     """Return True if an errno means that the process or the system has too many open files."""
     return number in _NO_DESCRIPTOR_ERRNOS
 
 
-def opened() -> int | None:
+def open_descriptor_count() -> int | None:
     """Return the number of open descriptors of this process, or None if unknown."""
     try:
-        return len(os.listdir(_FOLDER))  # noqa: PTH208 - half the time of pathlib; called for each socket
+        return len(os.listdir(_DESCRIPTOR_FOLDER))  # noqa: PTH208 - half the time of pathlib; called for each socket
     except OSError as error:
-        return limit() if is_lack(error.errno) else None  # listing the folder needs a descriptor, too
+        return (
+            descriptor_limit() if is_descriptor_shortage(error.errno) else None
+        )  # listing the folder needs a descriptor, too
 
 
-def limit() -> int | None:
+def descriptor_limit() -> int | None:
     """Return the soft limit of open descriptors, or None if there is none."""
     if sys.platform == "win32":
         return None
@@ -58,15 +60,15 @@ class _DescriptorCheck:
         self._pollers: dict[int, select.poll] = {}
 
     def check(self, needed: int, what: str) -> None:
-        most = limit()
-        if most is not None and not self.has(needed + SPARE):
-            raise TooManyFilesError(what, opened(), most)
+        most = descriptor_limit()
+        if most is not None and not self.has_free(needed + RESERVED_DESCRIPTORS):
+            raise TooManyFilesError(what, open_descriptor_count(), most)
 
-    def has(self, needed: int) -> bool:
-        most = limit()
+    def has_free(self, needed: int) -> bool:
+        most = descriptor_limit()
         if most is None or self._count_free_at_end(most, needed) >= needed:
             return True
-        count = opened()
+        count = open_descriptor_count()
         return count is None or most - count >= needed
 
     def _count_free_at_end(self, most: int, needed: int) -> int:
@@ -82,34 +84,34 @@ class _DescriptorCheck:
             return sum(event == select.POLLNVAL for _number, event in last.poll(0))
 
 
-_check = _DescriptorCheck()
+_descriptor_check = _DescriptorCheck()
 
 
-def check_room(needed: int, what: str) -> None:
+def check_free_descriptors(needed: int, what: str) -> None:
     """Raise `TooManyFilesError` if opening `needed` descriptors would leave fewer than `SPARE`.
 
     Args:
         needed: Number of descriptors to be opened.
         what: What they are opened for; part of the error message.
     """
-    _check.check(needed, what)
+    _descriptor_check.check(needed, what)
 
 
-def has_room(needed: int) -> bool:
+def has_free_descriptors(needed: int) -> bool:
     """Return True if this process may open `needed` more descriptors."""
-    return _check.has(needed)
+    return _descriptor_check.has_free(needed)
 
 
 def _forked() -> None:
     # In a forked child the lock may be held for ever.
-    global _check  # noqa: PLW0603 - one per process
-    _check = _DescriptorCheck()
+    global _descriptor_check  # noqa: PLW0603 - one per process
+    _descriptor_check = _DescriptorCheck()
 
 
-in_child(_forked)
+call_in_child(_forked)
 
 
-def allow_many() -> None:
+def raise_open_file_limit() -> None:
     """Raise the soft limit of open files up to 8192. Call this in programs, not in libraries.
 
     The default on macOS, 256, is enough for only a dozen topics of the original NEP.

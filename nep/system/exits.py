@@ -9,26 +9,26 @@ from __future__ import annotations
 import atexit
 from collections.abc import Callable
 
-_calls: list[Callable[[], object]] = []
+_handlers: list[Callable[[], object]] = []
 
 
-def after_nodes(call: Callable[[], object]) -> None:
+def call_after_nodes(call: Callable[[], object]) -> None:
     """Register a function to be called at interpreter exit, after all nodes are closed.
 
     If the function is registered with `atexit`, it is unregistered there.
     """
     atexit.unregister(call)
-    _calls.append(call)
+    _handlers.append(call)
 
 
-def not_after_nodes(call: Callable[[], object]) -> None:
+def cancel_after_nodes(call: Callable[[], object]) -> None:
     """Unregister a function that was registered with `after_nodes`."""
-    _calls[:] = [each for each in _calls if each is not call]
+    _handlers[:] = [each for each in _handlers if each is not call]
 
 
-def _run() -> None:
-    while _calls:
-        _calls.pop()()
+def _run_handlers() -> None:
+    while _handlers:
+        _handlers.pop()()
 
 
-atexit.register(_run)
+atexit.register(_run_handlers)

@@ -21,26 +21,26 @@ from typing import Protocol
 from weakref import WeakSet
 
 
-class Inherited(Protocol):
+class ForkAware(Protocol):
     """Object that must not be used in a forked child process."""
 
     def forked(self) -> None:
         """Mark the object as closed in a child process, without taking a lock or touching a ZeroMQ socket."""
 
 
-_watched: WeakSet[Inherited] = WeakSet()
-_calls: list[Callable[[], None]] = []
+_watched: WeakSet[ForkAware] = WeakSet()
+_handlers: list[Callable[[], None]] = []
 _inherited_endpoints: set[str] = set()
-_FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
+_DESCRIPTOR_FOLDER = "/proc/self/fd" if sys.platform == "linux" else "/dev/fd"
 _ANY_HOSTS = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 
-def watch(owner: Inherited) -> None:
+def watch(owner: ForkAware) -> None:
     """Register an object whose `forked` is called in every child process. Keeps only a weak reference."""
     _watched.add(owner)
 
 
-def give_up(*endpoints: str) -> None:
+def close_in_child(*endpoints: str) -> None:
     """Close the sockets in this child process that are bound to, accepted at or connected to these endpoints.
 
     Call this in `forked`; the sockets are closed after all owners were notified. Endpoints have the form
@@ -49,15 +49,15 @@ def give_up(*endpoints: str) -> None:
     _inherited_endpoints.update(endpoints)
 
 
-def in_child(call: Callable[[], None]) -> None:
+def call_in_child(call: Callable[[], None]) -> None:
     """Register a function to be called in every child process after all owners were notified. For modules."""
-    _calls.append(call)
+    _handlers.append(call)
 
 
 def _notify_owners() -> None:
     owners = list(_watched)
     _watched.clear()
-    for tell in (*(owner.forked for owner in owners), *_calls):
+    for tell in (*(owner.forked for owner in owners), *_handlers):
         with contextlib.suppress(Exception):  # a failure must not prevent the others
             tell()
     if _inherited_endpoints:
@@ -94,7 +94,7 @@ def _close_sockets(exact: set[object], ports: set[object]) -> None:
 
 
 def _close_matching(exact: set[object], ports: set[object]) -> None:
-    for name in os.listdir(_FOLDER):  # noqa: PTH208 - plain numbers
+    for name in os.listdir(_DESCRIPTOR_FOLDER):  # noqa: PTH208 - plain numbers
         with contextlib.suppress(OSError, ValueError):  # the listing's own descriptor is closed already
             number = int(name)
             if stat.S_ISSOCK(os.fstat(number).st_mode) and any(

@@ -11,7 +11,7 @@ import os
 import sys
 from typing import Protocol
 
-LOADER = "pyimod02_importers"
+LOADER_MODULE = "pyimod02_importers"
 """Name of PyInstaller's import module."""
 
 
@@ -21,13 +21,13 @@ class Archive(Protocol):
     _filename: str
 
 
-def hold_code() -> bool:
+def keep_archive_open() -> bool:
     """Keep the program's file open and import modules from the open file. Return True if this is possible.
 
     Works on Linux only, where an open file can be reopened with an independent position. Windows locks the
     files of running programs. Returns False if the program is not frozen.
     """
-    archive: Archive | None = getattr(sys.modules.get(LOADER), "pyz_archive", None)
+    archive: Archive | None = getattr(sys.modules.get(LOADER_MODULE), "pyz_archive", None)
     if archive is None or not sys.platform.startswith("linux"):
         return False
     try:

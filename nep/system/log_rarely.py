@@ -14,7 +14,7 @@ def is_logged(count: int) -> bool:
     return count in _LOGGED_COUNTS
 
 
-class SurvivedErrors:
+class SuppressedErrors:
     """Context manager that suppresses, counts and logs exceptions, for threads that must keep running.
 
     Exceptions are logged at increasing intervals. SystemExit is suppressed too, because a callback may raise

@@ -10,7 +10,7 @@ from pathlib import Path
 from nep.i18n import _
 
 _MAX_ATTEMPTS = 20
-_PAUSE_S = 0.05
+_RETRY_DELAY_S = 0.05
 _OPEN_FILE_ERRORS = frozenset({5, 32, 33})
 """Windows error codes for a file in use: access denied, sharing violation, lock violation."""
 
@@ -40,6 +40,6 @@ def replace_file(
             if tried == _MAX_ATTEMPTS:
                 reason = _("another program has the file open; close the file there")
                 raise PermissionError(error.errno, reason, str(old)) from error
-            wait(_PAUSE_S)
+            wait(_RETRY_DELAY_S)
         else:
             return

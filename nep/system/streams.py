@@ -19,7 +19,7 @@ _REPLACEMENTS = {
     **dict.fromkeys("●•", "*"), "│": "|", "…": "...", "→": "->", "←": "<-", "↔": "<->", "✗": "x", "✓": "+",
     "≤": "<=", "≥": ">=", "\u00d7": "x", "°": " deg",
 }  # fmt: skip
-_HANDLER = "nep.protocol.encoding"
+_ERROR_HANDLER = "nep.protocol.encoding"
 _READER_GONE_ERRNOS = frozenset(
     {errno.EPIPE, errno.ESHUTDOWN, *([errno.EINVAL] if sys.platform == "win32" else [])}
 )
@@ -34,7 +34,7 @@ def prepare_streams() -> None:
     Streams that were closed before the program started are opened to the null device, so that sockets don't
     get their descriptors. Reading or writing them fails as usual; messages to a closed stderr are discarded.
     """
-    codecs.register_error(_HANDLER, _replace_unencodable)
+    codecs.register_error(_ERROR_HANDLER, _replace_unencodable)
     ways = {"stdin": os.O_WRONLY, "stdout": os.O_RDONLY, "stderr": os.O_WRONLY}
     for name, way in ways.items():
         stream = getattr(sys, name)
@@ -42,7 +42,7 @@ def prepare_streams() -> None:
             mode, nowhere = "r" if name == "stdin" else "w", os.open(os.devnull, way)
             setattr(sys, name, open(nowhere, mode, encoding="utf-8"))  # noqa: SIM115, PTH123 - stays open
         elif name != "stdin" and isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors=_HANDLER)
+            stream.reconfigure(errors=_ERROR_HANDLER)
 
 
 def buffer_output() -> None:
@@ -57,7 +57,7 @@ def buffer_output() -> None:
         )
 
 
-def words_given() -> list[str]:
+def command_line_arguments() -> list[str]:
     """Return the command-line arguments, decoded as UTF-8 even in the locale "C"."""
     if os.name != "posix":
         return sys.argv[1:]
@@ -87,15 +87,15 @@ def output_problem(raised: OSError | None = None) -> str | None:
     try:
         sys.stdout.flush()
     except OSError as error:
-        return _reason_of(error)
+        return _write_error_reason(error)
     except ValueError:  # closed
         return ""
     if raised is not None and raised.filename is None and raised.errno in _READER_GONE_ERRNOS | _DISK_ERRNOS:
-        return _reason_of(raised)
+        return _write_error_reason(raised)
     return None
 
 
-def _reason_of(error: OSError) -> str:
+def _write_error_reason(error: OSError) -> str:
     if error.errno == errno.EBADF:
         return "it is closed"
     return "" if error.errno in _READER_GONE_ERRNOS else (error.strerror or str(error)).lower()

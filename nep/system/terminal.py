@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 MAX_CHARACTERS = 256 * 1024
 """Maximum size of queued text in characters."""
-CLOSE_S = 0.5
-_RETRY_S = 0.05
+CLOSE_TIMEOUT_S = 0.5
+_RETRY_DELAY_S = 0.05
 
 
 class Terminal(io.TextIOBase):
@@ -82,12 +82,12 @@ class Terminal(io.TextIOBase):
     def flush(self) -> None:
         """Do nothing: flushing must not block."""
 
-    def drain(self, timeout_s: float = CLOSE_S) -> bool:
+    def drain(self, timeout_s: float = CLOSE_TIMEOUT_S) -> bool:
         """Wait until all queued text is written; return False after the time limit."""
         with self._changed:
             return self._changed.wait_for(lambda: not self._queue and not self._is_writing, timeout_s)
 
-    def close(self, timeout_s: float = CLOSE_S) -> None:
+    def close(self, timeout_s: float = CLOSE_TIMEOUT_S) -> None:
         """Write the queued text for at most `timeout_s` seconds, then stop the thread. Idempotent."""
         with self._changed:
             self._is_closing = True
@@ -172,7 +172,7 @@ class Terminal(io.TextIOBase):
         while data:
             written = raw.write(data)
             if written is None:  # a non-blocking stream that is full
-                never.wait(_RETRY_S)
+                never.wait(_RETRY_DELAY_S)
             else:
                 data = data[written:]
 

@@ -10,10 +10,10 @@ import threading
 
 from nep.errors import TooManyFilesError
 from nep.i18n import _
-from nep.system.descriptors import is_lack, limit, opened
+from nep.system.descriptors import descriptor_limit, is_descriptor_shortage, open_descriptor_count
 from nep.system.forks import watch
 
-_HAS_EVENTS = sys.platform == "linux" and hasattr(os, "eventfd")
+_HAS_EVENTFD = sys.platform == "linux" and hasattr(os, "eventfd")
 
 
 class Waker:
@@ -28,13 +28,15 @@ class Waker:
         self._event = -1
         self._ends: tuple[socket.socket, ...] = ()
         try:
-            if _HAS_EVENTS:
+            if _HAS_EVENTFD:
                 self._event = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
             else:
                 self._ends = socket.socketpair()
         except OSError as error:
-            if is_lack(error.errno):
-                raise TooManyFilesError(_("a waiting thread"), opened(), limit()) from error
+            if is_descriptor_shortage(error.errno):
+                raise TooManyFilesError(
+                    _("a waiting thread"), open_descriptor_count(), descriptor_limit()
+                ) from error
             raise
         for end in self._ends:
             end.setblocking(False)

@@ -31,7 +31,7 @@ class FakeLink:
         self.poke: Callable[[], None] = lambda: None
         self.stopped_outside: Callable[[str], None] = lambda _: None
 
-    def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
+    def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
         self.poke, self.stopped_outside = poke, stopped_outside
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 
-from app.robots.description.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, thing_description
 
 
 def _block(category: str, icon: str, text: str, says: str | None = None) -> dict[str, object]:
@@ -167,7 +167,7 @@ MODEL: dict[str, object] = {
 
 def robot(name: str = "Pepper", **changes: object) -> Robot:
     """A connected robot of that name."""
-    return parse(td_for(MODEL | changes, name))
+    return parse(thing_description(MODEL | changes, name))
 
 
 def nao(name: str = "NAO") -> Robot:

@@ -118,7 +118,7 @@ def test_picture_behaviour_has_the_designed_problems():
     saved = json.loads(Path("tests/data/behaviours/picture-02.nepb").read_text("utf-8"))
     pepper, absent = (parse(saved["robots"][name]) for name in ("Pepper", "NAO"))
     program = compile_behaviour(saved["workspace"], [pepper], absent=[absent], name=saved["name"])
-    assert [problem.sentence for problem in program.problems] == [
+    assert [problem.message for problem in program.problems] == [
         "NAO is not connected, so wave will be skipped.",
         "wait until waits forever if no one appears.",
     ]

@@ -6,7 +6,7 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.fixes.fixes import fix
-from app.blocks.fixes.replace_robot import asked_of, blocks_of, can_do
+from app.blocks.fixes.replace_robot import block_types_by_robot, blocks_of, supports_blocks
 from tests.blocks.samples import block, robot, say, started, workspace
 
 
@@ -66,4 +66,4 @@ def test_fix_on_invalid_workspace_changes_nothing_and_does_not_raise(blocks):
     assert fix(saved, "limit:w") is None
     assert fix(saved, "define:w") is None
     assert blocks_of(saved, "Pepper") == ()
-    assert not can_do(asked_of(saved).get("Pepper", ()), "pepper", robot())
+    assert not supports_blocks(block_types_by_robot(saved).get("Pepper", ()), "pepper", robot())

@@ -9,26 +9,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.blocks.model.fields import ChoiceField, ColourField, FieldError, NumberField, PathField, TopicField
-from app.blocks.model.names import Names
-from app.blocks.model.robot_text import TextParts
+from app.blocks.model.names import PythonNames
+from app.blocks.model.robot_text import BlockTemplate
 from app.blocks.model.workspace import parse_workspace
 from app.blocks.runtime import values
 from app.blocks.runtime.errors import BehaviourError, explain
-from app.blocks.runtime.robot_handle import sentence
-from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
+from app.blocks.runtime.robot_handle import activity_text
+from app.blocks.runtime.triggers import Hat, ThresholdTrigger, change_detector, event_matches
 from tests.blocks.samples import robot
 
 
 @given(st.lists(st.text(), min_size=1, max_size=8))
 def test_names_are_valid_python_identifiers_and_unique(words):
-    names = Names(frozenset({"taken"}))
+    names = PythonNames(frozenset({"taken"}))
     made = [names.new(word, "thing") for word in words]
     assert len(set(made)) == len(made)
     assert all(name.isidentifier() and not keyword.iskeyword(name) and name != "taken" for name in made)
 
 
 def test_names_resemble_the_original_words():
-    names = Names(frozenset())
+    names = PythonNames(frozenset())
     assert names.new("when started", "x") == "when_started"
     assert names.new("When started!", "x") == "when_started_2"
     assert names.new("123", "thing") == "thing_123"
@@ -46,7 +46,7 @@ def test_number_field_reads_and_validates_values():
 def test_choice_field_returns_value_of_its_label():
     field = ChoiceField("C", (("yes", True), ("three", 3), ("all", "all")))
     assert [field.read(saved) for saved in ("true", "3", "all", None)] == [True, 3, "all", True]
-    assert field.words(3) == "three"
+    assert field.option_text(3) == "three"
     with pytest.raises(FieldError):
         field.read("none")
     assert ChoiceField("ROBOT", (), source="robots:nao").read("NAO") == "NAO"
@@ -113,17 +113,17 @@ def test_exceptions_are_explained():
 def test_event_block_keeps_newest_events_and_counts_dropped_ones():
     hat = Hat("x", most=3)
     for number in range(5):
-        hat.happened((number,))
+        hat.enqueue((number,))
     assert hat.dropped == 2
     lone = Hat("x", most=1)
-    lone.happened(())
-    lone.happened(())
+    lone.enqueue(())
+    lone.enqueue(())
     assert lone.dropped == 0  # a second touch while the script runs is one more run, not a loss
 
 
 def test_threshold_fires_only_when_crossed():
     passed = []
-    gate = PassGate("below", 20, lambda: passed.append(1))
+    gate = ThresholdTrigger("below", 20, lambda: passed.append(1))
     for value, so_far in ((10, 0), (30, 0), (20, 0), (19, 1), (5, 1), (None, 1), (True, 1), (21, 1), (0, 2)):
         gate(value)
         assert len(passed) == so_far
@@ -131,7 +131,7 @@ def test_threshold_fires_only_when_crossed():
 
 def test_change_fires_only_on_different_value():
     seen = []
-    told = changes(lambda: seen.append(1))
+    told = change_detector(lambda: seen.append(1))
     for value in (1, 1, 2, 2, 1):
         told(value)
     assert len(seen) == 2
@@ -151,15 +151,15 @@ def test_robot_action_is_described_as_sentence():
     turn, say = pepper.action("turn"), pepper.action("say")
     assert turn is not None
     assert say is not None
-    assert sentence(pepper, turn, {"direction": "right"}) == "Pepper turns right by 90 °"
-    assert sentence(pepper, say, {"text": "Hi"}) == "Pepper says “Hi”"
+    assert activity_text(pepper, turn, {"direction": "right"}) == "Pepper turns right by 90 °"
+    assert activity_text(pepper, say, {"text": "Hi"}) == "Pepper says “Hi”"
 
 
 def test_placeholders_in_robot_block_text_are_parsed():
-    parts = TextParts("%robot say %text loud %text %nobody %ROBOT", ["text", "robot", "Text", "live"])
+    parts = BlockTemplate("%robot say %text loud %text %nobody %ROBOT", ["text", "robot", "Text", "live"])
     assert parts.text == "%ROBOT say %TEXT loud   "
     assert parts.arguments == {"text": "TEXT", "robot": "ROBOT_2", "Text": "TEXT_2", "live": "LIVE_2"}
-    assert TextParts("wave", []).text == "%ROBOT wave"
+    assert BlockTemplate("wave", []).text == "%ROBOT wave"
 
 
 def test_ids_are_made_unique():

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.blocks.model.template import expression, holes, literal, statements
+from app.blocks.model.template import expression, literal, placeholders, statements
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -62,4 +62,4 @@ def test_variable_placeholder_is_used_for_reading_and_setting():
 def test_missing_placeholder_value_is_named():
     with pytest.raises(KeyError, match="NOTHING"):
         expression("f(%NOTHING)", {})
-    assert holes("f(%A, **%B_2)") == {"A", "B_2"}
+    assert placeholders("f(%A, **%B_2)") == {"A", "B_2"}

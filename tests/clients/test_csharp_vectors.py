@@ -147,11 +147,11 @@ def losses_in_python(steps: list[tuple[str, int, int]]) -> list[object]:
     def connect(id: int, history: int) -> None:
         record = PublisherRecord(id, "t", "json", "json", history=history)
         source = sources.add_listed(RemotePublisher(record, "n", "name"))
-        source.is_silent, source.ends_at = False, None
+        source.is_silent, source.bye_deadline = False, None
 
     do: dict[str, Callable[[int, int], object]] = {
         "listed": connect,
-        "expect": lambda id, _number: sources.expect_all_of(id),
+        "expect": lambda id, _number: sources.expect_all_messages(id),
         "arrived": lambda id, number: sources.count_message(id, number, is_alone=False),
         "alone": lambda id, number: sources.count_message(id, number, is_alone=True),
         "early": lambda id, _number: sources.is_early(id),
@@ -197,7 +197,7 @@ def clock_in_python(steps: list[tuple[str, int, int]]) -> list[object]:
         if step == "add":
             results.append(samples.add(sent, first, second))
         elif step == "forget":
-            samples.forget()
+            samples.clear()
         else:
             wall, steady = first, second
             sent = samples.now() if step == "now" else sent

@@ -32,7 +32,7 @@ def save_for_ever(path: Path, journals: Path, begin: int, saved: int) -> None:
     number = begin
     while True:
         number += 1
-        document.edited(blocks(number))
+        document.apply_edit(blocks(number))
         document.save(path)
         os.write(saved, b"s")
 

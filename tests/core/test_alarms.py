@@ -12,7 +12,7 @@ from app.core.alarms import FILE, MAX_AGE_S
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
-from nep.programs.alarms.rule_file import alarms_text, read_alarms
+from nep.programs.alarms.rule_file import encode_alarms, read_alarms
 from tests.core.robots.test_motion_gate import TOPIC, real_robot
 from tests.core.waiting import tick_until
 from tests.nep.alarms.scene import message
@@ -44,15 +44,15 @@ def test_alarm_triggered_by_a_value_calls_a_service_and_publishes(session: Sessi
             AlarmAction("console"),
         )
         rule = AlarmRule("d", BELOW, actions)
-        session.alarms.put(rule)
+        session.alarms.set_rule(rule)
         tick_until(session, lambda: publisher.subscribers == 1)
         publisher.publish({"range": 0.36})
         tick_until(session, lambda: alert(session, rule) is not None)
         record = session.alarms.history.records[0]
-        tick_until(session, lambda: len(record.deeds) == 4)
+        tick_until(session, lambda: len(record.action_results) == 4)
         assert asked == [{"n": 1}]
         assert heard.listen(timeout_s=5.0) == (True, {"say": "near"})
-        assert {deed.kind: deed.words for deed in record.deeds} == {
+        assert {deed.kind: deed.text for deed in record.action_results} == {
             "call": "restart replied",
             "send": "sent to /say",
             "keep": "nothing saved: the flight recorder is off",
@@ -60,18 +60,18 @@ def test_alarm_triggered_by_a_value_calls_a_service_and_publishes(session: Sessi
         }
         said = alert(session, rule)
         assert said.title == "Range of /distance is 0.36, below 0.4."
-        assert not session.alerts.dismissed(said.id)
+        assert not session.alerts.is_dismissed(said.id)
         assert any(line.text.startswith("range of /distance") for line in session.console.records)
         publisher.publish({"range": 2})
         tick_until(session, lambda: alert(session, rule) is None)
-        assert record.lasted_s is not None
+        assert record.duration_s is not None
 
 
 def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, master) -> None:
     moved: list[tuple[object, str]] = []
     session.alarms.on_moved = lambda robots, by: moved.append((robots, by))
     rule = AlarmRule("d", BELOW, (AlarmAction("send", TOPIC, {"op": "invoke"}),))
-    session.alarms.put(rule)
+    session.alarms.set_rule(rule)
     with real_robot(session, master.address) as told, nep.node("sensor") as node:
         publisher = node.new_pub("/distance", "json")
         tick_until(session, lambda: publisher.subscribers == 1)
@@ -80,17 +80,20 @@ def test_alarm_moves_a_real_robot_only_after_confirmation(session: Session, mast
         def come_on() -> list[str]:
             """The alarm comes on anew; what became of its message so far."""
             publisher.publish({"range": 0.1})
-            tick_until(session, lambda: session.alarms.on)
-            return [deed.words for deed in session.alarms.history.records[0].deeds]
+            tick_until(session, lambda: session.alarms.active)
+            return [deed.text for deed in session.alarms.history.records[0].action_results]
 
         assert come_on() == []
         tick_until(session, lambda: permission.question is not None)
         assert permission.question.title == "Allow Rover to move?"
-        assert f"An alarm wants to send a message on {TOPIC}" in permission.question.sentence
+        assert f"An alarm wants to send a message on {TOPIC}" in permission.question.message
         permission.answer(let=False)
-        tick_until(session, lambda: session.alarms.history.records[0].deeds)
-        assert session.alarms.history.records[0].deeds[0].words == "not sent: Rover is not allowed to move"
-        session.alarms.put(AlarmRule("e", BELOW, rule.actions))
+        tick_until(session, lambda: session.alarms.history.records[0].action_results)
+        assert (
+            session.alarms.history.records[0].action_results[0].text
+            == "not sent: Rover is not allowed to move"
+        )
+        session.alarms.set_rule(AlarmRule("e", BELOW, rule.actions))
         publisher.publish({"range": 0.1})
         tick_until(session, lambda: permission.question is not None)
         assert (told, moved) == ([], [])
@@ -103,16 +106,16 @@ def test_alarm_without_banner_is_shown_only_in_the_alert_list(session: Session) 
     with nep.node("robot") as node:
         publisher = node.new_pub("/distance", "json")
         rule = AlarmRule("d", BELOW, ())
-        session.alarms.put(rule)
+        session.alarms.set_rule(rule)
         tick_until(session, lambda: publisher.subscribers == 1)
         publisher.publish({"range": 0.1})
         tick_until(session, lambda: alert(session, rule) is not None)
-        assert session.alerts.dismissed("alarm:d")
-        assert [each.id for each in session.alarms.on] == ["d"]
+        assert session.alerts.is_dismissed("alarm:d")
+        assert [each.id for each in session.alarms.active] == ["d"]
         session.alarms.remove("d")
         tick_until(session, lambda: alert(session, rule) is None)
         assert publisher.subscribers == 1 or not session.alarms.alarms.evaluator.topics
-        session.alarms.put_back()
+        session.alarms.restore()
         assert [each.id for each in session.alarms.rules] == ["d"]
 
 
@@ -123,9 +126,9 @@ def at_rest(folder: Path) -> Session:
 
 def test_alarms_and_their_history_survive_a_restart(tmp_path: Path) -> None:
     first = at_rest(tmp_path)
-    kept = first.alarms.new(BELOW)
-    first.alarms.new(AlarmCondition("silent", "", for_s=2.0))  # nobody has said which topic
-    first.alarms.new(AlarmCondition("below", "/distance", "", 1))  # ... or which value
+    kept = first.alarms.create(BELOW)
+    first.alarms.create(AlarmCondition("silent", "", for_s=2.0))  # nobody has said which topic
+    first.alarms.create(AlarmCondition("below", "/distance", "", 1))  # ... or which value
     first.alarms.snooze(kept.id, 4e9)
     first.close()
     assert [rule.id for rule in read_alarms(tmp_path / FILE).rules] == [kept.id]
@@ -139,18 +142,18 @@ def test_number_of_alarms_is_limited_to_the_file_capacity(tmp_path: Path, monkey
     monkeypatch.setattr("app.core.alarms.MAX_ALARMS", 5)
     session = at_rest(tmp_path)
     for _ in range(5):
-        session.alarms.new(BELOW)
+        session.alarms.create(BELOW)
     first = session.alarms.rules[-1]
     session.alarms.remove(first.id)
-    session.alarms.new(BELOW)
+    session.alarms.create(BELOW)
     assert all(each.id != "alarms:most" for each in session.alerts.active)
-    one_more = session.alarms.new(BELOW)
-    session.alarms.put_back()  # its place is taken
+    one_more = session.alarms.create(BELOW)
+    session.alarms.restore()  # its place is taken
     assert not {one_more.id, first.id} & {rule.id for rule in session.alarms.rules}
     assert any(each.id == "alarms:most" for each in session.alerts.active)
     session.alarms.remove(session.alarms.rules[0].id)
     assert all(each.id != "alarms:most" for each in session.alerts.active)
-    session.alarms.put_back()
+    session.alarms.restore()
     session.close()
     assert len(read_alarms(tmp_path / FILE).rules) == 5
 
@@ -158,7 +161,7 @@ def test_number_of_alarms_is_limited_to_the_file_capacity(tmp_path: Path, monkey
 def test_active_alarm_is_shown_even_if_its_history_record_was_evicted(tmp_path: Path) -> None:
     session = at_rest(tmp_path)
     rule = AlarmRule("d", BELOW, (AlarmAction("banner"),))
-    session.alarms.put(rule)
+    session.alarms.set_rule(rule)
     session.alarms.evaluate("/distance", [message("/distance", {"range": 0.1})])
     session.tick()
     session.alarms.history.records.clear()
@@ -177,13 +180,13 @@ def test_damaged_file_is_backed_up_and_reported(tmp_path: Path, data: bytes) -> 
     assert (tmp_path / "alarms.damaged.json").read_bytes() == data
     (said,) = [each for each in session.alerts.active if each.id == "alarms:file"]
     assert "alarms.damaged.json" in said.detail
-    session.alarms.new(BELOW)
+    session.alarms.create(BELOW)
     session.close()
     assert len(read_alarms(tmp_path / FILE).rules) == 1
 
 
 def test_invalid_alarm_in_the_file_does_not_disable_the_others(tmp_path: Path) -> None:
-    text = json.loads(alarms_text([AlarmRule("good", BELOW)]))
+    text = json.loads(encode_alarms([AlarmRule("good", BELOW)]))
     text["alarms"].append({"when": {"topic": "/t", "is": "sielnt"}})
     (tmp_path / FILE).write_text(json.dumps(text), encoding="utf-8")
     session = at_rest(tmp_path)
@@ -196,7 +199,7 @@ def test_file_of_a_newer_version_is_not_modified(tmp_path: Path) -> None:
     data = b'{"format": 2, "alarms": [], "more": true}'
     (tmp_path / FILE).write_bytes(data)
     session = at_rest(tmp_path)
-    session.alarms.new(BELOW)
+    session.alarms.create(BELOW)
     session.close()
     assert (tmp_path / FILE).read_bytes() == data
     assert not (tmp_path / "alarms.damaged.json").exists()
@@ -208,7 +211,7 @@ def test_alarm_message_expires_if_no_master_is_found_in_time(tmp_path: Path) -> 
     jobs = []
     session.source.submit = lambda _what, job: jobs.append(job)  # type: ignore[method-assign]
     told: list[tuple[bool, str]] = []
-    session.alarms._command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
+    session.alarms._submit_command(None, AlarmAction("send", "/cmd", 1), lambda *said: told.append(said))  # type: ignore[arg-type]
     now[0] += MAX_AGE_S + 1
     jobs[0](None)
     assert told == [(False, "no master was running")]

@@ -10,50 +10,50 @@ from app.core.alerts import Alerts
 def test_alerts_are_sorted_by_severity_then_age() -> None:
     times = iter([1.0, 2.0, 3.0, 4.0])
     alerts = Alerts(lambda: next(times))
-    alerts.put("a", "info", "a")
-    alerts.put("b", "warn", "b")
-    alerts.put("c", "error", "c")
-    alerts.put("d", "warn", "d")
+    alerts.raise_alert("a", "info", "a")
+    alerts.raise_alert("b", "warn", "b")
+    alerts.raise_alert("c", "error", "c")
+    alerts.raise_alert("d", "warn", "d")
     assert [alert.id for alert in alerts.active] == ["c", "b", "d", "a"]
 
 
 def test_repeated_alert_updates_its_count_and_keeps_its_start_time() -> None:
     times = iter([1.0, 9.0])
     alerts = Alerts(lambda: next(times))
-    alerts.put("a", "warn", "one message")
-    alerts.put("a", "warn", "five messages", count=4)
+    alerts.raise_alert("a", "warn", "one message")
+    alerts.raise_alert("a", "warn", "five messages", count=4)
     (alert,) = alerts.active
     assert (alert.count, alert.title, alert.since_s) == (5, "five messages", 1.0)
 
 
 def test_repeated_alert_with_zero_count_changes_nothing() -> None:
     alerts = Alerts(lambda: 1.0)
-    alerts.put("a", "warn", "same")
+    alerts.raise_alert("a", "warn", "same")
     revision = alerts.revision
-    alerts.put("a", "warn", "same", count=0)
+    alerts.raise_alert("a", "warn", "same", count=0)
     assert alerts.revision == revision
 
 
 def test_resolved_alert_is_removed_and_shown_again_when_it_recurs() -> None:
     alerts = Alerts(lambda: 1.0)
-    alerts.put("a", "warn", "a")
+    alerts.raise_alert("a", "warn", "a")
     alerts.dismiss("a")
-    assert alerts.dismissed("a")
+    assert alerts.is_dismissed("a")
     assert alerts.active
     alerts.resolve("a")
     assert not alerts.active
-    alerts.put("a", "warn", "a")
-    assert not alerts.dismissed("a")
+    alerts.raise_alert("a", "warn", "a")
+    assert not alerts.is_dismissed("a")
 
 
 def test_cure_all_removes_alerts_by_prefix() -> None:
     alerts = Alerts(lambda: 1.0)
     for id in ("message:/a", "message:/b", "master"):
-        alerts.put(id, "warn", id)
+        alerts.raise_alert(id, "warn", id)
     alerts.resolve_all("message:")
     assert [alert.id for alert in alerts.active] == ["master"]
 
 
 def test_unknown_severity_is_rejected() -> None:
     with pytest.raises(ValueError, match="no severity 'bad'"):
-        Alerts().put("a", "bad", "a")
+        Alerts().raise_alert("a", "bad", "a")

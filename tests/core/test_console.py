@@ -59,7 +59,7 @@ def test_log_records_are_decoded_lazily() -> None:
     first, told, last = console.records
     assert (first.text, last.text) == ("first", "last")
     assert (told.level, told.origin, told.logger, told.text) == ("warn", "Pepper", "driver", "low")
-    assert (told.stamp_s, told.place) == (9.0, "a.py:3")
+    assert (told.stamp_s, told.location) == (9.0, "a.py:3")
     assert [line.number for line in console.records] == [1, 2, 3]
     assert (console.revision, sent.reads) == (3, 1)  # reading is no change, and done once
 
@@ -78,8 +78,8 @@ def test_dropped_records_are_counted() -> None:
 
 def test_records_of_a_local_program_are_not_duplicated() -> None:
     console = Console()
-    console.leave_out(None)
-    console.leave_out(77)
+    console.ignore_process(None)
+    console.ignore_process(77)
     console.add_messages([record(text="mine", pid=77), record(text="theirs", pid=78), record(text="unsaid")])
     assert [line.text for line in console.records] == ["theirs", "unsaid"]
 

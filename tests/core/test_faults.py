@@ -13,8 +13,8 @@ import pytest
 
 import nep
 from app.core import faults
-from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_words
-from app.core.network.source import GraphSeen, JobFailed, LiveSource, MasterFound
+from app.core.faults import FaultAlerts, LogFile, RepeatFilter, error_text
+from app.core.network.source import GraphReceived, JobFailed, LiveSource, MasterFound
 from app.core.robots.stop.report import StopDone, StopReport
 from app.core.run.runner import RunnerEvent
 from app.core.session import Session
@@ -69,8 +69,8 @@ def test_faults_are_distinguished_by_place_and_text() -> None:
         return once.filter(logging.LogRecord("qt", logging.WARNING, "", 0, text, (), None)) is not None
 
     assert [said(text) for text in ("one", "other", "one", "other")] == [True, True, False, False]
-    assert all(said(f"text {number}") for number in range(2 * faults.FAULTS_KEPT))
-    assert len(once._counts) == faults.FAULTS_KEPT
+    assert all(said(f"text {number}") for number in range(2 * faults.MAX_COUNTED_FAULTS))
+    assert len(once._counts) == faults.MAX_COUNTED_FAULTS
     assert said("one")  # so long ago that it is new
 
 
@@ -165,8 +165,8 @@ def test_system_exit_and_keyboard_interrupt_are_not_logged_as_faults(
 
 
 def test_exception_is_formatted_on_one_line() -> None:
-    assert error_words(ValueError("two\nlines")) == "ValueError: two lines"
-    assert error_words(KeyError()) == "KeyError"
+    assert error_text(ValueError("two\nlines")) == "ValueError: two lines"
+    assert error_text(KeyError()) == "KeyError"
 
 
 # -- a tick ----------------------------------------------------------------------------------------
@@ -262,7 +262,7 @@ def test_fault_alert_is_resolved_after_the_operation_succeeds_for_some_seconds(
             session.tick()
 
     with monkeypatch.context() as broken:
-        broken.setattr(session.nodes, "age", raising)
+        broken.setattr(session.nodes, "update_ages", raising)
         broken.setattr(session.traffic, "add", raising)
         seconds(90)
         assert session.alerts.has("studio"), "it goes on"
@@ -319,7 +319,7 @@ def test_source_thread_survives_exceptions_in_jobs_and_sinks(master: Master) -> 
         source.submit("do the impossible", raising)
         source.submit("do it", lambda _node: done.set())
         assert done.wait(20)
-        assert [e.sentence for e in events if isinstance(e, JobFailed)] == [
+        assert [e.message for e in events if isinstance(e, JobFailed)] == [
             "ValueError: invalid literal for int() with base 10: 'x'"
         ]
         with nep.node("talker", master=master.address) as node:
@@ -337,7 +337,7 @@ def test_source_thread_survives_an_exception_in_the_graph_handler(
     again = threading.Event()
 
     def take(event: object) -> None:
-        if isinstance(event, GraphSeen):
+        if isinstance(event, GraphReceived):
             seen.append(event)
             if len(seen) > 1:
                 again.set()

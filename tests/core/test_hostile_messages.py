@@ -10,7 +10,7 @@ import pytest
 import nep
 from app.core.session import Session
 from app.errors import DescriptionError
-from app.robots.description.description import announced, td_for
+from app.robots.description.description import parse_announcement, thing_description
 from app.robots.description.model import Robot
 from app.robots.driver.driver import Driver
 from app.robots.virtual.room_map import TOPIC as ROOM_TOPIC
@@ -60,7 +60,7 @@ def evil(master):
 def test_session_survives_every_hostile_message(session: Session, evil: nep.Node, caplog) -> None:
     watches = [session.watch("/watched"), session.watch("/Lamp/state")]
     condition = AlarmCondition("above", "/watched", "pose.x", 3.0)
-    session.alarms.put(AlarmRule("1", condition, (AlarmAction("show"),)))
+    session.alarms.set_rule(AlarmRule("1", condition, (AlarmAction("show"),)))
     publishers = [evil.new_pub(topic, msg_type) for topic, msg_type in MESSAGES]
     with nep.node("lamp") as node, Driver(LAMP, "Lamp", node):
         tick_until(session, lambda: session.fleet.connected and publishers[-1].subscribers)
@@ -77,10 +77,10 @@ def test_session_survives_every_hostile_message(session: Session, evil: nep.Node
         tick_until(session, lambda: any(each.text == "an honest record" for each in session.console.records))
         tick_until(session, lambda: session.fleet.link("Lamp").publisher)
         blink = session.fleet.invoke("Lamp", "blink", {})
-        tick_until(session, lambda: not blink.running)
+        tick_until(session, lambda: not blink.is_running)
         assert blink.state == "succeeded"
         stopped = session.stopper.stop_all(["Lamp"])
-        assert [each.answered for each in stopped.robots] == [True]
+        assert [each.is_confirmed for each in stopped.robots] == [True]
     assert [record for record in caplog.records if record.exc_info] == []
     assert [each.name for each in threads if not each.is_alive() and "lamp" not in each.name.lower()] == []
     for watch in watches:
@@ -88,12 +88,12 @@ def test_session_survives_every_hostile_message(session: Session, evil: nep.Node
 
 
 def test_descriptions_are_parsed_or_rejected_with_a_message():
-    described = td_for(LAMP.thing_model, "Lamp")
+    described = thing_description(LAMP.thing_model, "Lamp")
     sentences: list[str] = []
     seen: set[type] = set()
     for payload in hostile.payloads(described, share=7):
         try:
-            robot = announced(Message("/Lamp/description", payload, "json", "robot/description"))
+            robot = parse_announcement(Message("/Lamp/description", payload, "json", "robot/description"))
         except (DescriptionError, DecodeError) as error:
             sentences.append(str(error))
             seen.add(type(error))

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 
-from app.__main__ import still_running
+from app.__main__ import join_threads
 
 PROGRAM = """
 import logging, sys, threading
@@ -46,7 +46,7 @@ def test_thread_that_ends_in_time_is_joined() -> None:
 
     thread = threading.Thread(target=last, name="last")
     thread.start()
-    assert "last" in still_running(0.0)
+    assert "last" in join_threads(0.0)
     go.set()
-    assert "last" not in still_running(30.0)
+    assert "last" not in join_threads(30.0)
     assert gone.is_set()

@@ -23,7 +23,7 @@ def program(tmp_path: Path) -> Path:
 def test_unchanged_program_is_reported_as_unchanged(program: Path) -> None:
     own = OwnProgram(program)
     program.read_bytes()
-    assert own.fate() == ""
+    assert own.executable_state() == ""
 
 
 def test_update_with_same_size_and_time_is_detected_as_replaced(program: Path) -> None:
@@ -32,19 +32,19 @@ def test_update_with_same_size_and_time_is_detected_as_replaced(program: Path) -
     new.write_bytes(b"new")
     shutil.copystat(program, new)
     new.replace(program)
-    assert own.fate() == "replaced"
+    assert own.executable_state() == "replaced"
 
 
 def test_removed_program_is_detected_and_a_new_one_counts_as_replaced(program: Path) -> None:
     own = OwnProgram(program)
     program.rename(program.with_name("kept, so that its number is not given again"))
-    assert own.fate() == "gone"
+    assert own.executable_state() == "gone"
     program.write_bytes(b"new")
-    assert own.fate() == "replaced"
+    assert own.executable_state() == "replaced"
 
 
 def test_running_from_source_has_no_program_to_watch() -> None:
-    assert OwnProgram().fate() == ""
+    assert OwnProgram().executable_state() == ""
 
 
 def test_alert_about_a_changed_program_is_shown_and_resolved_with_its_cause(
@@ -75,7 +75,7 @@ def test_check_of_the_program_file_preserves_the_alert_of_a_behaviour(
 ) -> None:
     session = Session(Settings(tmp_path / "home"), journal_folder=tmp_path / "j", start_processes=False)
     try:
-        session.alerts.put("program", "error", "The behaviour stopped unexpectedly.")
+        session.alerts.raise_alert("program", "error", "The behaviour stopped unexpectedly.")
         session._check(0.0)
         assert [each.title for each in session.alerts.active if each.id == "program"] == [
             "The behaviour stopped unexpectedly."

@@ -14,9 +14,9 @@ import pytest
 
 import nep
 from app.core.network.source import JobFailed
-from app.core.session import NO_WATCH, Session
-from app.errors import RobotInputError, RobotUnknownError
-from app.robots.description.description import td_for
+from app.core.session import MONITORING_FAILED, Session
+from app.errors import RobotInputError, UnknownRobotError
+from app.robots.description.description import thing_description
 from app.robots.kit import Call, Driver, Kind, Link, action, safe_stop
 from tests.core.waiting import tick_until
 
@@ -107,14 +107,14 @@ def test_virtual_robot_is_found_watched_tried_and_stopped(session: Session) -> N
     link = session.fleet.link("Pepper")
     assert link is not None
     assert link.virtual
-    tick_until(session, lambda: link.chip == "virtual, ready")
-    with session.fleet.look_at("Pepper"):
+    tick_until(session, lambda: link.chip_text == "virtual, ready")
+    with session.fleet.watch_sensors("Pepper"):
         tick_until(session, lambda: "distance" in link.values and link.drawing is not None)
         stream = session.images.stream("/Pepper/camera")
         tick_until(session, lambda: stream.picture is not None)
         stream.close()
         said = session.fleet.invoke("Pepper", "say", {"text": "hi"})
-        tick_until(session, lambda: not said.running)
+        tick_until(session, lambda: not said.is_running)
         assert said.state == "succeeded", said
         walk = session.fleet.invoke("Pepper", "walk", {"distance": 2.0})
         tick_until(session, lambda: link.drawing is not None and link.drawing["moving"])
@@ -157,10 +157,10 @@ def test_hung_virtual_robot_can_be_reconnected(session: Session) -> None:
 def test_unwritable_journal_raises_an_alert_until_it_is_writable(session: Session, tmp_path: Path) -> None:
     folder = tmp_path / "journal"
     folder.write_text("a file is in its place")
-    session.document.edited({"blocks": {"blocks": []}, "edit": 1})
+    session.document.apply_edit({"blocks": {"blocks": []}, "edit": 1})
     tick_until(session, lambda: session.alerts.has("journal"))
     folder.unlink()
-    session.document.edited({"blocks": {"blocks": []}, "edit": 2})
+    session.document.apply_edit({"blocks": {"blocks": []}, "edit": 2})
     tick_until(session, lambda: not session.alerts.has("journal"))
 
 
@@ -172,7 +172,7 @@ def test_invalid_input_is_rejected_before_it_is_sent(session: Session) -> None:
             tick_until(session, lambda: session.fleet.connected)
             with pytest.raises(RobotInputError):
                 session.fleet.invoke("Lamp", "blink", {"colour": 5})
-            with pytest.raises(RobotUnknownError):
+            with pytest.raises(UnknownRobotError):
                 session.fleet.invoke("Nobody", "blink", {})
         finally:
             driver.close()
@@ -181,14 +181,14 @@ def test_invalid_input_is_rejected_before_it_is_sent(session: Session) -> None:
 def test_example_runs_and_its_stop_is_confirmed(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
-    session.document.example(EXAMPLES / "1-greeting.nepb")
+    session.document.open_example(EXAMPLES / "1-greeting.nepb")
     assert not [p for p in session.document.problems() if p.severity == "error"]
     session.runs.run()
     tick_until(session, lambda: session.runs.running_blocks)
     assert session.runs.view().state == "running"
     session.runs.pause()
     tick_until(session, lambda: session.runs.view().state == "paused")
-    session.runs.go_on()
+    session.runs.resume()
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "proven")
     assert session.runs.view().result_status == "ok"
@@ -206,7 +206,7 @@ def test_example_runs_and_its_stop_is_confirmed(session: Session) -> None:
 def test_virtual_robot_whose_process_ended_needs_no_manual_switch_off(session: Session) -> None:
     session.launcher.start_virtual_robot("Pepper")
     tick_until(session, lambda: session.fleet.connected and session.stopper and session.stopper.robots)
-    session.document.example(EXAMPLES / "1-greeting.nepb")
+    session.document.open_example(EXAMPLES / "1-greeting.nepb")
     session.runs.run()
     tick_until(session, lambda: session.runs.running_blocks)
     session.launcher._robots["Pepper"][0].kill()
@@ -221,7 +221,7 @@ def test_virtual_robot_whose_process_ended_needs_no_manual_switch_off(session: S
 def test_program_with_an_error_marks_its_block_and_does_not_run(session: Session) -> None:
     block = {"type": "control_wait", "id": "w", "inputs": {}}
     started = {"type": "events_started", "id": "s", "next": {"block": block}}
-    session.document.edited({"blocks": {"languageVersion": 0, "blocks": [started]}})
+    session.document.apply_edit({"blocks": {"languageVersion": 0, "blocks": [started]}})
     session.runs.run()
     assert "w" in session.runs.block_errors
     assert session.runs.view().state == "ready"
@@ -234,7 +234,7 @@ def test_robots_of_a_killed_program_are_stopped(session: Session) -> None:
         commands = node.new_sub("/Lamp/command", "robot/command")
         try:
             tick_until(session, lambda: session.stopper and session.stopper.robots)
-            session.document.edited(json.loads(json.dumps(_forever())))
+            session.document.apply_edit(json.loads(json.dumps(_forever())))
             session.runs.run()
             tick_until(session, lambda: "w" in session.runs.running_blocks)
             runner = session.runs._runner
@@ -263,7 +263,7 @@ def test_end_of_a_program_stops_only_its_own_robots(session: Session) -> None:
             tick_until(session, lambda: session.stopper and len(session.stopper.robots) == 2)
             blink = {"type": "robot_lamp_do_blink", "id": "b", "fields": {"ROBOT": "Lamp"}}
             started = {"type": "events_started", "id": "s", "next": {"block": blink}}
-            session.document.edited({"blocks": {"languageVersion": 0, "blocks": [started]}})
+            session.document.apply_edit({"blocks": {"languageVersion": 0, "blocks": [started]}})
             session.runs.run()
             tick_until(session, lambda: session.runs.view().title.startswith("Finished"))
             assert session.runs.view().result is not None
@@ -281,16 +281,16 @@ def test_end_of_a_program_stops_only_its_own_robots(session: Session) -> None:
 def test_unresponsive_robot_is_named_and_run_stays_disabled(session: Session) -> None:
     with nep.node("mute") as node:
         description = node.new_pub("/Mute/description", "robot/description", latched=True)
-        description.publish(td_for(LAMP.thing_model, "Mute"))
+        description.publish(thing_description(LAMP.thing_model, "Mute"))
         tick_until(session, lambda: session.stopper and session.stopper.robots)
         session.runs.stop()
-        tick_until(session, lambda: session.runs.view().stop_word == "Stopping")
+        tick_until(session, lambda: session.runs.view().stop_label == "Stopping")
         tick_until(session, lambda: session.runs.view().state == "unanswered")
         view = session.runs.view()
         assert view.title.startswith("Mute ")
         assert not view.can_run
         assert any(alert.id == "stop" for alert in session.alerts.active)
-        session.runs.confirm_still()
+        session.runs.confirm_stopped()
         assert session.runs.view().state == "ready"
         assert not any(alert.id == "stop" for alert in session.alerts.active)
 
@@ -308,7 +308,7 @@ def _number(value: float) -> dict[str, object]:
 
 
 def test_failed_network_job_is_reported_in_one_sentence(session: Session) -> None:
-    session._on_event(JobFailed(NO_WATCH, "the master has gone"), 0.0)
+    session._on_event(JobFailed(MONITORING_FAILED, "the master has gone"), 0.0)
     session._on_event(JobFailed("", "nobody asked"), 0.0)
     texts = [record.text for record in session.console.records]
     assert "can't monitor the robots: the master has gone" in texts

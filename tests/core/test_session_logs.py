@@ -94,7 +94,9 @@ def test_program_output_is_shown_once_even_if_it_is_also_published_as_log(sessio
 
     with nep.node("page") as page, page.new_sub("/nep/log", "nep/log") as records:
         tick_until(session, lambda: session.master.kind == "connected")
-        session.document.edited(workspace(stack(started(), write(text("hello")), write(number(7)), waits)))
+        session.document.apply_edit(
+            workspace(stack(started(), write(text("hello")), write(number(7)), waits))
+        )
         session.runs.run()
 
         def by_both_ways() -> bool:

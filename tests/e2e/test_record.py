@@ -32,7 +32,7 @@ def test_recording_contains_every_message_published_meanwhile(studio: Studio) ->
             assert recording.is_complete
             heard = [each.message.payload for each in recording.read(topics=("/distance",))]
             assert heard == [{"range": number} for number in range(50)]
-            assert recording.figures()["/distance"].lost == 0
+            assert recording.stats()["/distance"].lost == 0
         studio.click("Show")
         studio.find(path.stem, kind="ElidedLabel")
         studio.screen.key("F2")

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from app.ui.startup.single_instance import place
+from app.ui.startup.single_instance import socket_name
 from tests.e2e.behaviours import say, started, write
 from tests.e2e.studio import END_S, Studio
 from tests.e2e.waiting import until
@@ -37,7 +37,7 @@ def renderers_of(studio: Studio) -> list[psutil.Process]:
 
 def has_looked_back(studio: Studio) -> None:
     """What a start does before it can be found by others."""
-    until(lambda: Path(place(studio.home)).exists(), "it can be found")
+    until(lambda: Path(socket_name(studio.home)).exists(), "it can be found")
     studio.choose("Help", "About NEP Studio")
     studio.says("Copy version information")
     studio.screen.key("Escape")

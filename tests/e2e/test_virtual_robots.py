@@ -67,7 +67,7 @@ class RoomOnScreen:
         x, y, wide, high = self.studio.find(kind="RoomView")["rect"]
         bounds = RoomBounds(-2.5, 3.0, -2.5, 2.5)
         stage = Stage(QRectF(x, y, wide, high), bounds)
-        spot = stage.spot(*place)
+        spot = stage.spot_at(*place)
         at = stage.origin + QPointF(spot.u, spot.v - up * spot.scale) * stage.scale
         return at.x(), at.y()
 

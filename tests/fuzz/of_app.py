@@ -21,7 +21,7 @@ if IS_THERE:  # they are no needs of the library's own
     from app.blocks.runtime.variables import VariableValue
     from app.core.documents.file_format import BehaviourFile, parse_file, write_file
     from app.core.messages.lazy_json import JsonIndex, LazyList, LazyObject
-    from app.core.robots.voices import Heard
+    from app.core.robots.voices import RobotSound
     from app.core.storage.settings import Settings
     from app.errors import DescriptionError, DocumentError
     from app.robots import rize
@@ -106,7 +106,7 @@ if IS_THERE:  # they are no needs of the library's own
             path.write_bytes(data)
             settings = Settings(Path(folder))
             assert isinstance(settings.get("theme", ""), str)
-            assert all(isinstance(each.opened_s, float) for each in settings.recent_known)
+            assert all(isinstance(each.opened_s, float) for each in settings.all_recent)
             settings.set("theme", "light")
             assert Settings(Path(folder)).get("theme", "") == "light"
 
@@ -127,10 +127,10 @@ if IS_THERE:  # they are no needs of the library's own
     )
     def neighbours_of_robots(data: bytes) -> None:
         heard = Neighbours("b", Still(), 1)
-        heard.hear(map_of(data))
-        for each in heard.others():
+        heard.receive(map_of(data))
+        for each in heard.present_robots():
             assert each.name
-        heard.makes_way(0.0, 0.0, 0.5)
+        heard.must_give_way(0.0, 0.0, 0.5)
 
     class Still:
         """A clock that stands."""
@@ -151,7 +151,7 @@ if IS_THERE:  # they are no needs of the library's own
         words=(b'"notes":', b'"volume":', b'"sound":', b"NaN", b"1" * 400),
     )
     def voices_of_robots(data: bytes) -> None:
-        heard = Heard.parse(map_of(data))
+        heard = RobotSound.parse(map_of(data))
         assert 0.0 <= heard.volume <= 1.0 or heard.volume != heard.volume
         assert isinstance(heard.notes, tuple)
 
@@ -162,7 +162,7 @@ if IS_THERE:  # they are no needs of the library's own
     def answers_of_rize(data: bytes) -> None:
         value = value_of(data)
         rize.ready(value)
-        rize.from_answer(value)
+        rize.from_reply(value)
 
     @TARGETS.add(
         KeyError,

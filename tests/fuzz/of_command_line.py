@@ -7,13 +7,21 @@ import json
 import orjson
 
 from nep.cli import topic_patterns
-from nep.cli.publish import value_of as payload_of
-from nep.cli.values import json_of, presented
+from nep.cli.publish import parse_payload as payload_of
+from nep.cli.values import format_payload, json_of
 from nep.errors import EncodeError, NepError, WrongTypeError
 from nep.messages.codecs import CODECS
-from nep.messages.fields import MISSING, leaves, parse_path, pick
-from nep.system.arguments import at_least, limit, one_of, period, seconds, text, within
-from nep.text import control_in, escaped, harmless, shortened
+from nep.messages.fields import MISSING, leaf_paths, parse_path, value_at
+from nep.system.arguments import (
+    check_at_least,
+    check_choice,
+    check_optional_time_limit,
+    check_period,
+    check_range,
+    check_time_limit,
+    check_type_name,
+)
+from nep.text import escaped, first_control, shortened, strip_controls
 from tests.fuzz.target import SEPARATOR, Targets, joined, parts_of, text_of, value_of
 
 TARGETS = Targets()
@@ -43,13 +51,13 @@ def fields() -> list[bytes]:
 def field_paths(data: bytes) -> None:
     path, *rest = parts_of(data)
     value = value_of(b"".join(rest))
-    for leaf in leaves(value):
+    for leaf in leaf_paths(value):
         try:
             steps = parse_path(leaf)
         except NepError:
             continue  # a name that is empty, say
-        pick(value, steps)
-    found = pick(value, parse_path(text_of(path)))
+        value_at(value, steps)
+    found = value_at(value, parse_path(text_of(path)))
     assert found is MISSING or found is not None or value is not None
 
 
@@ -79,9 +87,9 @@ def values_on_a_terminal(data: bytes) -> None:
     for made in (json_of(value), json_of(value, indent=True)):
         json.loads(made)
     for whole in (False, True):
-        shown = presented(value, whole=whole)
+        shown = format_payload(value, whole=whole)
         shown.encode()
-        assert not control_in(shown.replace("\n", ""))
+        assert not first_control(shown.replace("\n", ""))
 
 
 @TARGETS.add(
@@ -92,9 +100,9 @@ def texts_of_strangers(data: bytes) -> None:
     said = text_of(data)
     for lines in (False, True):
         escaped(said, lines=lines).encode()
-        harmless(said, lines=lines).encode()
-        assert not control_in(escaped(said, lines=lines).replace("\n", "").replace("\t", ""))
-    assert not control_in(escaped(said))
+        strip_controls(said, lines=lines).encode()
+        assert not first_control(escaped(said, lines=lines).replace("\n", "").replace("\t", ""))
+    assert not first_control(escaped(said))
     assert len(shortened(said, 10)) < 100
 
 
@@ -109,13 +117,13 @@ def arguments(data: bytes) -> None:
     value = value_of(data)
     failed = []
     for check in (
-        lambda: text("name", value),
-        lambda: at_least("count", value, 0),
-        lambda: within("count", value, 0, 9),
-        lambda: 1.5 + (seconds("timeout_s", value) or 0.0),
-        lambda: 1.5 + period("period_s", value),
-        lambda: 1.5 + limit("rate", value),
-        lambda: one_of("mode", value, ("a", "b")),
+        lambda: check_type_name("name", value),
+        lambda: check_at_least("count", value, 0),
+        lambda: check_range("count", value, 0, 9),
+        lambda: 1.5 + (check_optional_time_limit("timeout_s", value) or 0.0),
+        lambda: 1.5 + check_period("period_s", value),
+        lambda: 1.5 + check_time_limit("rate", value),
+        lambda: check_choice("mode", value, ("a", "b")),
     ):
         try:
             check()

@@ -8,19 +8,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from nep.errors import NepError
-from nep.programs.bridges.configuration import join_line
-from nep.programs.bridges.toml_file import EXAMPLE, read_text
-from nep.programs.gateway.framing import FrameError, Shape, lost_numbers, shield_csharp, shield_javascript
+from nep.programs.bridges.configuration import configuration_from_arguments
+from nep.programs.bridges.toml_file import EXAMPLE, parse_configuration
+from nep.programs.gateway.framing import FrameError, Shape, has_replaced_nan, shield_csharp, shield_javascript
 from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
 from nep.programs.gateway.requests import (
     PORT_B,
     Member,
     Request,
     RequestError,
-    broadcast,
-    grant,
-    read_request,
-    refuse,
+    encode_broadcast,
+    encode_grant,
+    encode_rejection,
+    parse_request,
 )
 from tests.fuzz.target import Targets, joined, parts_of, text_of
 
@@ -43,15 +43,15 @@ REQUEST = {
 def requests_of_originals(data: bytes) -> None:
     for port in (7000, PORT_B):
         try:
-            asked = read_request(data, port)
+            asked = parse_request(data, port)
         except RequestError as error:
-            json.loads(refuse(error))
+            json.loads(encode_rejection(error))
             continue
         assert isinstance(asked, Request)
-        assert json.loads(grant(asked, 50_001))["topic"] == asked.topic
+        assert json.loads(encode_grant(asked, 50_001))["topic"] == asked.topic
         assert asked.framing in {"prefixed", "bare"}
         member = Member(asked.topic, asked.node, 1, asked.socket, asked.mode, asked.msg_type, asked.pid)
-        assert asked.topic in json.loads(broadcast([member])[len(b"master ") :])
+        assert asked.topic in json.loads(encode_broadcast([member])[len(b"master ") :])
 
 
 def frames() -> Iterator[bytes]:
@@ -70,12 +70,12 @@ SHAPES = tuple(
 @TARGETS.add(FrameError, seeds=frames, words=(b"t ", b"NaN", b"Infinity", b'"\\u0074', b"\\", b'"{'))
 def frames_of_originals(data: bytes) -> None:
     for shape in SHAPES:
-        shape.wants(data)
+        shape.matches_filter(data)
         try:
             said = shape.read(data)
         except FrameError:
             continue
-        lost_numbers(data, said)
+        has_replaced_nan(data, said)
         if shape.codec == "json" and not data.endswith(said):
             json.loads(said, parse_constant=refuse_constant)
         assert shape.read(shape.write(said)) == said or shape.codec == "json"
@@ -159,7 +159,7 @@ def the_gateways_file(data: bytes) -> None:
     slower=2,
 )
 def files_of_bridges(data: bytes) -> None:
-    made = read_text(text_of(data), "bridge.toml", "bridge")
+    made = parse_configuration(text_of(data), "bridge.toml", "bridge")
     assert made.topics
     for each in made.topics:
         assert each.origins
@@ -176,5 +176,5 @@ def files_of_bridges(data: bytes) -> None:
 )
 def bridges_of_one_line(data: bytes) -> None:
     a, b, direction = [*map(text_of, parts_of(data)), "", "", ""][:3]
-    made = join_line(a, b, name="x", direction=direction or "both")
+    made = configuration_from_arguments(a, b, name="x", direction=direction or "both")
     assert len(made.topics) == 1

@@ -15,11 +15,11 @@ import nep
 from nep.errors import DecodeError, EncodeError
 from nep.messages import image_codec
 from nep.messages.codecs import CODECS, find_nan
-from nep.messages.image_files import examine
+from nep.messages.image_files import parse_header
 from nep.messages.packing import pack, unpack, unpack_bounded, unpack_first
 from nep.messages.typed import TypedReader, message_type, typed_codec
 from nep.nodes.log_handler import LogRecord
-from nep.patterns.parameters.parameter import NodeParameter, declared
+from nep.patterns.parameters.parameter import NodeParameter, new_parameter
 from nep.programs.blackboard.board import Blackboard
 from nep.programs.blackboard.keys import key_matches, key_text, parse_key
 from nep.programs.bridges.trail import MAX_HOPS, read_trail
@@ -109,7 +109,7 @@ PNG_WORDS = (b"IHDR", b"IDAT", b"IEND", b"PLTE", b"tRNS", b"acTL", b"fdAT", b"\x
 @TARGETS.add(DecodeError, seeds=pictures, words=(*JPEG_WORDS, *PNG_WORDS))
 def picture_files(data: bytes) -> None:
     info = image_codec.picture_info(data)
-    found = examine(data)
+    found = parse_header(data)
     assert info == found.extension
     assert 1 <= found.orientation <= 8
     assert len(found.data) <= len(data)
@@ -117,7 +117,7 @@ def picture_files(data: bytes) -> None:
 
 @TARGETS.add(DecodeError, seeds=pictures, words=(*JPEG_WORDS, *PNG_WORDS), slower=8)
 def pictures_decoded(data: bytes) -> None:
-    found = examine(data)
+    found = parse_header(data)
     if found.width * found.height > 1_000_000:
         return  # it would be decoded, but it takes its time
     picture = image_codec.decode(memoryview(data), {})
@@ -232,7 +232,7 @@ def trails_of_bridges(data: bytes) -> None:
     trail = read_trail(map_of(data))
     assert len(trail.networks) <= MAX_HOPS + 2
     assert len(trail.bridges) <= MAX_HOPS + 2
-    trail.may_go("network", "bridge")
+    trail.may_forward("network", "bridge")
     assert read_trail({"bridge": trail.to_plain()}) == trail
 
 
@@ -290,4 +290,4 @@ def parameter(name: str, default: object, **limits: object) -> NodeParameter:
         "choices": (),
         "is_read_only": False,
     }
-    return declared(name, default, **{**every, **limits})
+    return new_parameter(name, default, **{**every, **limits})

@@ -8,24 +8,24 @@ import struct
 from collections.abc import Iterator
 from functools import cache
 
-from nep.backends.connection import checked_mode, checked_port
-from nep.backends.nanomsg.endpoints import endpoint, own_part, parse_endpoint, split_one
+from nep.backends.connection import parse_port, validate_mode
+from nep.backends.nanomsg.endpoints import endpoint, parse_endpoint, split_message, subscriber_topic_part
 from nep.backends.ros import carried, definition
-from nep.backends.ros.address import address_of
+from nep.backends.ros.address import ros_master_address
 from nep.backends.ros2.names import (
     dds_topic,
+    decode_user_data,
+    encode_user_data,
     ros_topic,
     ros_type,
     split_node_name,
     type_name,
-    user_data,
-    user_data_of,
 )
-from nep.backends.zenoh.keys import data_key, node_key, parse_live, publisher_key, subscriber_key, topic_of
+from nep.backends.zenoh.keys import data_key, node_key, parse_token, publisher_key, subscriber_key, topic_of
 from nep.errors import DecodeError, EncodeError, NepError, WireError
 from nep.protocol import wire
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
-from nep.system.addresses import checked_host, is_endpoint, is_loopback, master_address, nearest
+from nep.system.addresses import check_host, is_endpoint, is_loopback, master_address, reachable_endpoint
 from tests.fuzz.target import SEPARATOR, Targets, check_sentence, map_of, text_of
 
 TARGETS = Targets()
@@ -41,10 +41,10 @@ TARGETS = Targets()
 def addresses(data: bytes) -> None:
     text = text_of(data)
     if is_endpoint(text):
-        assert nearest([text], "192.168.1.1:7780") in {"", text} or "0.0.0.0" in text
+        assert reachable_endpoint([text], "192.168.1.1:7780") in {"", text} or "0.0.0.0" in text
     is_loopback(text)
     with contextlib.suppress(NepError):
-        assert checked_host(text) is text
+        assert check_host(text) is text
     found = master_address(text)
     assert 0 <= int(found.rpartition(":")[2]) < 65536
 
@@ -53,8 +53,8 @@ def addresses(data: bytes) -> None:
 def ports_and_modes(data: bytes) -> None:
     text = text_of(data)
     with contextlib.suppress(NepError):
-        assert checked_mode(text) == text
-    assert 1 <= checked_port(text) <= 65535
+        assert validate_mode(text) == text
+    assert 1 <= parse_port(text) <= 65535
 
 
 @TARGETS.add(
@@ -65,7 +65,7 @@ def ports_and_modes(data: bytes) -> None:
 def addresses_of_ros(data: bytes) -> None:
     text = text_of(data)
     if text:  # "" is what the environment says
-        assert 0 < int(address_of(text).rpartition(":")[2]) < 65536
+        assert 0 < int(ros_master_address(text).rpartition(":")[2]) < 65536
 
 
 # ---- ROS
@@ -190,7 +190,7 @@ def carried_by_ros(data: bytes) -> None:
         ("image", "sensor_msgs/CompressedImage"),
         ("image", "sensor_msgs/Image"),
     ):
-        reader = carried.unpacker(msg_type, kind, "")
+        reader = carried.unpacker_for(msg_type, kind, "")
         try:
             body, extension = reader.unpack(memoryview(data))
         except (WireError, struct.error) as error:
@@ -218,9 +218,9 @@ def names_of_ros2(data: bytes) -> None:
     space, name = split_node_name(text)
     assert name.isascii()
     assert space.isascii()
-    told = user_data_of(data)
+    told = decode_user_data(data)
     if all(each.isascii() for pair in told.items() for each in pair):
-        assert user_data_of(user_data(told)) == told
+        assert decode_user_data(encode_user_data(told)) == told
     with contextlib.suppress(NepError):
         assert ros_topic(dds_topic(text)) == f"/{text.removeprefix('/')}"
     type_name(text)
@@ -272,12 +272,12 @@ def of_nanomsg() -> Iterator[bytes]:
 @TARGETS.add(WireError, seeds=of_nanomsg)
 def messages_of_nanomsg(data: bytes) -> None:
     for is_alone in (False, True):
-        rest = split_one(data, b"t\0", is_alone=is_alone)
+        rest = split_message(data, b"t\0", is_alone=is_alone)
         if len(rest) > 1:
             wire.split_rest(rest)
         else:
             wire.read_header(rest[0])
-    assert own_part(7, "t").endswith(b"\0")
+    assert subscriber_topic_part(7, "t").endswith(b"\0")
 
 
 @TARGETS.add(seeds=lambda: [endpoint("127.0.0.1", 5, 6).encode()], words=(b"nanomsg://", b":65536/", b"/0"))
@@ -301,7 +301,7 @@ def tokens() -> Iterator[bytes]:
 def keys_of_zenoh(data: bytes) -> None:
     text = text_of(data)
     topic_of(text)
-    alive = parse_live(text)
+    alive = parse_token(text)
     if alive is None or not _is_text(text):
         return
     record = alive.record
@@ -312,7 +312,7 @@ def keys_of_zenoh(data: bytes) -> None:
         assert topic_of(data_key(record.topic)) == record.topic
     else:
         made = subscriber_key(alive.node_id, record)
-    assert parse_live(made) == alive
+    assert parse_token(made) == alive
 
 
 def _is_text(text: str) -> bool:

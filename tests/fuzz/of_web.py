@@ -19,11 +19,11 @@ from nep.programs.web.messages.fragments import FragmentBuffer
 from nep.programs.web.messages.payloads import from_ros, nep_type_of, ros_type_of
 from nep.programs.web.messages.png import text_as_png, text_in_png
 from nep.programs.web.outgoing import EncodingOptions, publish_frames
-from nep.programs.web.served_pages import PageRequest, answer
+from nep.programs.web.served_pages import PageRequest, respond
 from nep.programs.web.server import node_name
 from nep.programs.web.visitors import MAX_SHOWN_LENGTH, client_name, page_title
 from nep.protocol.wire import check_node_name
-from nep.text import control_in
+from nep.text import first_control
 from tests.fuzz.target import Targets, check_sentence, text_of
 
 TARGETS = Targets()
@@ -65,7 +65,7 @@ def operations_of_pages(data: bytes) -> None:
             assert len(inner) <= MAX_MESSAGE_BYTES
             operation = op.parse(inner)
     if isinstance(operation, op.Auth):
-        assert not AuthCheck("token", lambda: 1.0).is_right(operation)
+        assert not AuthCheck("token", lambda: 1.0).verify(operation)
     if isinstance(operation, op.Publish):
         for ros_type in TYPES:
             try:
@@ -87,10 +87,10 @@ def origins_of_pages(data: bytes) -> None:
     if refusal:
         check_sentence(NepError(refusal))
     assert refusal or "localhost" in text.lower() or "127." in text or "::" in text or "192.168.1.5" in text
-    assert access.is_given("/?" + text, text) is not True or "a-long-token" in text
+    assert access.check_token("/?" + text, text) is not True or "a-long-token" in text
     for name in (client_name(text), page_title(text, text, text)):
         assert len(name) <= MAX_SHOWN_LENGTH
-        assert not control_in(name)
+        assert not first_control(name)
     if not refusal:
         check_node_name(node_name(text, "127.0.0.1:5"))
 
@@ -101,7 +101,9 @@ def origins_of_pages(data: bytes) -> None:
 )
 def requests_of_browsers(data: bytes) -> None:
     path, _space, host = text_of(data).partition(" ")
-    found = answer(PageRequest("GET", path, (host,), "http://192.168.1.5:9090"), Access(token="a-long-token"))
+    found = respond(
+        PageRequest("GET", path, (host,), "http://192.168.1.5:9090"), Access(token="a-long-token")
+    )
     given = unquote(re.sub("[\t\r\n]", "", path))  # as urllib reads a URL
     assert b"a-long-token" not in found.body or "a-long-token" in given
     for header in found.headers.values():

@@ -20,17 +20,17 @@ from nep.protocol.requests import (
     AddSubscriber,
     Done,
     Found,
+    GraphReply,
     Join,
     Listen,
-    Look,
     NodeRecord,
     Ping,
     PublisherCount,
     PublisherRecord,
+    QueryGraph,
     Refused,
     RemotePublisher,
     Renew,
-    Seen,
     SubscriberCount,
     SubscriberRecord,
     id_from,
@@ -62,8 +62,8 @@ def split(data: bytes) -> None:
 def notices() -> Iterator[bytes]:
     for kind in ({}, {"one_part": True}, {"tells": True}, {"batches": True}):
         yield wire.hello_part(0x1234, "tö/pic", **kind)
-    yield wire.read_part(wire.Read(1, 2, 3, 2**64 - 1))
-    yield wire.shares_part(wire.Shares(1, 2, 3))
+    yield wire.acknowledgement_part(wire.Acknowledgement(1, 2, 3, 2**64 - 1))
+    yield wire.acceptance_part(wire.OfferAcceptance(1, 2, 3))
 
 
 @TARGETS.add(
@@ -77,17 +77,17 @@ def filters(data: bytes) -> None:
             hello.subscriber,
             hello.topic,
             one_part=hello.one_part,
-            tells=hello.tells,
+            tells=hello.acknowledges,
             batches=hello.batches,
         )
         assert made.lower() == data.lower()
-    read = wire.parse_read(data)
+    read = wire.parse_acknowledgement(data)
     if read is not None:
-        assert wire.read_part(read) == data.lower()
+        assert wire.acknowledgement_part(read) == data.lower()
         assert all(0 <= each < 2**64 for each in read)
-    shares = wire.parse_shares(data)
+    shares = wire.parse_acceptance(data)
     if shares is not None:
-        assert wire.shares_part(shares) == data.lower()
+        assert wire.acceptance_part(shares) == data.lower()
 
 
 def batches() -> Iterator[bytes]:
@@ -109,9 +109,9 @@ def calls() -> Iterator[bytes]:
     yield joined(native.call(7, 1, 2.5, b'{"a":1}'))
     yield joined(native.call(2**64 - 1, 4, None, b""))
     for kind in (service_wire.CallKind.ERROR, service_wire.CallKind.REFUSED):
-        failed = service_wire.failure(kind, "ValueError", "no \ud800")
-        yield joined(native.answer(9, failed))
-        yield joined(service_wire.ORIGINAL.answer(9, failed))
+        failed = service_wire.error_reply(kind, "ValueError", "no \ud800")
+        yield joined(native.reply(9, failed))
+        yield joined(service_wire.ORIGINAL.reply(9, failed))
     yield joined(service_wire.ORIGINAL.call(7, 1, 2.5, b'{"a":1}'))
 
 
@@ -128,10 +128,10 @@ def answers_of_services(data: bytes) -> None:
     parts = parts_of(data)
     for framing in (service_wire.NATIVE, service_wire.ORIGINAL):
         try:
-            answer = framing.read_answer(parts)
+            answer = framing.read_reply(parts)
         except WireError:
             continue
-        name, reason = service_wire.read_failure(answer.reply.data)
+        name, reason = service_wire.read_error_reply(answer.reply.data)
         assert len(name) < 1000
         assert len(reason) < 20_000
         (name + reason).encode()
@@ -190,7 +190,7 @@ def requests() -> Iterator[bytes]:
             0.5,
         ),
         Listen(("*",)),
-        Look(),
+        QueryGraph(),
         Ping(),
     ]
     for number, each in enumerate(asked):
@@ -233,30 +233,30 @@ def conversations() -> Iterator[bytes]:
 @TARGETS.add(WireError, seeds=conversations, words=(*WORDS, SEPARATOR), slower=4)
 def a_master(data: bytes) -> None:
     graph = Graph(1, 0.0, learn_s=0.0)
-    encoder = encoding.AnswerEncoder()
+    encoder = encoding.ReplyEncoder()
     for number, body in enumerate(parts_of(data)[:20]):
         received = encoding.decode_request(body)
         if not isinstance(received.request, WireError | Listen):
             for each in graph.apply(received.request, received.call, float(number), "a", is_foreign=True):
-                encoding.decode_answer(encoder.encode(each.answer, each.call or 0))
+                encoding.decode_reply(encoder.encode(each.body, each.call or 0))
         graph.tick(float(number))
-        encoding.decode_answer(encoder.encode(Seen(1, 2, graph.view()), 1))
+        encoding.decode_reply(encoder.encode(GraphReply(1, 2, graph.view()), 1))
 
 
 def answers() -> Iterator[bytes]:
-    yield encoding.encode_answer(Done(1, 2), 1)
-    yield encoding.encode_answer(Refused(1, 2, "no"), 2)
-    yield encoding.encode_answer(Found(1, 2, (RemotePublisher(PUBLISHER, NODE.id, "näme"),)), 3)
-    yield encoding.encode_answer(Seen(1, 2, GraphView(1, 2, {}, {}, ())), 4)
+    yield encoding.encode_reply(Done(1, 2), 1)
+    yield encoding.encode_reply(Refused(1, 2, "no"), 2)
+    yield encoding.encode_reply(Found(1, 2, (RemotePublisher(PUBLISHER, NODE.id, "näme"),)), 3)
+    yield encoding.encode_reply(GraphReply(1, 2, GraphView(1, 2, {}, {}, ())), 4)
     yield encode_renewed(1, 2, 3, {4: 5}, ("127.0.0.1",), 2.0)
 
 
 @TARGETS.add(WireError, seeds=answers, words=WORDS)
 def answers_of_the_master(data: bytes) -> None:
-    number = encoding.call_of_view(data)
+    number = encoding.call_of_graph_reply(data)
     assert number is None or number > 0
-    call, answer = encoding.decode_answer(data)
-    _call, again = encoding.decode_answer(encoding.encode_answer(answer, call))
+    call, answer = encoding.decode_reply(data)
+    _call, again = encoding.decode_reply(encoding.encode_reply(answer, call))
     assert repr(again) == repr(answer)
 
 

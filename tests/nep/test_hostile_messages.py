@@ -13,7 +13,7 @@ import nep
 from nep.cli import log as log_command
 from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LAST_ERRORS_TYPE, LOG_TOPIC, LOG_TYPE, LogRecord
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from nep.programs.alarms.rule import NUMBER_KINDS, VALUE_KINDS
 from nep.programs.blackboard.server import BlackboardServer
 from nep.programs.bridges.trail import TRAIL_KEY
@@ -176,7 +176,7 @@ def test_servers_answer_after_hostile_requests():
         nep.node("asker", "memory", master="hostile") as asker,
     ):
         node.parameters.declare("speed", 0.5)
-        asked[place_of(node.id)] = {"set": {"speed": 1.5}}
+        asked[parameters_topic(node.id)] = {"set": {"speed": 1.5}}
         spinning = threading.Thread(target=node.spin)
         spinning.start()
         for service, request in asked.items():

@@ -9,11 +9,18 @@ from hypothesis import strategies as st
 
 from app import resources
 from app.errors import DescriptionError
-from app.robots.description.description import Parameter, announced, parse, td_for, topic_of, validate
-from app.robots.description.inputs import check_input, from_words, parameter_of, to_words
+from app.robots.description.description import (
+    Parameter,
+    parse,
+    parse_announcement,
+    thing_description,
+    topic_of,
+    validate,
+)
+from app.robots.description.inputs import check_input, format_for_editing, parameter_of, parse_value
 from nep.errors import NepError
 from nep.messages.message import UNDECODED, Message
-from nep.text import control_in
+from nep.text import first_control
 
 MODELS = sorted(resources.path("robots").glob("*.tm.jsonld"))
 
@@ -26,7 +33,7 @@ def model(name: str) -> dict[str, object]:
 def test_shipped_thing_models_and_their_descriptions_are_valid(path):
     document = json.loads(path.read_text(encoding="utf-8"))
     assert validate(document) == ()
-    described = td_for(document, "My robot")
+    described = thing_description(document, "My robot")
     assert validate(described) == ()
     robot = parse(described)
     assert robot.name == "My robot"
@@ -36,7 +43,7 @@ def test_shipped_thing_models_and_their_descriptions_are_valid(path):
 
 
 def test_description_has_topics_derived_from_the_robot_name():
-    robot = parse(td_for(model("pepper"), "Miss Pepper"))
+    robot = parse(thing_description(model("pepper"), "Miss Pepper"))
     assert robot.topics.command == "/Miss_Pepper/command"
     assert robot.topics.answer == "/Miss_Pepper/answer"
     assert robot.topics.state == "/Miss_Pepper/state"
@@ -47,16 +54,16 @@ def test_description_has_topics_derived_from_the_robot_name():
 
 
 def test_topics_are_read_from_the_forms():
-    document = td_for(model("pepper"), "Pepper")
+    document = thing_description(model("pepper"), "Pepper")
     document["properties"]["camera"]["forms"] = [{"href": "nep:/elsewhere/eye"}]
     document["actions"]["say"]["forms"] = [{"href": "nep:/x/do", "rb:answer": "nep:/x/did"}]
     robot = parse(document)
     assert robot.sensor("camera").topic == "/elsewhere/eye"
-    assert (robot.action("say").topic, robot.action("say").answer_topic) == ("/x/do", "/x/did")
+    assert (robot.action("say").topic, robot.action("say").reply_topic) == ("/x/do", "/x/did")
 
 
 def test_block_texts_match_the_design():
-    robot = parse(td_for(model("pepper"), "Pepper"))
+    robot = parse(thing_description(model("pepper"), "Pepper"))
     texts = {action.name: action.text for action in robot.actions}
     assert texts["say"] == "%robot say %text"
     assert texts["turn"] == "%robot turn %direction by %angle °"
@@ -207,7 +214,7 @@ def test_corrupt_description_never_crashes(changes):
         with pytest.raises(DescriptionError):
             parse(document)
     else:
-        robot = parse(td_for(document, "X"))
+        robot = parse(thing_description(document, "X"))
         for action in robot.actions:
             action.check({})
             action.check({parameter.name: 10**400 for parameter in action.parameters})
@@ -259,7 +266,7 @@ NUMBERS = {"type": "array", "items": {"type": "number"}}
     ],
 )
 def test_typed_text_is_parsed_to_a_list_or_object(described, words, value):
-    made = from_words(parameter(**described), words)
+    made = parse_value(parameter(**described), words)
     assert made == value
     assert repr(made) == repr(value)  # 1 is not 1.0, and not True
 
@@ -270,7 +277,7 @@ def test_formatted_list_or_object_parses_back_to_the_same_value(value):
     described = {"type": "object" if isinstance(value, dict) else "array"}
     if isinstance(value, list) and not strings:
         described = NUMBERS if not isinstance(value[0], list) else {"type": "array", "items": NUMBERS}
-    assert from_words(parameter(**described), to_words(value)) == value
+    assert parse_value(parameter(**described), format_for_editing(value)) == value
 
 
 @pytest.mark.parametrize(
@@ -299,8 +306,8 @@ def message_of(data: bytes, codec: str = "json") -> Message:
 
 
 def test_announced_description_is_parsed():
-    described = json.dumps(td_for(model("pepper"), "Pepper")).encode()
-    assert announced(message_of(described)).name == "Pepper"
+    described = json.dumps(thing_description(model("pepper"), "Pepper")).encode()
+    assert parse_announcement(message_of(described)).name == "Pepper"
 
 
 @pytest.mark.parametrize(
@@ -311,43 +318,43 @@ def test_announced_description_is_parsed():
 )  # fmt: skip
 def test_invalid_announcement_raises_an_error(data):
     with pytest.raises((DescriptionError, NepError)):
-        announced(message_of(data))
+        parse_announcement(message_of(data))
 
 
 def test_huge_description_is_rejected_before_decoding():
-    described = td_for(model("pepper"), "Pepper")
+    described = thing_description(model("pepper"), "Pepper")
     described["description"] = "x" * 1_000_000
     message = message_of(json.dumps(described).encode())
     with pytest.raises(DescriptionError, match="it is 1\\.0 MB in size; the limit is 1 MB"):
-        announced(message)
+        parse_announcement(message)
     assert message.decoded is UNDECODED
 
 
 def test_description_with_too_many_values_is_rejected_without_validation():
     """Checking all of it took the window six seconds, and its Stop with it."""
-    described = td_for(model("pepper"), "Pepper")
+    described = thing_description(model("pepper"), "Pepper")
     described["actions"] = {f"do {number}": {"title": number} for number in range(25_000)}
     with pytest.raises(DescriptionError, match="the description has more than 20000 values"):
-        announced(message_of(json.dumps(described).encode()))
+        parse_announcement(message_of(json.dumps(described).encode()))
 
 
 def test_number_of_reported_problems_is_limited():
-    described = td_for(model("pepper"), "Pepper")
+    described = thing_description(model("pepper"), "Pepper")
     described["actions"] = {f"do {number}": {} for number in range(3000)}
     assert len(validate(described)) <= 20
 
 
 @pytest.mark.parametrize("name", ["Arm\n", "Arm\u202e", "A\u200brm", "\x1b[2J"])
 def test_confusable_robot_name_is_rejected_with_an_escaped_message(name):
-    described = {**td_for(model("pepper"), "Pepper"), "title": name}
+    described = {**thing_description(model("pepper"), "Pepper"), "title": name}
     with pytest.raises(DescriptionError, match=r"title: '.*' can't be used in a name") as refused:
         parse(described)
-    assert control_in(str(refused.value)) == ""
+    assert first_control(str(refused.value)) == ""
 
 
 def test_control_characters_are_removed_from_texts_of_a_description():
     """A letter that turns the direction of writing would turn the question that has it in its middle, too."""
-    described = td_for(model("pepper"), "Pepper")
+    described = thing_description(model("pepper"), "Pepper")
     say = described["actions"]["say"]
     say["title"] = "\u202esay\n"
     say["rb:block"] = {**say["rb:block"], "text": {"en": "s\u200bay\x1b %text"}, "category": "\u202eSpeech"}
@@ -355,15 +362,15 @@ def test_control_characters_are_removed_from_texts_of_a_description():
     words |= {"title": "te\u2066xt", "description": "a\nb", "default": "a\n\u202eb"}
     action = parse(described).action("say")
     assert (action.title, action.category) == ("say ", "Speech")
-    assert control_in(action.text) == ""
+    assert first_control(action.text) == ""
     assert action.parameters[0].title == "text"
     assert action.parameters[0].default == "a\n\u202eb"
 
 
 def test_description_error_message_is_short_and_escaped():
-    described = {**td_for(model("pepper"), "Pepper"), "title": "\x1b" + "A" * 100_000}
+    described = {**thing_description(model("pepper"), "Pepper"), "title": "\x1b" + "A" * 100_000}
     described["actions"] = {"B" * 100_000: {"rb:block": 7}}
     with pytest.raises(DescriptionError) as refused:
         parse(described)
     assert len(str(refused.value)) < 600
-    assert control_in(str(refused.value)) == ""
+    assert first_control(str(refused.value)) == ""

@@ -12,9 +12,9 @@ def message(publisher: int, seq: int = 1) -> nep.Message:
 
 def test_many_messages_of_one_publisher_displace_only_its_own() -> None:
     held = HeldMessages(per_publisher=2)
-    held.put(message(1))
+    held.add(message(1))
     for seq in range(1000):
-        held.put(message(2, seq))
+        held.add(message(2, seq))
     assert [(each.publisher, each.seq) for each in held.pop_all()] == [(1, 1), (2, 998), (2, 999)]
     assert not held
 
@@ -22,7 +22,7 @@ def test_many_messages_of_one_publisher_displace_only_its_own() -> None:
 def test_many_publishers_displace_no_earlier_one() -> None:
     held = HeldMessages(publishers=8)
     for publisher in range(1000):
-        held.put(message(publisher))
+        held.add(message(publisher))
     assert [each.publisher for each in held.pop_all()] == list(range(8))
-    held.put(message(1000))
-    assert held.holds(1000)
+    held.add(message(1000))
+    assert held.has_messages_of(1000)

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.ui.startup.interpreter import collect_garbage
-from app.ui.theme.theme import STYLED, Theme
+from app.ui.theme.theme import STYLED_PROPERTY, Theme
 from tests.ui.fakes import close_sessions
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
@@ -78,7 +78,7 @@ def _garbage() -> Iterator[None]:
 def _text_as_before(qapp: QApplication) -> Iterator[None]:
     """The tests of each file find letters as large as they are at first."""
     yield
-    if qapp.property(STYLED) is not None:
+    if qapp.property(STYLED_PROPERTY) is not None:
         Theme("light").apply()
 
 

@@ -43,8 +43,8 @@ class Window:
             self.commands.append,
             self.answers,
             plot=lambda topic, path: self.plotted.append((topic, path)),
-            open_beside=self.beside.append,
-            why=lambda panel, topic: self.asked_why.append((panel, topic)),
+            open_to_side=self.beside.append,
+            open_doctor=lambda panel, topic: self.asked_why.append((panel, topic)),
             panels=lambda: self.panels,
         )
 

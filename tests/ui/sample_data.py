@@ -43,7 +43,7 @@ def Invocation(
     """A try of the real kind, at whose clock so much time has passed."""
     made = link_module.Invocation(id, action, state, feedback or {}, clock=lambda: elapsed_s, **more)  # type: ignore[arg-type]
     if left_s is not None:
-        made.begun_s, made.timeout_s = 0.0, elapsed_s + left_s
+        made.execution_start_s, made.timeout_s = 0.0, elapsed_s + left_s
     return made
 
 

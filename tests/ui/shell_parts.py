@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLineEdit, QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.shell.start_page.page import Example
-from app.ui.widgets.file_dialogs import FileKind, meant
+from app.ui.widgets.file_dialogs import FileKind, resolve_kind
 from tests.blocks.fakes import until
 from tests.ui import fakes
 from tests.ui.sample_data import WORKSPACE, Invocation, pepper
@@ -121,7 +121,7 @@ class Answers:
     ) -> None:
         self.asked.append(f"{title}: {suggestion}")
         if self.path is not None:
-            take(*meant(self.path, kinds[0], kinds))
+            take(*resolve_kind(self.path, kinds[0], kinds))
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         self.asked.append(f"picture {folder}")
@@ -154,11 +154,11 @@ def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fa
     if run != "ready":
         begin_run(session, run)
     for link, state in zip(links, states, strict=True):
-        link.stopping, link.connected = state == "stopping", state != "away"
+        link.is_stopping, link.is_connected = state == "stopping", state != "away"
         if state == "silent":
-            link.silent, link.mute = silent, silent is None
+            link.silent, link.is_unresponsive = silent, silent is None
         elif state == "not stopped":
-            link.not_stopped = f"{link.name} may still move: a joint is stuck"
+            link.stop_problem = f"{link.name} may still move: a joint is stuck"
         elif state == "busy":
             link.invocations["walk"] = Invocation("1", "walk")
         assert link.state == state
@@ -168,7 +168,7 @@ def robots_in(*states: str, run: str = "ready", silent: str | None = None) -> fa
 
 def begin_run(session: fakes.Session, state: str) -> None:
     """Run a behaviour until its run is running or paused."""
-    session.document.edited(WORKSPACE)
+    session.document.apply_edit(WORKSPACE)
     session.runs.run()
     assert session.runner is not None
     session.runner.does("b2")

@@ -66,7 +66,7 @@ ALARMS = (
             AlarmAction("call", "restart_lidar", {"now": True}),
             AlarmAction("run", "Rest"),
         ),
-        is_on=False,
+        is_enabled=False,
     ),
     AlarmRule("new", AlarmCondition("leaves", ""), (AlarmAction("banner"),)),
     AlarmRule(
@@ -120,7 +120,7 @@ def shown_panel(
     with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
         dock.show()
     dock.front = True
-    qtbot.waitUntil(dock.shown)
+    qtbot.waitUntil(dock.is_displayed)
     if session.fleet.links:
         prepare(name, widget)
     for _ in range(3):
@@ -157,7 +157,7 @@ def prepare(name: str, widget: PanelWidget) -> None:
         widget.show_topic("/blackboard")
     if name == "alarms" and isinstance(widget, alarms.AlarmsPanel) and "/blackboard" in widget.session.topics:
         for rule in ALARMS:
-            widget.session.alarms.put(rule)
+            widget.session.alarms.set_rule(rule)
         widget.session.send("/blackboard", {"robots": {"Pepper": {"battery": 12}}})  # type: ignore[attr-defined]
 
 

@@ -86,7 +86,7 @@ def test_every_control_in_the_window_has_an_accessible_name(
         commands.run(name)
         shown = next(each for each in window.findChildren(Overlay) if each.isVisible())
         faults += unsaid(shown)
-        shown.shut()
+        shown.dismiss()
     assert faults == []
 
 
@@ -115,7 +115,7 @@ def test_tab_reaches_every_control_and_returns_to_the_first(
     seen = reached(window)
     bench = window.benches[layout]
     for dock in bench.docks.values():
-        if dock.shown():
+        if dock.is_displayed():
             assert any(dock.isAncestorOf(each) for each in seen), dock.description.name
     bar = window.run_bar if layout == "behaviour" else window.tool_bar
     assert bar.stop in seen
@@ -129,7 +129,7 @@ def test_panels_have_focus_in_reading_order(qtbot, window: MainWindow, commands:
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     commands.run("layout.developer")
-    qtbot.waitUntil(window.benches["developer"].docks["console"].shown)
+    qtbot.waitUntil(window.benches["developer"].docks["console"].is_displayed)
     order = []
     for _ in range(4):
         QTest.keyClick(window, Qt.Key.Key_F6)
@@ -156,7 +156,7 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_alert_is_announced_once(qtbot, window: MainWindow, commands: Commands, said: list[str]) -> None:
     window.show()
     commands.run("layout.behaviour")
-    window.session.alerts.put("camera", "error", "The camera is silent.", "No pictures come.")
+    window.session.alerts.raise_alert("camera", "error", "The camera is silent.", "No pictures come.")
     for _ in range(3):
         window.tick()
     assert said == ["The camera is silent. No pictures come."]
@@ -169,11 +169,11 @@ def test_alert_with_an_increased_count_is_not_announced_again(
     window.show()
     commands.run("layout.behaviour")
     for count in (1, 2, 12):
-        alerts.put("message:/bad", "warn", f"{count} messages can't be decoded.")
+        alerts.raise_alert("message:/bad", "warn", f"{count} messages can't be decoded.")
         window.tick()
     assert said == ["1 messages can't be decoded."]
     alerts.resolve("message:/bad")
-    alerts.put("silent:/cam", "warn", "The camera has been silent for 4 s.")
+    alerts.raise_alert("silent:/cam", "warn", "The camera has been silent for 4 s.")
     window.tick()
     assert said[1:] == ["The camera has been silent for 4 s."]
 

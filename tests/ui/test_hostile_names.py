@@ -46,7 +46,7 @@ def test_tooltip_shows_exactly_the_text(qapp, words: str) -> None:
 def test_menu_shows_exactly_the_name(qtbot) -> None:
     menu = QMenu()
     qtbot.addWidget(menu)
-    action = menu.addAction(plain.entry("R&D\t<b>Ctrl+Q</b>"))
+    action = menu.addAction(plain.escape_menu_text("R&D\t<b>Ctrl+Q</b>"))
     assert action.text() == "R&&D <b>Ctrl+Q</b>"
 
 
@@ -72,7 +72,7 @@ def hostile() -> Window:
     actions = [replace(action, title=f"{action.title} {NAME}") for action in robot.actions]
     link.robot = replace(robot, actions=tuple(actions))
     session.fleet.revision += 1
-    session.alerts.put("a", "error", NAME, NAME, button=NAME, action="x")
+    session.alerts.raise_alert("a", "error", NAME, NAME, button=NAME, action="x")
     session.console.add("error", NAME, NAME)
     return Window(session)
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import pytest
 
 from app.core.robots.voices import Notes
-from app.ui.speaker import QtEngine, QtSpeaker, no_voice, outlives_trial, samples, voice_words
+from app.ui.speaker import QtEngine, QtSpeaker, no_voice_message, passes_trial, samples, voice_text
 
 
 class FakeEngine:
@@ -34,7 +34,7 @@ class FakeEngine:
     def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
         self.threads.add(threading.current_thread().name)
         if language != "en":
-            return no_voice(language)
+            return no_voice_message(language)
         self.did.append((words, volume))
         self.end = ended
         return ""
@@ -144,18 +144,18 @@ def test_speaker_without_audio_libraries_is_silent_with_a_reason(qtbot) -> None:
 
 def test_voice_engine_that_crashes_in_its_trial_process_is_not_created(qtbot, monkeypatch, caplog) -> None:
     crash = [sys.executable, "-c", "import os; os.kill(os.getpid(), 11)"]
-    assert not outlives_trial(crash)
+    assert not passes_trial(crash)
     assert "the test process exited with" in caplog.text
-    assert not outlives_trial([sys.executable + " is not there"])
-    assert outlives_trial([sys.executable, "-c", ""])
+    assert not passes_trial([sys.executable + " is not there"])
+    assert passes_trial([sys.executable, "-c", ""])
     monkeypatch.setattr("app.ui.speaker.has_voice_engine", lambda: True)
     monkeypatch.setattr("app.ui.speaker.module_command", lambda module: crash)
-    assert QtEngine().speak("Hello", "en", 0.5, lambda: None) == no_voice("en")
+    assert QtEngine().speak("Hello", "en", 0.5, lambda: None) == no_voice_message("en")
 
 
 def test_voice_engine_trial_that_hangs_is_terminated(monkeypatch) -> None:
-    monkeypatch.setattr("app.ui.speaker.TRIAL_S", 0.2)
-    assert not outlives_trial([sys.executable, "-c", "import threading; threading.Event().wait()"])
+    monkeypatch.setattr("app.ui.speaker.TRIAL_TIMEOUT_S", 0.2)
+    assert not passes_trial([sys.executable, "-c", "import threading; threading.Event().wait()"])
     hangs = "import threading; from app.ui import speaker; speaker.TRIAL_S = 0.2; "
     hangs += "speaker._make_voice = lambda: threading.Event().wait(); speaker.try_voice()"
     assert subprocess.run([sys.executable, "-c", hangs], check=False).returncode == 1
@@ -174,12 +174,12 @@ def test_tone_has_the_requested_pitch_duration_and_volume_without_clicks() -> No
 
 
 def test_reason_for_silent_robots_names_what_to_install() -> None:
-    assert voice_words("", has_engine=True) == "Robots speak with the voice of this computer."
-    silent = voice_words("", has_engine=False, platform="linux")
+    assert voice_text("", has_engine=True) == "Robots speak with the voice of this computer."
+    silent = voice_text("", has_engine=False, platform="linux")
     assert silent.startswith(
         "This computer has no voice: what robots say is only shown. Install the packages"
     )
-    assert "Windows" in voice_words("", has_engine=False, platform="win32")
-    assert "System Settings" in voice_words("", has_engine=False, platform="darwin")
-    french = voice_words(no_voice("fr"), has_engine=True, platform="freebsd")
+    assert "Windows" in voice_text("", has_engine=False, platform="win32")
+    assert "System Settings" in voice_text("", has_engine=False, platform="darwin")
+    french = voice_text(no_voice_message("fr"), has_engine=True, platform="freebsd")
     assert french.startswith("This computer has no voice for French. Install the packages")

@@ -13,7 +13,7 @@ CATEGORY = Category(
     style="values",
     icon="message-circle-question-mark",
     order=33,
-    within="texts",
+    parent="texts",
     blocks=(
         Block(
             type="asking_ask",
@@ -27,7 +27,7 @@ CATEGORY = Category(
             "their questions are asked afterwards.",
             python="ask(%QUESTION)",
             arguments=(ValueInput("QUESTION", None, "What is your name?"),),
-            words="input, prompt, question, type, person, read, keyboard, user, form",
+            search_words="input, prompt, question, type, person, read, keyboard, user, form",
         ),
         Block(
             type="asking_choices",
@@ -45,7 +45,8 @@ CATEGORY = Category(
                 ValueInput("QUESTION", None, "Do you want to play?"),
                 ListInput("CHOICES", texts=("yes", "no")),
             ),
-            words="quiz!, menu!, choose, choice, question, buttons, options, select, pick, yes no, form",
+            search_words="quiz!, menu!, choose, choice, question, buttons, options, select, pick, yes no, "
+            "form",
         ),
         Block(
             type="asking_answer",
@@ -57,8 +58,8 @@ CATEGORY = Category(
             help="If a number was typed, you can calculate with it. Before the first question, the "
             "answer is empty.",
             python="answer()",
-            fails=False,
-            words="input, reply, response, typed, user",
+            can_fail=False,
+            search_words="input, reply, response, typed, user",
         ),
     ),
 )

@@ -25,7 +25,7 @@ CATEGORY = Category(
             tooltip="Waits this number of seconds; the other scripts continue.",
             python="wait(%SECONDS)",
             arguments=(ValueInput("SECONDS", "Number", 2, unit="s"),),
-            words="sleep, pause, delay, seconds, hold, rest, stay, timer",
+            search_words="sleep, pause, delay, seconds, hold, rest, stay, timer",
         ),
         Block(
             type="control_wait_until",
@@ -36,7 +36,7 @@ CATEGORY = Category(
             tooltip="Waits until the condition is true; the other scripts continue.",
             python="wait_until(lambda: %CONDITION)",
             arguments=(_CONDITION,),
-            words="sleep, pause, hold, condition, as soon as",
+            search_words="sleep, pause, hold, condition, as soon as",
         ),
         Block(
             type="control_wait_until_at_most",
@@ -47,7 +47,7 @@ CATEGORY = Category(
             tooltip="Waits until the condition is true, but no longer than this number of seconds.",
             python="wait_until(lambda: %CONDITION, at_most_s=%SECONDS)",
             arguments=(_CONDITION, ValueInput("SECONDS", "Number", 10, unit="s")),
-            words="timeout, time limit, pause, give up, limit, seconds",
+            search_words="timeout, time limit, pause, give up, limit, seconds",
         ),
         Block(
             type="control_repeat",
@@ -58,7 +58,7 @@ CATEGORY = Category(
             tooltip="Repeats the blocks inside this many times.",
             python="for _ in repeat(%TIMES):\n    %BODY",
             arguments=(ValueInput("TIMES", "Number", 3), _BODY),
-            words="loop, for, again, count, iterate, do, cycle, many times",
+            search_words="loop, for, again, count, iterate, do, cycle, many times",
         ),
         Block(
             type="control_forever",
@@ -69,7 +69,7 @@ CATEGORY = Category(
             tooltip="Repeats the blocks inside until the script is stopped.",
             python="while True:\n    %BODY",
             arguments=(_BODY,),
-            words="loop, always, endless, infinite, again, while true, nonstop, cycle",
+            search_words="loop, always, endless, infinite, again, while true, nonstop, cycle",
         ),
         Block(
             type="control_while",
@@ -84,7 +84,7 @@ CATEGORY = Category(
             },
             arguments=(ChoiceField("MODE", (("while", "while"), ("until", "until"))), _CONDITION, _BODY),
             variant="MODE",
-            words="loop, while, until, as long as, again, condition, do while, cycle",
+            search_words="loop, while, until, as long as, again, condition, do while, cycle",
         ),
         Block(
             type="control_count",
@@ -102,7 +102,7 @@ CATEGORY = Category(
                 ValueInput("STEP", "Number", 1),
                 _BODY,
             ),
-            words="for, loop, index, range, counter, repeat, i, numbers, step, cycle",
+            search_words="for, loop, index, range, counter, repeat, i, numbers, step, cycle",
         ),
         Block(
             type="control_if",
@@ -115,7 +115,7 @@ CATEGORY = Category(
             python="if %CONDITION:\n    %BODY",
             arguments=(_CONDITION, _BODY),
             mutator="branches",
-            words="if then, then, condition, when, check, decide, test, case, choose, branch, whether",
+            search_words="if then, then, condition, when, check, decide, test, case, choose, branch, whether",
         ),
         Block(
             type="control_if_else",
@@ -128,7 +128,7 @@ CATEGORY = Category(
             python="if %CONDITION:\n    %BODY\nelse:\n    %ELSE",
             arguments=(_CONDITION, _BODY, StatementInput("ELSE")),
             mutator="branches",
-            words="if then else, then, otherwise, condition, decide, check, choose, branch, or else",
+            search_words="if then else, then, otherwise, condition, decide, check, choose, branch, or else",
         ),
         Block(
             type="control_stop_script",
@@ -139,7 +139,7 @@ CATEGORY = Category(
             tooltip="Stops this script; the other scripts continue. An event can start it again.",
             python="return",
             python_in_function="stop_script()",
-            words="end, exit, return, quit, break, halt, finish",
+            search_words="end, exit, return, quit, break, halt, finish",
         ),
         Block(
             type="control_stop_others",
@@ -150,7 +150,7 @@ CATEGORY = Category(
             tooltip="Stops all other scripts; this one continues. Events can start them again.",
             help="Robot actions that these scripts started are cancelled.",
             python="stop_others()",
-            words="end, cancel, kill, halt, interrupt, rest, other programs",
+            search_words="end, cancel, kill, halt, interrupt, rest, other programs",
         ),
         Block(
             type="control_stop_program",
@@ -160,7 +160,7 @@ CATEGORY = Category(
             icon="octagon-x",
             tooltip="Stops all scripts and the robots.",
             python="stop_program()",
-            words="end, exit, quit, all, everything, halt, finish, abort, kill, program, script",
+            search_words="end, exit, quit, all, everything, halt, finish, abort, kill, program, script",
         ),
     ),
 )

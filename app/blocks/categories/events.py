@@ -24,7 +24,7 @@ CATEGORY = Category(
             tooltip="The blocks below run when the behaviour starts. A behaviour can have several of "
             "these blocks; their scripts run at the same time.",
             python="on_start",
-            words="begin, start, run, go, green flag, flag, play, launch, on start, setup, main",
+            search_words="begin, start, run, go, green flag, flag, play, launch, on start, setup, main",
         ),
         Block(
             type="events_message",
@@ -36,7 +36,7 @@ CATEGORY = Category(
             python="on_message(%TOPIC)",
             arguments=(TopicField("TOPIC"),),
             parameters=("message",),
-            words="topic, subscribe, listen, receive, data, incoming, on message",
+            search_words="topic, subscribe, listen, receive, data, incoming, on message",
         ),
         Block(
             type="events_becomes_true",
@@ -47,7 +47,8 @@ CATEGORY = Category(
             tooltip="The blocks below run each time the condition becomes true.",
             python="on_true(lambda: %CONDITION)",
             arguments=(ValueInput("CONDITION", "Boolean"),),
-            words="condition, whenever, event, trigger, as soon as, watch, sensor, above, below, happens",
+            search_words="condition, whenever, event, trigger, as soon as, watch, sensor, above, below, "
+            "happens",
         ),
         Block(
             type="events_received",
@@ -59,7 +60,7 @@ CATEGORY = Category(
             help="Several scripts can receive the same name. A script that is still running restarts.",
             python="on_broadcast(%NAME)",
             arguments=(_NAME,),
-            words="broadcast, message, signal, event, on message, trigger, get",
+            search_words="broadcast, message, signal, event, on message, trigger, get",
         ),
         Block(
             type="events_broadcast",
@@ -72,7 +73,7 @@ CATEGORY = Category(
             "“publish” in Messages.",
             python="broadcast(%NAME)",
             arguments=(_NAME,),
-            words="send, message, signal, event, tell, emit, shout, trigger, start other scripts",
+            search_words="send, message, signal, event, tell, emit, shout, trigger, start other scripts",
         ),
         Block(
             type="events_broadcast_wait",
@@ -83,7 +84,7 @@ CATEGORY = Category(
             tooltip="Starts the scripts that receive this name, and waits until they have finished.",
             python="broadcast_and_wait(%NAME)",
             arguments=(_NAME,),
-            words="send, message, signal, event, call, until done, trigger",
+            search_words="send, message, signal, event, call, until done, trigger",
         ),
     ),
 )

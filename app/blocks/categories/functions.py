@@ -36,7 +36,8 @@ CATEGORY = Category(
             python="",
             arguments=(_NAME, _INPUTS, _BODY),
             mutator="function",
-            words="function, define, procedure, method, own block, my block, block, make, create, subroutine",
+            search_words="function, define, procedure, method, own block, my block, block, make, create, "
+            "subroutine",
         ),
         _definition(
             "functions_define_result",
@@ -47,7 +48,8 @@ CATEGORY = Category(
             python="",
             arguments=(TextField("NAME", "my result"), _INPUTS, _BODY, ValueInput("RESULT")),
             mutator="function",
-            words="function, define, return, procedure, own block, my block, block, make, result, calculate",
+            search_words="function, define, return, procedure, own block, my block, block, make, result, "
+            "calculate",
         ),
         _statement(
             "functions_return_if",
@@ -58,7 +60,7 @@ CATEGORY = Category(
             python="if %CONDITION:\n    return %VALUE",
             arguments=(ValueInput("CONDITION", "Boolean"), ValueInput("VALUE")),
             needs_function="result",
-            words="return, result, exit",
+            search_words="return, result, exit",
         ),
         _statement(
             "functions_leave_if",
@@ -70,7 +72,7 @@ CATEGORY = Category(
             python="if %CONDITION:\n    return",
             arguments=(ValueInput("CONDITION", "Boolean"),),
             needs_function="plain",
-            words="return, exit, end, break, quit",
+            search_words="return, exit, end, break, quit",
         ),
         _statement(
             "functions_call",
@@ -81,7 +83,7 @@ CATEGORY = Category(
             arguments=(_INPUTS,),
             mutator="call",
             in_toolbox=False,
-            words="call, run, do, use, procedure, own block",
+            search_words="call, run, do, use, procedure, own block",
         ),
         _value(
             "functions_result",
@@ -92,7 +94,7 @@ CATEGORY = Category(
             arguments=(_INPUTS,),
             mutator="call",
             in_toolbox=False,
-            words="call, run, use, result, procedure, own block",
+            search_words="call, run, use, result, procedure, own block",
         ),
         _value(
             "functions_input",
@@ -101,9 +103,9 @@ CATEGORY = Category(
             tooltip="The value of this input of the function.",
             python="%INPUT",
             arguments=(InputField("INPUT"),),
-            fails=False,
+            can_fail=False,
             in_toolbox=False,
-            words="input, parameter, argument, value",
+            search_words="input, parameter, argument, value",
         ),
     ),
 )

@@ -14,17 +14,19 @@ _boolean = partial(Block, shape="boolean", style="variables")
 _statement = partial(Block, shape="statement", style="variables")
 
 _LIST = ValueInput("LIST", "List", variable="list")
-_NUMBER = ValueInput("NUMBER", "Number", 1, only=("WHERE", "number"))
-_PLACES = (("item number", "number"), ("first item", "first"), ("last item", "last"))
-_PLACES_OR_ANY = (*_PLACES, ("a random item", "random"))
-_WHERE = ChoiceField("WHERE", _PLACES_OR_ANY)
+_NUMBER = ValueInput("NUMBER", "Number", 1, only_if=("WHERE", "number"))
+_POSITIONS = (("item number", "number"), ("first item", "first"), ("last item", "last"))
+_POSITIONS_OR_RANDOM = (*_POSITIONS, ("a random item", "random"))
+_WHERE = ChoiceField("WHERE", _POSITIONS_OR_RANDOM)
 
 
-def _at(call: str, places: tuple[tuple[str, str], ...] = _PLACES_OR_ANY) -> dict[str, str]:
+def _templates_by_position(
+    call: str, places: tuple[tuple[str, str], ...] = _POSITIONS_OR_RANDOM
+) -> dict[str, str]:
     return {place: call.replace("@", "%NUMBER" if place == "number" else f"'{place}'") for _, place in places}
 
 
-_MAKING = (
+_CREATE_BLOCKS = (
     _value(
         "lists_empty",
         "empty list",
@@ -33,8 +35,8 @@ _MAKING = (
         help="Set a variable to it first, then add items to that variable.",
         python="new_list()",
         check="List",
-        fails=False,
-        words="new, create, array, make, no items",
+        can_fail=False,
+        search_words="new, create, array, make, no items",
     ),
     _value(
         "lists_create",
@@ -46,8 +48,8 @@ _MAKING = (
         arguments=(Items("ITEM", 3, ("apple", "pear", "plum")),),
         check="List",
         mutator="items",
-        extra={"items": 3},
-        words="new, create, array, make, collection, several",
+        extra_state={"items": 3},
+        search_words="new, create, array, make, collection, several",
     ),
     _value(
         "lists_split",
@@ -59,21 +61,21 @@ _MAKING = (
         python="split_text(%TEXT, %BETWEEN)",
         arguments=(ValueInput("TEXT", None, "yes,no"), ValueInput("BETWEEN", None, ",")),
         check="List",
-        words="text, words, separate, divide, cut, csv",
+        search_words="text, words, separate, divide, cut, csv",
     ),
 )
 
-_READING = (
+_READ_BLOCKS = (
     _value(
         "lists_get",
         "%WHERE %NUMBER of %LIST",
         icon="list-ordered",
         tooltip="One item of a list; the first is number 1.",
         help="If there is no such item, the behaviour stops with an error.",
-        python=_at("item(%LIST, @)"),
+        python=_templates_by_position("item(%LIST, @)"),
         arguments=(_WHERE, _NUMBER, _LIST),
         variant="WHERE",
-        words="get, element, index, choose, item, pick, first, last, read",
+        search_words="get, element, index, choose, item, pick, first, last, read",
     ),
     _value(
         "lists_length",
@@ -83,7 +85,7 @@ _READING = (
         python="length(%LIST)",
         arguments=(_LIST,),
         check="Number",
-        words="length, count, size, how many",
+        search_words="length, count, size, how many",
     ),
     _boolean(
         "lists_contains",
@@ -94,7 +96,7 @@ _READING = (
         python="contains(%LIST, %VALUE)",
         arguments=(ValueInput("LIST", None, variable="list"), ValueInput("VALUE", None, "apple")),
         check="Boolean",
-        words="in, has, includes, find, search, member",
+        search_words="in, has, includes, find, search, member",
     ),
     _value(
         "lists_position",
@@ -104,7 +106,7 @@ _READING = (
         python="position(%LIST, %VALUE)",
         arguments=(ValueInput("VALUE", None, "apple"), _LIST),
         check="Number",
-        words="index, find, where, position, search, place",
+        search_words="index, find, where, position, search, place",
     ),
     _value(
         "lists_join",
@@ -115,7 +117,7 @@ _READING = (
         python="join_items(%LIST, %BETWEEN)",
         arguments=(_LIST, ValueInput("BETWEEN", None, ", ")),
         check="String",
-        words="join, text, say, concatenate, glue, combine",
+        search_words="join, text, say, concatenate, glue, combine",
     ),
     _value(
         "lists_part",
@@ -126,7 +128,7 @@ _READING = (
         python="part_of_list(%LIST, %FIRST, %LAST)",
         arguments=(ValueInput("FIRST", "Number", 1), ValueInput("LAST", "Number", 3), _LIST),
         check="List",
-        words="slice, sublist, piece, some, part",
+        search_words="slice, sublist, piece, some, part",
     ),
     _boolean(
         "lists_is_empty",
@@ -136,11 +138,11 @@ _READING = (
         python="is_empty_list(%LIST)",
         arguments=(_LIST,),
         check="Boolean",
-        words="nothing, none, length, no items",
+        search_words="nothing, none, length, no items",
     ),
 )
 
-_WORKING_OUT = (
+_AGGREGATE_BLOCKS = (
     _value(
         "lists_total",
         "%WHAT of %LIST",
@@ -169,7 +171,7 @@ _WORKING_OUT = (
         ),
         variant="WHAT",
         check="Number",
-        words="total, sum, add, average, mean, min, max, minimum, maximum, median, smallest, largest, "
+        search_words="total, sum, add, average, mean, min, max, minimum, maximum, median, smallest, largest, "
         "statistics",
     ),
     _value(
@@ -201,21 +203,21 @@ _WORKING_OUT = (
         ),
         variant="ORDER",
         check="List",
-        words="sort, order, reverse, shuffle, mix, duplicate, ascending, descending, random order, "
+        search_words="sort, order, reverse, shuffle, mix, duplicate, ascending, descending, random order, "
         "alphabetical",
     ),
 )
 
-_removing = partial(
+_remove_block = partial(
     Block,
     style="variables",
     icon="list-minus",
-    python=_at("remove_item(%LIST, @)"),
+    python=_templates_by_position("remove_item(%LIST, @)"),
     arguments=(_WHERE, _NUMBER, _LIST),
     variant="WHERE",
 )
 
-_CHANGING = (
+_CHANGE_BLOCKS = (
     _statement(
         "lists_add",
         "add %VALUE to %LIST",
@@ -224,42 +226,42 @@ _CHANGING = (
         help="The initial value of a variable is 0: set it to an empty list before you add items.",
         python="add_item(%LIST, %VALUE)",
         arguments=(ValueInput("VALUE", None, "apple"), _LIST),
-        words="append, push, put, insert, element",
+        search_words="append, push, put, insert, element",
     ),
     _statement(
         "lists_insert",
         "insert %VALUE as %WHERE %NUMBER of %LIST",
         icon="list-plus",
         tooltip="Inserts a value into a list; the items after it move down by one.",
-        python=_at("insert_item(%LIST, @, %VALUE)", _PLACES),
-        arguments=(ValueInput("VALUE", None, "apple"), ChoiceField("WHERE", _PLACES), _NUMBER, _LIST),
+        python=_templates_by_position("insert_item(%LIST, @, %VALUE)", _POSITIONS),
+        arguments=(ValueInput("VALUE", None, "apple"), ChoiceField("WHERE", _POSITIONS), _NUMBER, _LIST),
         variant="WHERE",
-        words="add, put, push, element, between",
+        search_words="add, put, push, element, between",
     ),
     _statement(
         "lists_set",
         "set %WHERE %NUMBER of %LIST to %VALUE",
         icon="square-pen",
         tooltip="Replaces an item of a list with another value.",
-        python=_at("set_item(%LIST, @, %VALUE)"),
+        python=_templates_by_position("set_item(%LIST, @, %VALUE)"),
         arguments=(_WHERE, _NUMBER, _LIST, ValueInput("VALUE", None, "apple")),
         variant="WHERE",
-        words="replace, change, element, item, overwrite",
+        search_words="replace, change, element, item, overwrite",
     ),
-    _removing(
+    _remove_block(
         "lists_remove",
         "remove %WHERE %NUMBER of %LIST",
         shape="statement",
         tooltip="Removes an item from a list; the items after it move up by one.",
-        words="delete, drop, pop, erase, element",
+        search_words="delete, drop, pop, erase, element",
     ),
-    _removing(
+    _remove_block(
         "lists_take",
         "take out %WHERE %NUMBER of %LIST",
         shape="value",
         tooltip="Removes an item from a list and returns it.",
         help="To go through a list in a random order: take out a random item until the list is empty.",
-        words="pop, draw, remove, delete, pull",
+        search_words="pop, draw, remove, delete, pull",
     ),
     _statement(
         "lists_clear",
@@ -268,7 +270,7 @@ _CHANGING = (
         tooltip="Removes all items from a list.",
         python="clear_list(%LIST)",
         arguments=(_LIST,),
-        words="delete, empty, reset, clear, erase",
+        search_words="delete, empty, reset, clear, erase",
     ),
     _statement(
         "lists_each",
@@ -278,7 +280,7 @@ _CHANGING = (
         help="The loop uses a copy of the list, so changes inside the loop don't affect it.",
         python="for %VAR in each(%LIST):\n    %BODY",
         arguments=(VariableField("VAR", "item"), _LIST, StatementInput("BODY")),
-        words="loop, repeat, for, foreach, iterate, every, cycle",
+        search_words="loop, repeat, for, foreach, iterate, every, cycle",
     ),
 )
 
@@ -290,7 +292,7 @@ CATEGORY = Category(
     order=45,
     dynamic="lists",
     button=("New list", "CREATE_LIST"),
-    blocks=(*_MAKING, *_READING, *_WORKING_OUT, *_CHANGING),
+    blocks=(*_CREATE_BLOCKS, *_READ_BLOCKS, *_AGGREGATE_BLOCKS, *_CHANGE_BLOCKS),
     headings={
         "lists_empty": "Make a list",
         "lists_get": "Read a list",

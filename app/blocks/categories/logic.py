@@ -29,7 +29,7 @@ CATEGORY = Category(
     style="values",
     icon="equal",
     order=25,
-    within="numbers",
+    parent="numbers",
     blocks=(
         Block(
             type="values_compare",
@@ -46,7 +46,8 @@ CATEGORY = Category(
             ),
             variant="RELATION",
             check="Boolean",
-            words="compare, greater!, less!, equals!, equal!, smaller, larger, bigger, more than, less than, "
+            search_words="compare, greater!, less!, equals!, equal!, smaller, larger, bigger, more than, "
+            "less than, "
             "greater than, same, different, between, =, <, >, ≠, ≤, ≥, ==, !=, <=, >=",
         ),
         Block(
@@ -64,8 +65,8 @@ CATEGORY = Category(
             ),
             variant="LOGIC",
             check="Boolean",
-            fails=False,
-            words="both, either, boolean, condition, all of, any of, &&, ||",
+            can_fail=False,
+            search_words="both, either, boolean, condition, all of, any of, &&, ||",
         ),
         Block(
             type="values_not",
@@ -77,8 +78,8 @@ CATEGORY = Category(
             python="not %A",
             arguments=(ValueInput("A", "Boolean"),),
             check="Boolean",
-            fails=False,
-            words="opposite, invert, negate, unless, false, !",
+            can_fail=False,
+            search_words="opposite, invert, negate, unless, false, !",
         ),
         Block(
             type="values_boolean",
@@ -91,8 +92,8 @@ CATEGORY = Category(
             python="%VALUE",
             arguments=(ChoiceField("VALUE", (("true", True), ("false", False))),),
             check="Boolean",
-            fails=False,
-            words="yes, no, on, off, boolean, bool, constant",
+            can_fail=False,
+            search_words="yes, no, on, off, boolean, bool, constant",
         ),
         Block(
             type="values_known",
@@ -104,8 +105,8 @@ CATEGORY = Category(
             python="is_known(%A)",
             arguments=(ValueInput("A"),),
             check="Boolean",
-            fails=False,
-            words="exists, available, defined, none, null, empty, has value, already",
+            can_fail=False,
+            search_words="exists, available, defined, none, null, empty, has value, already",
         ),
     ),
 )

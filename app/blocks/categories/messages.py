@@ -23,7 +23,7 @@ CATEGORY = Category(
             python="publish(%TOPIC, %VALUE)",
             arguments=(ValueInput("VALUE", None, "hello"), TopicField("TOPIC")),
             publishes=True,
-            words="send, topic, tell, transmit, post, message, network, share",
+            search_words="send, topic, tell, transmit, post, message, network, share",
         ),
         Block(
             type="messages_publish_field",
@@ -35,7 +35,7 @@ CATEGORY = Category(
             python="publish(%TOPIC, {%FIELD: %VALUE})",
             arguments=(TextField("FIELD", "name"), ValueInput("VALUE", None, "Ada"), TopicField("TOPIC")),
             publishes=True,
-            words="send, topic, json, key, named, field, message, network",
+            search_words="send, topic, json, key, named, field, message, network",
         ),
         Block(
             type="messages_write",
@@ -46,7 +46,7 @@ CATEGORY = Category(
             tooltip="Shows a value as a line in the console.",
             python="write(%VALUE)",
             arguments=(ValueInput("VALUE", None, "Hello"),),
-            words="print, say, log, show, display, console, output, debug, text, terminal, screen",
+            search_words="print, say, log, show, display, console, output, debug, text, terminal, screen",
         ),
         Block(
             type="messages_newest",
@@ -58,7 +58,7 @@ CATEGORY = Category(
             "message arrives.",
             python="newest(%TOPIC, %FIELD)",
             arguments=(PathField("FIELD", "name"), TopicField("TOPIC", "/faces")),
-            words="read, topic, latest, last, get, receive, subscribe, value, current",
+            search_words="read, topic, latest, last, get, receive, subscribe, value, current",
         ),
         Block(
             type="messages_message",
@@ -68,9 +68,9 @@ CATEGORY = Category(
             icon="mail",
             tooltip="The content of the message that started this script.",
             python="message",
-            fails=False,
+            can_fail=False,
             needs_message=True,
-            words="received, data, content, payload, what arrived",
+            search_words="received, data, content, payload, what arrived",
         ),
         Block(
             type="messages_field",
@@ -80,9 +80,9 @@ CATEGORY = Category(
             icon="mail",
             tooltip="One field of the message that started this script.",
             python="part(message, %FIELD)",
-            arguments=(PathField("FIELD", "name", topic=""),),
+            arguments=(PathField("FIELD", "name", topic_field=""),),
             needs_message=True,
-            words="received, part, data, json, key, value",
+            search_words="received, part, data, json, key, value",
         ),
     ),
 )

@@ -11,7 +11,7 @@ from app.blocks.model.fields import ChoiceField, NumberField, ValueInput
 _number = partial(Block, shape="value", style="values", check="Number")
 _boolean = partial(Block, shape="boolean", style="values", check="Boolean")
 
-_TWO = (ValueInput("A", "Number", 1), ValueInput("B", "Number", 1))
+_OPERANDS = (ValueInput("A", "Number", 1), ValueInput("B", "Number", 1))
 
 _ARITHMETIC = {
     "+": "%A + %B",
@@ -21,7 +21,7 @@ _ARITHMETIC = {
     "%": "%A % %B",
     "**": "%A ** %B",
 }
-_SIGNS = (
+_OPERATORS = (
     ("+", "+"),
     ("−", "-"),  # noqa: RUF001 (the sign that people read)
     ("×", "*"),  # noqa: RUF001 (the sign that people read)
@@ -46,7 +46,7 @@ _FUNCTIONS = (
     ("10 to the power", "10^", "ten_to_the(%NUMBER)"),
 )
 
-_BASIC = (
+_BASIC_BLOCKS = (
     Block(
         type="values_number",
         text="%NUMBER",
@@ -57,8 +57,8 @@ _BASIC = (
         python="%NUMBER",
         arguments=(NumberField("NUMBER", 0),),
         check="Number",
-        fails=False,
-        words="digit, figure, integer, decimal, value, amount",
+        can_fail=False,
+        search_words="digit, figure, integer, decimal, value, amount",
     ),
     Block(
         type="values_arithmetic",
@@ -68,10 +68,10 @@ _BASIC = (
         icon="",
         tooltip="Calculates with two numbers.",
         python=_ARITHMETIC,
-        arguments=(*_TWO, ChoiceField("SIGN", _SIGNS)),
+        arguments=(*_OPERANDS, ChoiceField("SIGN", _OPERATORS)),
         variant="SIGN",
         check="Number",
-        words="calculate, sum!, add!, plus!, addition, subtract, minus, difference, multiply, times, "
+        search_words="calculate, sum!, add!, plus!, addition, subtract, minus, difference, multiply, times, "
         "product, divide, division, math, maths, "
         "mathematics, formula, remainder, modulo, power, operator, +, -, "
         "*, /, %, ^",
@@ -86,7 +86,7 @@ _BASIC = (
         python="random_number(%LOW, %HIGH)",
         arguments=(ValueInput("LOW", "Number", 1), ValueInput("HIGH", "Number", 6)),
         check="Number",
-        words="dice, die, chance, luck, lottery, coin, pick, surprise, draw lots",
+        search_words="dice, die, chance, luck, lottery, coin, pick, surprise, draw lots",
     ),
     Block(
         type="values_round",
@@ -106,11 +106,11 @@ _BASIC = (
         ),
         variant="HOW",
         check="Number",
-        words="round!, round up, round down, whole, integer, ceiling, floor, nearest, decimals",
+        search_words="round!, round up, round down, whole, integer, ceiling, floor, nearest, decimals",
     ),
 )
 
-_MORE = (
+_FURTHER_BLOCKS = (
     _number(
         "numbers_function",
         "%FUNCTION of %NUMBER",
@@ -125,7 +125,8 @@ _MORE = (
             ValueInput("NUMBER", "Number", 9),
         ),
         variant="FUNCTION",
-        words="square root, sqrt, root, absolute, abs, sine, cosine, tangent, logarithm, exponent, angle, "
+        search_words="square root, sqrt, root, absolute, abs, sine, cosine, tangent, logarithm, exponent, "
+        "angle, "
         "math, trigonometry",
     ),
     _number(
@@ -136,7 +137,7 @@ _MORE = (
         help="With 0 places, the result is a whole number; with −1, it is rounded to tens.",  # noqa: RUF001
         python="rounded_to(%NUMBER, %PLACES)",
         arguments=(ValueInput("NUMBER", "Number", 3.14159), ValueInput("PLACES", "Number", 2)),
-        words="digits, decimals, precision, places",
+        search_words="digits, decimals, precision, places",
     ),
     _number(
         "numbers_of_two",
@@ -150,7 +151,7 @@ _MORE = (
             ValueInput("B", "Number", 2),
         ),
         variant="WHICH",
-        words="min, max, minimum, maximum, least, most, bigger, highest, lowest",
+        search_words="min, max, minimum, maximum, least, most, bigger, highest, lowest",
     ),
     _number(
         "numbers_limit",
@@ -165,7 +166,7 @@ _MORE = (
             ValueInput("LOW", "Number", 0),
             ValueInput("HIGH", "Number", 100),
         ),
-        words="constrain, clamp, range, minimum, maximum, at least, at most, restrict",
+        search_words="constrain, clamp, range, minimum, maximum, at least, at most, restrict",
     ),
     _number(
         "numbers_map",
@@ -181,7 +182,7 @@ _MORE = (
             ValueInput("NEW_LOW", "Number", 0),
             ValueInput("NEW_HIGH", "Number", 1),
         ),
-        words="scale, convert, range, proportion, rescale",
+        search_words="scale, convert, range, proportion, rescale",
     ),
     _number(
         "numbers_constant",
@@ -194,8 +195,8 @@ _MORE = (
             ChoiceField("CONSTANT", (("π (3.1416)", "pi"), ("e (2.7183)", "e"), ("φ (1.618)", "golden"))),
         ),
         variant="CONSTANT",
-        fails=False,
-        words="pi, circle, constant, golden, ratio, e",
+        can_fail=False,
+        search_words="pi, circle, constant, golden, ratio, e",
     ),
     _boolean(
         "numbers_is",
@@ -224,7 +225,7 @@ _MORE = (
             ),
         ),
         variant="KIND",
-        words="even, odd, whole, positive, negative, integer, sign, check",
+        search_words="even, odd, whole, positive, negative, integer, sign, check",
     ),
     _boolean(
         "numbers_divisible",
@@ -233,7 +234,7 @@ _MORE = (
         tooltip="True if the division leaves no remainder.",
         python="is_divisible(%NUMBER, %BY)",
         arguments=(ValueInput("NUMBER", "Number", 12), ValueInput("BY", "Number", 3)),
-        words="multiple, remainder, modulo, divided",
+        search_words="multiple, remainder, modulo, divided",
     ),
 )
 
@@ -243,6 +244,6 @@ CATEGORY = Category(
     style="values",
     icon="hash",
     order=30,
-    blocks=(*_BASIC, *_MORE),
+    blocks=(*_BASIC_BLOCKS, *_FURTHER_BLOCKS),
     headings={"values_number": "Calculate", "numbers_is": "Questions about numbers"},
 )

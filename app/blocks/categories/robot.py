@@ -7,10 +7,16 @@ from collections.abc import Mapping, Sequence
 from app.blocks.model.block import Block, RobotUse
 from app.blocks.model.category import Category, Group, ToolboxEntry
 from app.blocks.model.fields import ChoiceField, LiveField, NumberField, robot_field
-from app.blocks.model.robot_text import TextParts, about, field_of, input_of, type_of
-from app.blocks.model.robot_words import CHANGES, PASSES, in_both, words_of_action, words_of_sensor
+from app.blocks.model.robot_text import BlockTemplate, about, block_type_of, field_of, input_of
+from app.blocks.model.robot_words import (
+    CHANGE_SEARCH_WORDS,
+    PASS_SEARCH_WORDS,
+    action_search_words,
+    bilingual_search_words,
+    sensor_search_words,
+)
 from app.robots.description.description import Action, Event, Robot, Sensor
-from app.robots.description.json_access import names, spoken
+from app.robots.description.json_access import display_text, names
 from nep.i18n import _, pgettext, translate
 
 _ICONS = {
@@ -29,7 +35,7 @@ _GROUP_TITLES = {
     "looks": "Face and lights",
 }
 _SIMPLE_KINDS = ("boolean", "number", "integer", "text", "choice")
-_NUMBERS = ("number", "integer")
+_NUMBER_KINDS = ("number", "integer")
 
 
 def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
@@ -73,21 +79,21 @@ def _has_block(sensor: Sensor) -> bool:
 
 
 def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
-    parts = TextParts(action.text, [parameter.name for parameter in action.parameters])
+    parts = BlockTemplate(action.text, [parameter.name for parameter in action.parameters])
     arguments = [robot_field(robot.model, alike)]
     inputs = [
         (parameter, input_of(parameter, parts.arguments[parameter.name]))
         for parameter in action.parameters
         if parameter.name in parts.shown
     ]
-    returns = _returned_field(robot, action)
+    returns = _result_field(robot, action)
     called = [action.name, action.title, *_types(robot, "actions", action.name)]
     called += [parameter.name for parameter in action.parameters]
-    found = words_of_action(called, action.uses)
+    found = action_search_words(called, action.uses)
     do = "robot(%ROBOT).do(%X_NAME, **%X_INPUT)"
     ask = "robot(%ROBOT).ask(%X_NAME, %X_FIELD, **%X_INPUT)"
     return Block(
-        type=type_of(robot.model, "do", action.name),
+        type=block_type_of(robot.model, "do", action.name),
         text=parts.text,
         shape="statement" if returns is None else "value",
         style="robot",
@@ -99,25 +105,25 @@ def _action(robot: Robot, action: Action, alike: Sequence[str]) -> Block:
         keywords={"X_INPUT": tuple((argument.name, parameter.name) for parameter, argument in inputs)},
         robot=RobotUse("action", action.name, action.title, robot.model),
         about={argument.name: (parameter.title, about(parameter)) for parameter, argument in inputs},
-        words=", ".join((found.words, translate("category", _group_title(action)))),
-        english_words=found.english,
+        search_words=", ".join((found.words, translate("category", _group_title(action)))),
+        english_search_words=found.english,
     )
 
 
 def _tooltip(robot: Robot, action: Action) -> str:
-    document = spoken(_member(robot, "actions", action.name), "description")
+    document = display_text(_member(robot, "actions", action.name), "description")
     document = document or f"{robot.title}: {action.title}."
     return _("{what_it_does} The next block waits until it is done.").format(what_it_does=document)
 
 
 def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
-    parts = TextParts(sensor.text, [])
+    parts = BlockTemplate(sensor.text, [])
     robots = robot_field(robot.model, alike)
-    found = words_of_sensor((sensor.name, sensor.title, *_types(robot, "properties", sensor.name)))
+    found = sensor_search_words((sensor.name, sensor.title, *_types(robot, "properties", sensor.name)))
     if sensor.kind == "object":
         fields = tuple((field.title or field.name, field.name) for field in sensor.fields)
         return Block(
-            type=type_of(robot.model, "get", sensor.name),
+            type=block_type_of(robot.model, "get", sensor.name),
             text=f"{parts.text} %FIELD %LIVE",
             shape="value",
             style="sensors",
@@ -127,12 +133,12 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
             arguments=(robots, ChoiceField("FIELD", fields), LiveField("LIVE")),
             constants={"X_NAME": sensor.name},
             robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
-            words=found.words,
-            english_words=found.english,
+            search_words=found.words,
+            english_search_words=found.english,
         )
     boolean = sensor.kind == "boolean"
     return Block(
-        type=type_of(robot.model, "get", sensor.name),
+        type=block_type_of(robot.model, "get", sensor.name),
         text=parts.text if boolean else f"{parts.text} %LIVE",
         shape="boolean" if boolean else "value",
         style="sensors",
@@ -140,25 +146,25 @@ def _sensor(robot: Robot, sensor: Sensor, alike: Sequence[str]) -> Block:
         tooltip=_("Value reported by the robot: {sensor}.").format(sensor=sensor.title),
         python="robot(%ROBOT).get(%X_NAME)",
         arguments=(robots,) if boolean else (robots, LiveField("LIVE")),
-        check="Boolean" if boolean else "Number" if sensor.kind in _NUMBERS else "String",
+        check="Boolean" if boolean else "Number" if sensor.kind in _NUMBER_KINDS else "String",
         constants={"X_NAME": sensor.name},
         robot=RobotUse("sensor", sensor.name, sensor.title, robot.model),
-        words=found.words,
-        english_words=found.english,
+        search_words=found.words,
+        english_search_words=found.english,
     )
 
 
 def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
-    parts = TextParts(event.text, list(event.filters))
+    parts = BlockTemplate(event.text, list(event.filters))
     fields = {field.name: field for field in event.fields}
     filters = [
         (name, field_of(fields.get(name), parts.arguments[name]))
         for name in event.filters
         if name in parts.shown
     ]
-    found = words_of_sensor((event.name, event.title, *_types(robot, "events", event.name)))
+    found = sensor_search_words((event.name, event.title, *_types(robot, "events", event.name)))
     return Block(
-        type=type_of(robot.model, "when", event.name),
+        type=block_type_of(robot.model, "when", event.name),
         text=parts.text,
         shape="hat",
         style="events",
@@ -169,19 +175,19 @@ def _event(robot: Robot, event: Event, alike: Sequence[str]) -> Block:
         constants={"X_NAME": event.name},
         keywords={"X_INPUT": tuple((argument.name, name) for name, argument in filters)},
         robot=RobotUse("event", event.name, event.title, robot.model),
-        words=found.words,
-        english_words=found.english,
+        search_words=found.words,
+        english_search_words=found.english,
     )
 
 
 def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
     told = [sensor for sensor in robot.sensors if _has_block(sensor) and sensor.kind in _SIMPLE_KINDS]
-    numbers = [sensor for sensor in told if sensor.kind in _NUMBERS]
+    numbers = [sensor for sensor in told if sensor.kind in _NUMBER_KINDS]
     hats = []
     if told:
         hats.append(
             Block(
-                type=type_of(robot.model, "when", "changes", plain=True),
+                type=block_type_of(robot.model, "when", "changes", plain=True),
                 text=pgettext("block", "when %ROBOT %SENSOR changes"),
                 shape="hat",
                 style="events",
@@ -190,14 +196,14 @@ def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
                 python="robot(%ROBOT).on_change(%SENSOR)",
                 arguments=(robot_field(robot.model, alike), _sensor_field(told)),
                 robot=RobotUse("sensor", "", "changes", robot.model),
-                words=in_both(CHANGES).words,
-                english_words=in_both(CHANGES).english,
+                search_words=bilingual_search_words(CHANGE_SEARCH_WORDS).words,
+                english_search_words=bilingual_search_words(CHANGE_SEARCH_WORDS).english,
             )
         )
     if numbers:
         hats.append(
             Block(
-                type=type_of(robot.model, "when", "passes", plain=True),
+                type=block_type_of(robot.model, "when", "passes", plain=True),
                 text=pgettext("block", "when %ROBOT %SENSOR goes %SIDE %LIMIT"),
                 shape="hat",
                 style="events",
@@ -214,8 +220,8 @@ def _change_hats(robot: Robot, alike: Sequence[str]) -> tuple[Block, ...]:
                     NumberField("LIMIT", 20),
                 ),
                 robot=RobotUse("sensor", "", "passes", robot.model),
-                words=in_both(PASSES).words,
-                english_words=in_both(PASSES).english,
+                search_words=bilingual_search_words(PASS_SEARCH_WORDS).words,
+                english_search_words=bilingual_search_words(PASS_SEARCH_WORDS).english,
             )
         )
     return tuple(hats)
@@ -225,7 +231,7 @@ def _sensor_field(sensors: Sequence[Sensor]) -> ChoiceField:
     return ChoiceField("SENSOR", tuple((sensor.title or sensor.name, sensor.name) for sensor in sensors))
 
 
-def _returned_field(robot: Robot, action: Action) -> str | None:
+def _result_field(robot: Robot, action: Action) -> str | None:
     look = _member(robot, "actions", action.name).get("rb:block")
     returns = look.get("returns") if isinstance(look, Mapping) else None
     return returns if isinstance(returns, str) and returns else None
@@ -248,6 +254,6 @@ CATEGORY = Category(
     style="robot",
     icon="bot",
     order=70,
-    make=robot_blocks,
-    groups=robot_groups,
+    make_blocks=robot_blocks,
+    make_groups=robot_groups,
 )

@@ -10,7 +10,7 @@ from app.blocks.model.fields import ChoiceField, ValueInput
 
 _value = partial(Block, shape="value", style="values")
 
-_PARTS = (
+_DATE_PARTS = (
     ("year", "year"),
     ("month", "month"),
     ("day of the month", "day"),
@@ -30,7 +30,7 @@ CATEGORY = Category(
     style="values",
     icon="clock",
     order=37,
-    within="numbers",
+    parent="numbers",
     blocks=(
         _value(
             "sensing_timer",
@@ -40,7 +40,7 @@ CATEGORY = Category(
             help="The timer stops while the behaviour is paused.",
             python="timer()",
             check="Number",
-            words="stopwatch, seconds, since, time, elapsed, chronometer, clock",
+            search_words="stopwatch, seconds, since, time, elapsed, chronometer, clock",
         ),
         Block(
             type="sensing_reset",
@@ -50,7 +50,7 @@ CATEGORY = Category(
             icon="timer-reset",
             tooltip="Resets the timer to 0; it starts counting again immediately.",
             python="reset_timer()",
-            words="stopwatch, start, zero, seconds, restart, clear, chronometer",
+            search_words="stopwatch, start, zero, seconds, restart, clear, chronometer",
         ),
         _value(
             "sensing_now",
@@ -60,9 +60,9 @@ CATEGORY = Category(
             help="The day of the week is 1 for Monday. “date” has the format 2026-11-23, “time” the "
             "format 14:30.",
             python="now(%PART)",
-            arguments=(ChoiceField("PART", _PARTS),),
-            fails=False,
-            words="current, today, clock, weekday, calendar, date, time, hour, day",
+            arguments=(ChoiceField("PART", _DATE_PARTS),),
+            can_fail=False,
+            search_words="current, today, clock, weekday, calendar, date, time, hour, day",
         ),
         _value(
             "sensing_seconds_since",
@@ -74,7 +74,7 @@ CATEGORY = Category(
             python="seconds_since(%MOMENT)",
             arguments=(ValueInput("MOMENT", None, "14:30"),),
             check="Number",
-            words="elapsed, difference, until, age, duration, days since",
+            search_words="elapsed, difference, until, age, duration, days since",
         ),
     ),
 )

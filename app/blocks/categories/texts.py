@@ -12,7 +12,7 @@ _text = partial(Block, shape="value", style="values", check="String")
 _number = partial(Block, shape="value", style="values", check="Number")
 _boolean = partial(Block, shape="boolean", style="values", check="Boolean")
 
-_BASIC = (
+_BASIC_BLOCKS = (
     Block(
         type="values_text",
         text="%TEXT",  # the editor puts quotation marks around it
@@ -23,8 +23,8 @@ _BASIC = (
         python="%TEXT",
         arguments=(TextField("TEXT", "Hello"),),
         check="String",
-        fails=False,
-        words="text, string, word, letters, sentence, quote, write",
+        can_fail=False,
+        search_words="text, string, word, letters, sentence, quote, write",
     ),
     Block(
         type="values_join",
@@ -36,7 +36,8 @@ _BASIC = (
         python="join(%A, %B)",
         arguments=(ValueInput("A", None, "Hello "), ValueInput("B", None, "Pepper")),
         check="String",
-        words="concatenate, combine, append, connect, plus, glue, text, put together, merge, string, add",
+        search_words="concatenate, combine, append, connect, plus, glue, text, put together, merge, "
+        "string, add",
     ),
     Block(
         type="values_length",
@@ -48,11 +49,11 @@ _BASIC = (
         python="length(%TEXT)",
         arguments=(ValueInput("TEXT", None, "Hello"),),
         check="Number",
-        words="count, letters, characters, size, how long, how many",
+        search_words="count, letters, characters, size, how long, how many",
     ),
 )
 
-_TAKING_APART = (
+_PART_BLOCKS = (
     _text(
         "texts_letter",
         "%WHERE %NUMBER of %TEXT",
@@ -76,11 +77,11 @@ _TAKING_APART = (
                     ("a random letter", "random"),
                 ),
             ),
-            ValueInput("NUMBER", "Number", 1, only=("WHERE", "number")),
+            ValueInput("NUMBER", "Number", 1, only_if=("WHERE", "number")),
             ValueInput("TEXT", None, "Hello"),
         ),
         variant="WHERE",
-        words="character, char, get, index, letter, first, last",
+        search_words="character, char, get, index, letter, first, last",
     ),
     _text(
         "texts_part",
@@ -94,7 +95,7 @@ _TAKING_APART = (
             ValueInput("LAST", "Number", 3),
             ValueInput("TEXT", None, "Hello"),
         ),
-        words="substring, slice, piece, characters, cut, part, extract",
+        search_words="substring, slice, piece, characters, cut, part, extract",
     ),
     _number(
         "texts_position",
@@ -104,7 +105,7 @@ _TAKING_APART = (
         "contain them.",
         python="position_in_text(%TEXT, %PIECE)",
         arguments=(ValueInput("PIECE", None, "l"), ValueInput("TEXT", None, "Hello")),
-        words="index, find, where, search, place",
+        search_words="index, find, where, search, place",
     ),
     _text(
         "texts_change",
@@ -130,7 +131,7 @@ _TAKING_APART = (
             ),
         ),
         variant="CHANGE",
-        words="upper, lower, case, uppercase, lowercase, capital letters, small letters, trim, strip, "
+        search_words="upper, lower, case, uppercase, lowercase, capital letters, small letters, trim, strip, "
         "reverse, spaces",
     ),
     _text(
@@ -145,7 +146,7 @@ _TAKING_APART = (
             ValueInput("NEW", None, "Leo"),
             ValueInput("TEXT", None, "Hello Ada"),
         ),
-        words="substitute, exchange, swap, remove, change",
+        search_words="substitute, exchange, swap, remove, change",
     ),
     _number(
         "texts_number",
@@ -156,11 +157,11 @@ _TAKING_APART = (
         "check with “has a number” first.",
         python="number_in(%TEXT)",
         arguments=(ValueInput("TEXT", None, "12 apples"),),
-        words="convert, parse, to number, int, value",
+        search_words="convert, parse, to number, int, value",
     ),
 )
 
-_QUESTIONS = (
+_CONDITION_BLOCKS = (
     _boolean(
         "texts_contains",
         "%TEXT %HOW %PIECE",
@@ -178,7 +179,7 @@ _QUESTIONS = (
             ValueInput("PIECE", None, "Ada"),
         ),
         variant="HOW",
-        words="in, includes, has, begins, starts with, ends with, find, search",
+        search_words="in, includes, has, begins, starts with, ends with, find, search",
     ),
     _boolean(
         "texts_same",
@@ -188,7 +189,7 @@ _QUESTIONS = (
         help="Useful for answers that people type or say: “Yes”, “yes” and “YES ” count as the same.",
         python="same_words(%A, %B)",
         arguments=(ValueInput("A", None, "Yes"), ValueInput("B", None, "yes")),
-        words="equals, equal, same, compare, case, insensitive, uppercase",
+        search_words="equals, equal, same, compare, case, insensitive, uppercase",
     ),
     _boolean(
         "texts_empty",
@@ -197,7 +198,7 @@ _QUESTIONS = (
         tooltip="True if the text is empty or contains only spaces.",
         python="is_empty(%TEXT)",
         arguments=(ValueInput("TEXT", None, ""),),
-        words="nothing, blank, none, no text",
+        search_words="nothing, blank, none, no text",
     ),
     _boolean(
         "texts_has_number",
@@ -206,7 +207,7 @@ _QUESTIONS = (
         tooltip="True if the text contains a number.",
         python="has_number(%TEXT)",
         arguments=(ValueInput("TEXT", None, "12 apples"),),
-        words="is a number, numeric, digit, check number",
+        search_words="is a number, numeric, digit, check number",
     ),
 )
 
@@ -216,6 +217,6 @@ CATEGORY = Category(
     style="values",
     icon="type",
     order=35,
-    blocks=(*_BASIC, *_TAKING_APART, *_QUESTIONS),
+    blocks=(*_BASIC_BLOCKS, *_PART_BLOCKS, *_CONDITION_BLOCKS),
     headings={"values_text": "Text", "texts_contains": "Questions about text"},
 )

@@ -24,7 +24,7 @@ CATEGORY = Category(
             tooltip="Sets the variable to this value. All scripts share the variable.",
             python="%VAR = %VALUE",
             arguments=(VariableField("VAR"), ValueInput("VALUE", None, 0)),
-            words="variable, assign, store, save, put!, remember, initialize, let, make, equals, =",
+            search_words="variable, assign, store, save, put!, remember, initialize, let, make, equals, =",
         ),
         Block(
             type="variables_change",
@@ -35,7 +35,8 @@ CATEGORY = Category(
             tooltip="Adds this number to the variable.",
             python="%VAR += %BY",
             arguments=(VariableField("VAR"), ValueInput("BY", "Number", 1)),
-            words="variable, increase, decrease, add!, sum!, increment, decrement, count up, counter, score, "
+            search_words="variable, increase, decrease, add!, sum!, increment, decrement, count up, "
+            "counter, score, "
             "points, +=",
         ),
         Block(
@@ -47,8 +48,8 @@ CATEGORY = Category(
             tooltip="The value of the variable.",
             python="%VAR",
             arguments=(VariableField("VAR"),),
-            fails=False,
-            words="variable, value, read, use, box",
+            can_fail=False,
+            search_words="variable, value, read, use, box",
         ),
     ),
 )

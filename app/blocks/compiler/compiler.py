@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from app.blocks.compiler.conflicts import ConflictFinder
-from app.blocks.compiler.loose_ends import LooseEnds
+from app.blocks.compiler.loose_ends import NameUsage
 from app.blocks.compiler.lowering import END, Function, Lowering
 from app.blocks.compiler.problems import ProblemCollector
-from app.blocks.compiler.render import instrumented, readable
+from app.blocks.compiler.render import render_instrumented, render_source
 from app.blocks.model.block import Block
-from app.blocks.model.block_text import reading
+from app.blocks.model.block_text import block_text
 from app.blocks.model.fields import (
     ChoiceField,
     Field,
@@ -24,11 +24,11 @@ from app.blocks.model.fields import (
     VariableField,
 )
 from app.blocks.model.mutators import InputField
-from app.blocks.model.names import Names
+from app.blocks.model.names import PythonNames
 from app.blocks.model.program import Program, Variable
 from app.blocks.model.template import expression, literal, statements
-from app.blocks.model.workspace import Placed, Workspace, parse_workspace
-from app.blocks.runtime.publishing import moved_by
+from app.blocks.model.workspace import PlacedBlock, Workspace, parse_workspace
+from app.blocks.runtime.publishing import robots_moved_by
 from app.blocks.runtime.pure import calculation, clock, lists, texts
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Robot
@@ -58,10 +58,10 @@ class _UsedResources:
         self.listens: dict[str, None] = {}
         self.moves: dict[str, None] = {}
 
-    def remember(self, placed: Placed, block: Block) -> None:
+    def add(self, placed: PlacedBlock, block: Block) -> None:
         use = block.robot
         if use is not None:
-            robot = placed.field_id("ROBOT") or _first_robot(block)
+            robot = placed.field_text("ROBOT") or _first_robot(block)
             self.robots[robot] = None
             name = use.name or str(saved_value(block, placed, "SENSOR"))
             if use.kind == "sensor":
@@ -74,7 +74,7 @@ class _UsedResources:
                 topics[str(saved_value(block, placed, argument.name))] = None
 
 
-def saved_value(block: Block, placed: Placed, name: str) -> object:
+def saved_value(block: Block, placed: PlacedBlock, name: str) -> object:
     """Return the saved value of a block's field, or None if it has no such field. Raises FieldError."""
     argument = block.argument(name)
     return argument.read(placed.fields.get(name)) if isinstance(argument, Field) else None
@@ -116,7 +116,7 @@ class _Compiler:
     def __init__(self, catalogue: Catalogue, workspace: Workspace, name: str) -> None:
         self._catalogue = catalogue
         self._name = name
-        self._names = Names(RESERVED)
+        self._names = PythonNames(RESERVED)
         self._shaping = Lowering(workspace, catalogue, self._names)
         self._workspace = workspace = self._shaping.workspace
         self._function: Function | None = None  # the function being compiled
@@ -128,7 +128,7 @@ class _Compiler:
         self._labels: dict[str, str] = {}
         self._breakpoints: dict[str, None] = {}
         self._uses = _UsedResources()
-        self._loose_ends = LooseEnds()
+        self._loose_ends = NameUsage()
         self._in_message = False
         self._numbers: set[str] = set()  # blocks that must return a number
 
@@ -141,19 +141,23 @@ class _Compiler:
         self._loose_ends.report(self._problems, self._workspace)
         self._problems.check_unknown()
         self._problems.check_names()
-        for found in ConflictFinder(self._workspace, self._catalogue, self._shaping.called).conflicts():
-            self._problems.conflict(found)
+        for found in ConflictFinder(
+            self._workspace, self._catalogue, self._shaping.called_function
+        ).conflicts():
+            self._problems.report_conflict(found)
         body: list[ast.stmt] = [
             *statements("\n".join(f"{name} = 0" for name in self._variables.values()), {}),
             *own,
             *functions,
         ]
-        actions = asked_actions(body)  # before `instrumented` changes the trees
-        source, lines = readable([*imports(body), *body, *ending(self._name)], self._marks)
+        actions = invoked_actions(body)  # before `instrumented` changes the trees
+        source, lines = render_source(
+            [*import_statements(body), *body, *run_statements(self._name)], self._marks
+        )
         return Program(
             name=self._name,
             source=source,
-            runnable=instrumented(body, self._marks, self._numbers, self._calls),
+            runnable=render_instrumented(body, self._marks, self._numbers, self._calls),
             lines=lines,
             robots=tuple(self._uses.robots),
             sensors=tuple(self._uses.sensors),
@@ -178,7 +182,7 @@ class _Compiler:
 
     # ---- scripts and statements
 
-    def _script(self, script: tuple[Placed, ...]) -> ast.stmt | None:
+    def _script(self, script: tuple[PlacedBlock, ...]) -> ast.stmt | None:
         first = script[0]
         if not first.enabled:
             return None
@@ -186,9 +190,9 @@ class _Compiler:
         if block is None or block.shape == "definition":
             return None
         if block.shape != "hat":
-            self._problems.unattached(first, block)
+            self._problems.report_unattached(first, block)
             return None
-        if self._problems.missing(first, block) is not None:
+        if self._problems.report_empty_slot(first, block) is not None:
             return None
         self._in_message = bool(block.parameters)
         try:
@@ -196,8 +200,8 @@ class _Compiler:
         except _SkippedBlock:
             return None
         decorator = expression(self._template(block, first), expressions, keywords(block, expressions))
-        self._uses.remember(first, block)
-        self._loose_ends.remember(first, block)
+        self._uses.add(first, block)
+        self._loose_ends.add(first, block)
         parameters = ", ".join(block.parameters)
         (function,) = statements(
             f"@%DECORATOR\ndef script({parameters}):\n    %BODY",
@@ -205,8 +209,8 @@ class _Compiler:
             {"BODY": self._statements(script[1:])},
         )
         if isinstance(function, ast.FunctionDef):
-            function.name = self._names.new(self._store_reading(first), "script")
-            self._declare(function)
+            function.name = self._names.new(self._store_block_text(first), "script")
+            self._declare_globals(function)
         self._marks[function] = first.id
         return function
 
@@ -219,21 +223,21 @@ class _Compiler:
         self._function = None
         return made
 
-    def _definition(self, placed: Placed, function: Function) -> ast.stmt:
+    def _definition(self, placed: PlacedBlock, function: Function) -> ast.stmt:
         self._in_message = False
-        self._store_reading(placed)
+        self._store_block_text(placed)
         body = self._statements(placed.inputs.get("BODY", ()) if placed.enabled else ())
-        if function.gives:
+        if function.has_result:
             body += self._statement(replace(placed, type=f"{END}:{placed.id}"))
         (made,) = statements("def script():\n    %BODY", {}, {"BODY": body})
         if isinstance(made, ast.FunctionDef):
-            made.name = function.python
+            made.name = function.python_name
             made.args.args = [ast.arg(name) for name in function.parameters.values()]
-            self._declare(made)
+            self._declare_globals(made)
         self._marks[made] = placed.id
         return made
 
-    def _declare(self, function: ast.FunctionDef) -> None:
+    def _declare_globals(self, function: ast.FunctionDef) -> None:
         own = set(self._variables.values())
         stored = {
             node.id
@@ -243,35 +247,35 @@ class _Compiler:
         if stored:
             function.body.insert(0, ast.Global(sorted(stored)))
 
-    def _statements(self, chain: Sequence[Placed]) -> list[ast.stmt]:
+    def _statements(self, chain: Sequence[PlacedBlock]) -> list[ast.stmt]:
         made: list[ast.stmt] = []
         for placed in chain:
             if placed.enabled:
                 made += self._statement(placed)
         return made
 
-    def _statement(self, placed: Placed) -> list[ast.stmt]:
-        if placed.pauses:
+    def _statement(self, placed: PlacedBlock) -> list[ast.stmt]:
+        if placed.has_breakpoint:
             self._breakpoints[placed.id] = None
         block = self._usable_block(placed)
         if block is None:
             return []
-        if block.shape not in ("statement", "cap") or not self._is_at_home(block):
-            self._problems.misplaced(placed, block)
+        if block.shape not in ("statement", "cap") or not self._is_allowed_here(block):
+            self._problems.report_misplaced(placed, block)
             return []
-        self._store_reading(placed)
-        missing = self._problems.missing(placed, block)
+        self._store_block_text(placed)
+        missing = self._problems.report_empty_slot(placed, block)
         if missing is not None:
-            return self._marked(statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed)
+            return self._mark(statements("fail(%SENTENCE)", {"SENTENCE": literal(missing)}), placed)
         try:
             expressions = self._expressions(placed, block)
         except _SkippedBlock:
             return []
-        self._uses.remember(placed, block)
-        self._loose_ends.remember(placed, block)
-        self._problems.check(placed, block)
+        self._uses.add(placed, block)
+        self._loose_ends.add(placed, block)
+        self._problems.report_hints(placed, block)
         if block.publishes:
-            self._note_motion(placed, block)
+            self._record_moved_robots(placed, block)
         bodies = {
             argument.name: self._statements(placed.inputs.get(argument.name, ()))
             for argument in block.arguments
@@ -279,40 +283,42 @@ class _Compiler:
         }
         text = self._template(block, placed)
         made = statements(text, expressions, bodies, keywords(block, expressions))
-        if block.calls and isinstance(made[0], ast.Expr):
+        if block.calls_function and isinstance(made[0], ast.Expr):
             self._marks[made[0].value] = placed.id
             self._calls.add(placed.id)
-        return self._marked(made, placed)
+        return self._mark(made, placed)
 
-    def _note_motion(self, placed: Placed, block: Block) -> None:
+    def _record_moved_robots(self, placed: PlacedBlock, block: Block) -> None:
         topics = [argument.name for argument in block.arguments if isinstance(argument, TopicField)]
         for topic in (str(saved_value(block, placed, name)) for name in topics):
-            names = moved_by(topic, self._catalogue.connected.values())
+            names = robots_moved_by(topic, self._catalogue.connected.values())
             self._uses.robots |= dict.fromkeys(names)
             self._uses.moves |= dict.fromkeys(names)
-            self._problems.moves(placed, block, topic, names)
+            self._problems.report_motion(placed, block, topic, names)
 
-    def _is_at_home(self, block: Block) -> bool:
+    def _is_allowed_here(self, block: Block) -> bool:
         if not block.needs_function:
             return True
-        return self._function is not None and self._function.gives == (block.needs_function == "result")
+        return self._function is not None and self._function.has_result == (block.needs_function == "result")
 
-    def _marked(self, made: list[ast.stmt], placed: Placed) -> list[ast.stmt]:
+    def _mark(self, made: list[ast.stmt], placed: PlacedBlock) -> list[ast.stmt]:
         self._marks[made[0]] = placed.id
         return made
 
     # ---- values
 
-    def _expressions(self, placed: Placed, block: Block) -> dict[str, ast.expr]:
-        made = {name: literal(constant) for name, constant in block.constants.items()} | dict(block.trees)
+    def _expressions(self, placed: PlacedBlock, block: Block) -> dict[str, ast.expr]:
+        made = {name: literal(constant) for name, constant in block.constants.items()} | dict(
+            block.constant_trees
+        )
         for argument in block.arguments:
             if isinstance(argument, ValueInput):
                 made[argument.name] = self._value(placed, argument)
-            elif isinstance(argument, Field) and not argument.silent:
+            elif isinstance(argument, Field) and not argument.is_display_only:
                 made[argument.name] = self._field(placed, block, argument)
         return made
 
-    def _value(self, holder: Placed, argument: ValueInput) -> ast.expr:
+    def _value(self, holder: PlacedBlock, argument: ValueInput) -> ast.expr:
         inner = holder.inputs.get(argument.name, ())
         if not inner or not inner[0].enabled:
             return literal(argument.default)
@@ -321,33 +327,33 @@ class _Compiler:
         if block is None:
             raise _SkippedBlock
         if block.shape not in ("value", "boolean"):
-            self._problems.misplaced(placed, block)
+            self._problems.report_misplaced(placed, block)
             raise _SkippedBlock
         if block.needs_message and not self._in_message:
-            self._problems.no_message(placed, block)
+            self._problems.report_no_message(placed, block)
             return literal(None)
-        self._store_reading(placed)
-        missing = self._problems.missing(placed, block)
+        self._store_block_text(placed)
+        missing = self._problems.report_empty_slot(placed, block)
         expressions = self._expressions(placed, block)
         if missing is not None:
             made = expression("fail(%SENTENCE)", {"SENTENCE": literal(missing)})
         else:
-            self._uses.remember(placed, block)
-            self._loose_ends.remember(placed, block)
+            self._uses.add(placed, block)
+            self._loose_ends.add(placed, block)
             made = expression(self._template(block, placed), expressions, keywords(block, expressions))
-        if block.fails or missing is not None:
+        if block.can_fail or missing is not None:
             self._marks[made] = placed.id
             if block.check == "Number" and missing is None:
                 self._numbers.add(placed.id)
-            if block.calls:
+            if block.calls_function:
                 self._calls.add(placed.id)
         return made
 
-    def _field(self, placed: Placed, block: Block, field: Field) -> ast.expr:
+    def _field(self, placed: PlacedBlock, block: Block, field: Field) -> ast.expr:
         try:
             value = field.read(placed.fields.get(field.name))
         except FieldError as error:
-            self._problems.wrong_field(placed, block, error)
+            self._problems.report_invalid_field(placed, block, error)
             raise _SkippedBlock from None
         if isinstance(field, InputField):
             return self._input(placed, block, str(value))
@@ -355,38 +361,38 @@ class _Compiler:
             return ast.Name(self._variable(str(value)), ast.Load())
         return literal(value)
 
-    def _input(self, placed: Placed, block: Block, id: str) -> ast.expr:
+    def _input(self, placed: PlacedBlock, block: Block, id: str) -> ast.expr:
         name = self._function.parameters.get(id) if self._function is not None else None
         if name is None:
-            self._problems.no_input(placed, block)
+            self._problems.report_unknown_input(placed, block)
             raise _SkippedBlock
         return ast.Name(name, ast.Load())
 
     def _variable(self, id: str) -> str:
         if id not in self._variables:
-            is_nameless = id in self._workspace.nameless
+            is_nameless = id in self._workspace.nameless_variables
             words = id if is_nameless else self._workspace.variables.get(id, id)
             self._variables[id] = self._names.new(words, "variable")
         return self._variables[id]
 
     # ---- block look-up
 
-    def _usable_block(self, placed: Placed, holder: Placed | None = None) -> Block | None:
-        if placed.too_deep:
-            self._problems.too_deep(placed)
+    def _usable_block(self, placed: PlacedBlock, holder: PlacedBlock | None = None) -> Block | None:
+        if placed.is_too_deep:
+            self._problems.report_too_deep(placed)
             return None
         block = self._catalogue.blocks.get(placed.type)
-        if self._problems.absent(placed, block, holder):
+        if self._problems.report_unsupported(placed, block, holder):
             return None
-        if block is not None and block.undefined:
-            self._problems.undefined(placed, block)
+        if block is not None and block.undefined_message:
+            self._problems.report_undefined(placed, block)
         return block
 
-    def _template(self, block: Block, placed: Placed) -> str:
+    def _template(self, block: Block, placed: PlacedBlock) -> str:
         return template(block, placed, in_function=self._function is not None)
 
-    def _store_reading(self, placed: Placed) -> str:
-        words = reading(placed, self._catalogue.blocks, self._workspace.variables)
+    def _store_block_text(self, placed: PlacedBlock) -> str:
+        words = block_text(placed, self._catalogue.blocks, self._workspace.variables)
         self._readings[placed.id] = words
         block = self._catalogue.blocks.get(placed.type)
         self._labels[placed.id] = self._problems.label(placed, block)
@@ -406,7 +412,7 @@ def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, lis
     return made
 
 
-def template(block: Block, placed: Placed, *, in_function: bool) -> str:
+def template(block: Block, placed: PlacedBlock, *, in_function: bool) -> str:
     """Return the Python template of a placed block."""
     if in_function and block.python_in_function:
         return block.python_in_function
@@ -420,7 +426,7 @@ def _is_keyword_name(name: str) -> bool:
     return name.isidentifier() and name.isascii() and not keyword.iskeyword(name)
 
 
-def asked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None:
+def invoked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None:
     """Return the actions that a program invokes on each robot; None if that isn't statically known.
 
     The actions are read from the tree that is executed, so that a block can't invoke more than is reported.
@@ -431,19 +437,19 @@ def asked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None
             continue
         if call.func.attr not in ("do", "ask"):
             continue
-        robot, action = _first_text(call.func.value), _first_text(call)
+        robot, action = _first_argument_text(call.func.value), _first_argument_text(call)
         if robot is None or action is None:
             return None
         found.setdefault(robot, {})[action] = None
     return {robot: tuple(actions) for robot, actions in found.items()}
 
 
-def _first_text(node: ast.expr) -> str | None:
+def _first_argument_text(node: ast.expr) -> str | None:
     first = node.args[0] if isinstance(node, ast.Call) and node.args else None
     return first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else None
 
 
-def imports(body: Sequence[ast.stmt]) -> list[ast.stmt]:
+def import_statements(body: Sequence[ast.stmt]) -> list[ast.stmt]:
     """Return the import statement of a program file."""
     names = {
         node.id for statement in body for node in ast.walk(statement) if isinstance(node, ast.Name)
@@ -451,6 +457,6 @@ def imports(body: Sequence[ast.stmt]) -> list[ast.stmt]:
     return statements(f"from app.blocks.commands import {', '.join(sorted({*names, 'run'}))}", {})
 
 
-def ending(name: str) -> list[ast.stmt]:
+def run_statements(name: str) -> list[ast.stmt]:
     """Return the last statement of a program file."""
     return statements("run(%NAME)", {"NAME": literal(name)})

@@ -13,27 +13,31 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from app.blocks.compiler.lowering import Function
-from app.blocks.model.workspace import Placed, Workspace
+from app.blocks.model.workspace import PlacedBlock, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Action
 
-STARTED = "events_started"
+START_BLOCK = "events_started"
 IMMEDIATE, LATER, UNCERTAIN = range(3)
-_ENDLESS = frozenset({"control_forever", "control_while"})
-_CONDITIONS = frozenset({"control_if", "control_if_else"})
-_WAITS = {"control_wait": LATER, "control_wait_until": UNCERTAIN, "control_wait_until_at_most": UNCERTAIN}
-_REPLACES = "replace"
+_ENDLESS_BLOCKS = frozenset({"control_forever", "control_while"})
+_CONDITIONAL_BLOCKS = frozenset({"control_if", "control_if_else"})
+_TIMING_OF_WAIT_BLOCKS = {
+    "control_wait": LATER,
+    "control_wait_until": UNCERTAIN,
+    "control_wait_until_at_most": UNCERTAIN,
+}
+_REPLACE = "replace"
 
 
 @dataclass(frozen=True)
-class UsedPart:
+class ActionUse:
     """Action block of a robot; ``endless`` is True inside a loop that never ends."""
 
-    placed: Placed
+    block: PlacedBlock
     robot: str
     action: Action
-    when: int
-    endless: bool
+    timing: int
+    is_endless: bool
 
 
 @dataclass(frozen=True)
@@ -44,104 +48,112 @@ class Conflict:
     block of the other one; None if both run forever.
     """
 
-    first: UsedPart
-    second: UsedPart
-    part: str
-    put: tuple[str, str] | None
+    first: ActionUse
+    second: ActionUse
+    resource: str
+    reordering: tuple[str, str] | None
 
 
 class ConflictFinder:
     """Search through the start scripts of a workspace and the functions that they call."""
 
     def __init__(
-        self, workspace: Workspace, catalogue: Catalogue, function: Callable[[Placed], Function | None]
+        self, workspace: Workspace, catalogue: Catalogue, function: Callable[[PlacedBlock], Function | None]
     ) -> None:
         self._workspace, self._catalogue, self._function = workspace, catalogue, function
 
     def conflicts(self) -> Iterator[Conflict]:
         """Yield each conflict between two scripts, once for each resource of a robot."""
         scripts = [
-            script for script in self._workspace.scripts if script[0].type == STARTED and script[0].enabled
+            script
+            for script in self._workspace.scripts
+            if script[0].type == START_BLOCK and script[0].enabled
         ]
         if len(scripts) < 2:
             return
-        used = [self._used(script[1:])[0] for script in scripts]
+        used = [self._find_action_uses(script[1:])[0] for script in scripts]
         for one, other in itertools.combinations(range(len(scripts)), 2):
             told: set[tuple[str, str]] = set()
             for first, second in itertools.product(used[one], used[other]):
-                for part in _shared_parts(first, second):
+                for part in _shared_resources(first, second):
                     if (first.robot, part) not in told:
                         told.add((first.robot, part))
-                        yield Conflict(first, second, part, self._order(scripts[one], scripts[other]))
+                        yield Conflict(
+                            first, second, part, self._possible_reordering(scripts[one], scripts[other])
+                        )
 
-    def _used(
+    def _find_action_uses(
         self,
-        chain: Sequence[Placed],
+        chain: Sequence[PlacedBlock],
         when: int = IMMEDIATE,
         *,
         endless: bool = False,
         deep: tuple[str, ...] = (),
-    ) -> tuple[list[UsedPart], int]:
-        used: list[UsedPart] = []
+    ) -> tuple[list[ActionUse], int]:
+        used: list[ActionUse] = []
         for placed in chain:
             if not placed.enabled:
                 continue
-            found = self._part(placed)
+            found = self._robot_action(placed)
             if found is not None:
-                used.append(UsedPart(placed, *found, when, endless))
+                used.append(ActionUse(placed, *found, when, endless))
                 when = max(when, LATER)  # actions take time
-            is_condition = placed.type.partition(":")[0] in _CONDITIONS
-            loops = endless or placed.type in _ENDLESS
+            is_condition = placed.type.partition(":")[0] in _CONDITIONAL_BLOCKS
+            loops = endless or placed.type in _ENDLESS_BLOCKS
             for inner in placed.inputs.values():
-                inside, after = self._used(
+                inside, after = self._find_action_uses(
                     inner, UNCERTAIN if is_condition else when, endless=loops, deep=deep
                 )
                 used += inside
                 when = max(when, (LATER if inside else when) if is_condition else after)
             called = self._function(placed)
-            if called is not None and called.placed.id not in deep:
-                body = called.placed.inputs.get("BODY", ())
-                inside, when = self._used(body, when, endless=endless, deep=(*deep, called.placed.id))
+            if called is not None and called.definition.id not in deep:
+                body = called.definition.inputs.get("BODY", ())
+                inside, when = self._find_action_uses(
+                    body, when, endless=endless, deep=(*deep, called.definition.id)
+                )
                 used += inside
-            when = max(when, _WAITS.get(placed.type, IMMEDIATE))
+            when = max(when, _TIMING_OF_WAIT_BLOCKS.get(placed.type, IMMEDIATE))
         return used, when
 
-    def _part(self, placed: Placed) -> tuple[str, Action] | None:
+    def _robot_action(self, placed: PlacedBlock) -> tuple[str, Action] | None:
         block = self._catalogue.blocks.get(placed.type)
         if block is None or block.robot is None or block.robot.kind != "action":
             return None
-        name = placed.field_id("ROBOT")
+        name = placed.field_text("ROBOT")
         robot = self._catalogue.connected.get(name)
         action = robot.action(block.robot.name) if robot is not None else None
         return (name, action) if action is not None and action.uses else None
 
-    def _order(self, one: Sequence[Placed], other: Sequence[Placed]) -> tuple[str, str] | None:
+    def _possible_reordering(
+        self, one: Sequence[PlacedBlock], other: Sequence[PlacedBlock]
+    ) -> tuple[str, str] | None:
         if not self._is_endless(one):
             return other[0].id, one[0].id
         return None if self._is_endless(other) else (one[0].id, other[0].id)
 
-    def _is_endless(self, script: Sequence[Placed]) -> bool:
+    def _is_endless(self, script: Sequence[PlacedBlock]) -> bool:
         block = self._catalogue.blocks.get(script[-1].type)
         return block is None or block.shape == "cap"
 
 
-def _shared_parts(first: UsedPart, second: UsedPart) -> Sequence[str]:
-    if first.robot != second.robot or not _at_same_time(first, second):
+def _shared_resources(first: ActionUse, second: ActionUse) -> Sequence[str]:
+    if first.robot != second.robot or not _run_simultaneously(first, second):
         return ()
     if not any(
-        winner.action.on_busy == _REPLACES and loser.action.cancellable
+        winner.action.on_busy == _REPLACE and loser.action.cancellable
         for winner, loser in ((first, second), (second, first))
     ):
         return ()  # the robot runs them one after the other
     return [part for part in first.action.uses if part in second.action.uses]
 
 
-def _at_same_time(first: UsedPart, second: UsedPart) -> bool:
-    if UNCERTAIN in (first.when, second.when):
+def _run_simultaneously(first: ActionUse, second: ActionUse) -> bool:
+    if UNCERTAIN in (first.timing, second.timing):
         return False
-    if first.when == second.when == IMMEDIATE:
+    if first.timing == second.timing == IMMEDIATE:
         return True
-    if LATER in (first.when, second.when) and first.when != second.when:
-        early = first if first.when == IMMEDIATE else second
-        return early.endless
-    return first.endless and second.endless
+    if LATER in (first.timing, second.timing) and first.timing != second.timing:
+        early = first if first.timing == IMMEDIATE else second
+        return early.is_endless
+    return first.is_endless and second.is_endless

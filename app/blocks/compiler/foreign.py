@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-OURS: Mapping[str, str] = {
+EQUIVALENT_BLOCKS: Mapping[str, str] = {
     # Blockly
     "controls_for": "control_count",
     "controls_forEach": "lists_each",

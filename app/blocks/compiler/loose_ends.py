@@ -6,37 +6,37 @@ from app.blocks.compiler.problems import ProblemCollector
 from app.blocks.model.block import Block
 from app.blocks.model.fields import BroadcastField, FieldError, ValueInput, VariableField
 from app.blocks.model.mutators import InputField
-from app.blocks.model.workspace import Placed, Workspace
+from app.blocks.model.workspace import PlacedBlock, Workspace
 
 _READS, _CHANGES, _RECEIVES = "variables_get", "variables_change", "events_received"
 
 
-class LooseEnds:
+class NameUsage:
     """Collects the variables and broadcasts of all blocks that will run."""
 
     def __init__(self) -> None:
-        self._read: dict[str, tuple[Placed, Block]] = {}  # first block that reads a variable
+        self._read: dict[str, tuple[PlacedBlock, Block]] = {}  # first block that reads a variable
         self._set: set[str] = set()
         self._changed: set[str] = set()  # counting up from the initial 0 is fine
         self._as_list: set[str] = set()
-        self._sent: dict[str, tuple[Placed, Block]] = {}
-        self._received: dict[str, tuple[Placed, Block]] = {}
+        self._sent: dict[str, tuple[PlacedBlock, Block]] = {}
+        self._received: dict[str, tuple[PlacedBlock, Block]] = {}
 
-    def remember(self, placed: Placed, block: Block) -> None:
+    def add(self, placed: PlacedBlock, block: Block) -> None:
         """Record which variables a block reads or sets, and which broadcasts it sends or receives."""
         for argument in block.arguments:
             if isinstance(argument, ValueInput) and (argument.check == "List" or argument.variable == "list"):
                 inner = placed.inputs.get(argument.name, ())
                 if inner and inner[0].type == _READS:
-                    self._as_list.add(_variable(inner[0]))
+                    self._as_list.add(_variable_id(inner[0]))
             elif isinstance(argument, VariableField) and not isinstance(argument, InputField):
                 self._add_variable(placed, block)
             elif isinstance(argument, BroadcastField):
                 both = self._received if block.type == _RECEIVES else self._sent
                 both.setdefault(_broadcast_name(argument, placed), (placed, block))
 
-    def _add_variable(self, placed: Placed, block: Block) -> None:
-        id = _variable(placed)
+    def _add_variable(self, placed: PlacedBlock, block: Block) -> None:
+        id = _variable_id(placed)
         if block.type == _READS:
             self._read.setdefault(id, (placed, block))
         elif block.type == _CHANGES:
@@ -49,23 +49,23 @@ class LooseEnds:
         for id, (placed, block) in self._read.items():
             is_list = id in self._as_list
             if id not in self._set and (is_list or id not in self._changed):
-                notes.never_set(placed, block, id, workspace.variables.get(id, id), is_list=is_list)
+                notes.report_never_set(placed, block, id, workspace.variables.get(id, id), is_list=is_list)
         for name, (placed, block) in self._sent.items():
             if name not in self._received:
-                notes.never_received(placed, block, name)
+                notes.report_never_received(placed, block, name)
         for name, (placed, block) in self._received.items():
             if name not in self._sent:
-                notes.never_sent(placed, block, name)
+                notes.report_never_sent(placed, block, name)
 
 
-def _variable(placed: Placed) -> str:
+def _variable_id(placed: PlacedBlock) -> str:
     try:
         return str(VariableField("VAR").read(placed.fields.get("VAR")))
     except FieldError:
         return ""
 
 
-def _broadcast_name(field: BroadcastField, placed: Placed) -> str:
+def _broadcast_name(field: BroadcastField, placed: PlacedBlock) -> str:
     try:
         return str(field.read(placed.fields.get(field.name)))
     except FieldError:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 from app.blocks.model.block import Block
 from app.blocks.model.fields import Argument, ValueInput
-from app.blocks.model.mutators import Branches, FunctionInput, Inputs, Items, inputs_of, name_of
-from app.blocks.model.names import Names
-from app.blocks.model.workspace import Placed, Workspace
+from app.blocks.model.mutators import Branches, FunctionInput, Inputs, Items, function_name, inputs_of
+from app.blocks.model.names import PythonNames
+from app.blocks.model.workspace import PlacedBlock, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
 from nep.i18n import _
 
@@ -28,18 +28,18 @@ _HAS_RESULT = {PLAIN: False, RESULT: True}
 class Function:
     """Function of the behaviour; ``parameters`` are the Python names of its inputs by id."""
 
-    placed: Placed
+    definition: PlacedBlock
     name: str
-    python: str
+    python_name: str
     parameters: Mapping[str, str]
     inputs: tuple[FunctionInput, ...]
-    gives: bool
+    has_result: bool
 
 
 class Lowering:
     """Functions of a workspace, and the rewritten ``workspace``."""
 
-    def __init__(self, workspace: Workspace, catalogue: Catalogue, names: Names) -> None:
+    def __init__(self, workspace: Workspace, catalogue: Catalogue, names: PythonNames) -> None:
         self._catalogue = catalogue
         self.variables = workspace.variables  # without inputs of functions
         self._by_id: dict[str, Function] = {}
@@ -47,30 +47,32 @@ class Lowering:
             if script[0].type in _HAS_RESULT and script[0].enabled:
                 self._by_id[script[0].id] = _function(script[0], names)
         self._by_name = {function.name: function for function in reversed(self._by_id.values())}
-        scripts = tuple(tuple(map(self._lowered, script)) for script in workspace.scripts)
+        scripts = tuple(tuple(map(self._lower, script)) for script in workspace.scripts)
         shown = {each.id: each.name for function in self._by_id.values() for each in function.inputs}
         self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **shown})
 
-    def function(self, definition: Placed) -> Function | None:
+    def function(self, definition: PlacedBlock) -> Function | None:
         """Return the function that this block defines; None if it is disabled."""
         return self._by_id.get(definition.id)
 
-    def called(self, placed: Placed) -> Function | None:
+    def called_function(self, placed: PlacedBlock) -> Function | None:
         """Return the function that a block of the rewritten ``workspace`` calls, or None."""
         kind = placed.type.partition(":")[0]
-        found = self._called(placed) if kind in (CALL, CALL_RESULT) else None
+        found = self._find_function(placed) if kind in (CALL, CALL_RESULT) else None
         if found is None:
             return None
         definitions = (script[0] for script in self.workspace.scripts)
-        return next((replace(found, placed=each) for each in definitions if each.id == found.placed.id), None)
+        return next(
+            (replace(found, definition=each) for each in definitions if each.id == found.definition.id), None
+        )
 
-    def _called(self, placed: Placed) -> Function | None:
-        found = self._by_id.get(str(placed.extra.get("function")))
-        found = found or self._by_name.get(name_of(placed))
-        return None if found is None or (placed.type == CALL_RESULT and not found.gives) else found
+    def _find_function(self, placed: PlacedBlock) -> Function | None:
+        found = self._by_id.get(str(placed.extra_state.get("function")))
+        found = found or self._by_name.get(function_name(placed))
+        return None if found is None or (placed.type == CALL_RESULT and not found.has_result) else found
 
-    def _lowered(self, placed: Placed) -> Placed:
-        inner = {name: tuple(map(self._lowered, chain)) for name, chain in placed.inputs.items()}
+    def _lower(self, placed: PlacedBlock) -> PlacedBlock:
+        inner = {name: tuple(map(self._lower, chain)) for name, chain in placed.inputs.items()}
         placed = replace(placed, inputs=inner)
         block = self._catalogue.blocks.get(placed.type)
         if block is None or not block.mutator:
@@ -85,9 +87,9 @@ class Lowering:
             else self._lower_definition(placed, block)
         )
 
-    def _lower_list(self, placed: Placed, block: Block) -> Placed:
+    def _lower_list(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
         growing = next(argument for argument in block.arguments if isinstance(argument, Items))
-        gaps = growing.gaps(placed.extra)
+        gaps = growing.slots(placed.extra_state)
         holes = [f"%{gap.name}" for gap in gaps]
         hole = f"%{growing.name}"
         made = replace(
@@ -97,10 +99,10 @@ class Lowering:
             python=str(block.python).replace(hole, ", ".join(holes)),
             arguments=gaps,
         )
-        return self._with_type(placed, made)
+        return self._register_type(placed, made)
 
-    def _lower_branches(self, placed: Placed, block: Block) -> Placed:
-        branches = Branches.of(placed.extra, has_else=block.argument("ELSE") is not None)
+    def _lower_branches(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
+        branches = Branches.from_extra_state(placed.extra_state, has_else=block.argument("ELSE") is not None)
         text, python = block.text.partition("%BODY")[0] + "%BODY", "if %CONDITION:\n    %BODY"
         for number in range(1, branches.else_ifs + 1):
             text += f" {_('else if')} %CONDITION{number} %BODY{number}"
@@ -116,12 +118,12 @@ class Lowering:
             python=python,
             arguments=(*first, *branches.arguments()),
         )
-        return self._with_type(placed, made)
+        return self._register_type(placed, made)
 
-    def _lower_definition(self, placed: Placed, block: Block) -> Placed:
-        shown = " ".join(each.name for each in inputs_of(placed.extra))
-        text = block.text.replace("%NAME", _without_holes(name_of(placed))).replace(
-            "%INPUTS", _without_holes(shown)
+    def _lower_definition(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
+        shown = " ".join(each.name for each in inputs_of(placed.extra_state))
+        text = block.text.replace("%NAME", _escape_placeholders(function_name(placed))).replace(
+            "%INPUTS", _escape_placeholders(shown)
         )
         kept = tuple(argument for argument in block.arguments if f"%{argument.name}" in text)
         if placed.type == RESULT:
@@ -129,16 +131,16 @@ class Lowering:
             self._catalogue.blocks[f"{END}:{placed.id}"] = replace(
                 block, shape="statement", text="return %RESULT", python="return %RESULT", arguments=result
             )
-        return self._with_type(
+        return self._register_type(
             placed, replace(block, type=f"{block.type}:{placed.id}", text=text, arguments=kept)
         )
 
-    def _lower_call(self, placed: Placed, block: Block) -> Placed:
-        function = self._called(placed)
-        inputs = inputs_of(placed.extra) if function is None else function.inputs
-        name = _without_holes(name_of(placed) if function is None else function.name)
-        gaps, filled = _gaps(placed, inputs)
-        text = " ".join((name, *(f"{_without_holes(each.name)} %{gap.name}" for each, gap in gaps)))
+    def _lower_call(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
+        function = self._find_function(placed)
+        inputs = inputs_of(placed.extra_state) if function is None else function.inputs
+        name = _escape_placeholders(function_name(placed) if function is None else function.name)
+        gaps, filled = _fill_slots(placed, inputs)
+        text = " ".join((name, *(f"{_escape_placeholders(each.name)} %{gap.name}" for each, gap in gaps)))
         made = replace(block, type=f"{block.type}:{placed.id}", text=text)
         if function is None:
             sentence = _("The function “{name}” is missing. Define it, or delete this block.").format(
@@ -146,39 +148,40 @@ class Lowering:
             )
             made = replace(
                 made, text=name, arguments=(), python="fail(%X_SENTENCE)",
-                constants={"X_SENTENCE": sentence}, undefined=sentence,
+                constants={"X_SENTENCE": sentence}, undefined_message=sentence,
             )  # fmt: skip
         else:
             holes = ", ".join(f"%{gap.name}" for _, gap in gaps)
             made = replace(
                 made, arguments=tuple(gap for _, gap in gaps), python=f"%X_FUNCTION({holes})",
-                trees={"X_FUNCTION": ast.Name(function.python, ast.Load())}, calls=True,
+                constant_trees={"X_FUNCTION": ast.Name(function.python_name, ast.Load())},
+                calls_function=True,
             )  # fmt: skip
-        return self._with_type(replace(placed, inputs=filled), made)
+        return self._register_type(replace(placed, inputs=filled), made)
 
-    def _with_type(self, placed: Placed, block: Block) -> Placed:
+    def _register_type(self, placed: PlacedBlock, block: Block) -> PlacedBlock:
         self._catalogue.blocks[block.type] = block
         return replace(placed, type=block.type)
 
 
-def _function(placed: Placed, names: Names) -> Function:
-    inputs = inputs_of(placed.extra)
-    name = name_of(placed)
+def _function(placed: PlacedBlock, names: PythonNames) -> Function:
+    inputs = inputs_of(placed.extra_state)
+    name = function_name(placed)
     python = names.new(name, "function")
     parameters = {each.id: names.new(each.name, "input") for each in inputs}
     return Function(placed, name, python, parameters, inputs, _HAS_RESULT[placed.type])
 
 
-def _gaps(
-    placed: Placed, inputs: tuple[FunctionInput, ...]
-) -> tuple[list[tuple[FunctionInput, Argument]], dict[str, tuple[Placed, ...]]]:
+def _fill_slots(
+    placed: PlacedBlock, inputs: tuple[FunctionInput, ...]
+) -> tuple[list[tuple[FunctionInput, Argument]], dict[str, tuple[PlacedBlock, ...]]]:
     gaps: list[tuple[FunctionInput, Argument]] = []
-    filled: dict[str, tuple[Placed, ...]] = {}
-    for number, (each, gap) in enumerate(Inputs("INPUTS").gaps(inputs)):
+    filled: dict[str, tuple[PlacedBlock, ...]] = {}
+    for number, (each, gap) in enumerate(Inputs("INPUTS").slots(inputs)):
         gaps.append((each, ValueInput(f"G{number}")))
         filled[f"G{number}"] = placed.inputs.get(gap.name, ())
     return gaps, filled
 
 
-def _without_holes(words: str) -> str:
+def _escape_placeholders(words: str) -> str:
     return words.replace("%", "％")  # noqa: RUF001 (looks the same, but is not a hole)

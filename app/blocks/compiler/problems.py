@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from app.blocks.compiler.conflicts import Conflict
-from app.blocks.compiler.foreign import OURS
+from app.blocks.compiler.foreign import EQUIVALENT_BLOCKS
 from app.blocks.model.block import Block
-from app.blocks.model.block_text import label, label_of_unknown, reading
+from app.blocks.model.block_text import block_text, label, label_of_unknown
 from app.blocks.model.fields import Argument, Field, FieldError, TextField, ValueInput, VariableField
 from app.blocks.model.program import Problem, Severity
-from app.blocks.model.workspace import Placed, Workspace
+from app.blocks.model.workspace import PlacedBlock, Workspace
 from app.blocks.toolbox.catalogue import Catalogue
 from app.robots.description.description import Action
-from nep.i18n import _, lazy, listed, pgettext
+from nep.i18n import _, format_list, lazy, pgettext
 
-_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
-_NEEDS = {
+_SEVERITY_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2}
+_SLOT_TYPE_NAMES = {
     "Number": lazy("a number"),
     "String": lazy("a text"),
     "Boolean": lazy("a condition"),
@@ -24,7 +24,7 @@ _NEEDS = {
     None: lazy("a value"),
 }
 _LITERALS = {"values_number": "NUMBER", "values_text": "TEXT"}
-_PARTS = {
+_RESOURCE_NAMES = {
     "head": lazy("the head"),
     "arms": lazy("the arms"),
     "speech": lazy("the voice"),
@@ -33,7 +33,7 @@ _PARTS = {
     "light": lazy("the light"),
 }
 """Display names of the resources of our robots; those of other robots are shown as described."""
-_STARTER = "events_started"
+_START_BLOCK = "events_started"
 
 
 class ProblemCollector:
@@ -46,9 +46,9 @@ class ProblemCollector:
 
     def problems(self) -> tuple[Problem, ...]:
         """Return all problems, worst first."""
-        return tuple(sorted(self._problems.values(), key=lambda problem: _ORDER[problem.severity]))
+        return tuple(sorted(self._problems.values(), key=lambda problem: _SEVERITY_ORDER[problem.severity]))
 
-    def label(self, placed: Placed, block: Block | None) -> str:
+    def label(self, placed: PlacedBlock, block: Block | None) -> str:
         """Return the label of a block for use in messages."""
         return label_of_unknown(placed) if block is None else label(placed, block)
 
@@ -61,10 +61,10 @@ class ProblemCollector:
             "warning", None, None, subject,
             _("No event block starts these blocks, so they don't run. Put “{start}” above "
               "them.").format(start=subject),
-            fix=_("Add “when started”"), fix_action=f"add:{_STARTER}",
+            fix=_("Add “when started”"), fix_action=f"add:{_START_BLOCK}",
         )  # fmt: skip
 
-    def unattached(self, placed: Placed, block: Block) -> None:
+    def report_unattached(self, placed: PlacedBlock, block: Block) -> None:
         """Report blocks that are not below a start block."""
         name = self.label(placed, block)
         if block.shape in ("value", "boolean"):
@@ -75,13 +75,13 @@ class ProblemCollector:
         start = pgettext("block", "when started")
         self._add("info", placed, block, name, sentence.format(block=name, start=start))
 
-    def misplaced(self, placed: Placed, block: Block) -> None:
+    def report_misplaced(self, placed: PlacedBlock, block: Block) -> None:
         """Report a block at an invalid position, which the editor prevents but a file may contain."""
         name = self.label(placed, block)
         sentence = _("{block} can't be used here. It is kept but skipped.")
         self._add("warning", placed, block, name, sentence.format(block=name))
 
-    def too_deep(self, placed: Placed) -> None:
+    def report_too_deep(self, placed: PlacedBlock) -> None:
         """Report nesting that is too deep for Python."""
         block = self._catalogue.blocks.get(placed.type)
         name = self.label(placed, block)
@@ -92,7 +92,7 @@ class ProblemCollector:
             ).format(block=name),
         )  # fmt: skip
 
-    def no_message(self, placed: Placed, block: Block) -> None:
+    def report_no_message(self, placed: PlacedBlock, block: Block) -> None:
         """Report a block that reads the received message in a script that isn't started by a message."""
         name = self.label(placed, block)
         self._add(
@@ -100,20 +100,22 @@ class ProblemCollector:
             _("{block} only works below “when a message arrives”.").format(block=name),
         )  # fmt: skip
 
-    def no_input(self, placed: Placed, block: Block) -> None:
+    def report_unknown_input(self, placed: PlacedBlock, block: Block) -> None:
         """Report an input of a function that is used outside of the function or was removed."""
-        name = reading(placed, self._catalogue.blocks, self._workspace.variables)
+        name = block_text(placed, self._catalogue.blocks, self._workspace.variables)
         sentence = _("“{name}” only works inside its own function. It is kept but skipped.").format(name=name)
         self._add("warning", placed, block, name, sentence)
 
-    def undefined(self, placed: Placed, block: Block) -> None:
+    def report_undefined(self, placed: PlacedBlock, block: Block) -> None:
         """Report a call of an undefined function."""
         self._add(
-            "error", placed, block, self.label(placed, block), block.undefined,
+            "error", placed, block, self.label(placed, block), block.undefined_message,
             fix=_("Define it"), fix_action=f"define:{placed.id}",
         )  # fmt: skip
 
-    def never_set(self, placed: Placed, block: Block, id: str, name: str, *, is_list: bool) -> None:
+    def report_never_set(
+        self, placed: PlacedBlock, block: Block, id: str, name: str, *, is_list: bool
+    ) -> None:
         """Report a variable that is read but never set, so that its value remains 0."""
         subject = f"“{name}”"
         self._add(
@@ -122,7 +124,7 @@ class ProblemCollector:
             fix_action=f"begin:{'list' if is_list else 'number'}:{id}",
         )  # fmt: skip
 
-    def never_received(self, placed: Placed, block: Block, name: str) -> None:
+    def report_never_received(self, placed: PlacedBlock, block: Block, name: str) -> None:
         """Report a broadcast that no script receives."""
         subject = f"“{name}”"
         self._add(
@@ -130,39 +132,41 @@ class ProblemCollector:
             fix=_("Add “when I receive”"), fix_action=f"receive:{name}",
         )  # fmt: skip
 
-    def never_sent(self, placed: Placed, block: Block, name: str) -> None:
+    def report_never_sent(self, placed: PlacedBlock, block: Block, name: str) -> None:
         """Report a script that waits for a broadcast which is never sent."""
         subject = f"“{name}”"
         sentence = _("Nothing broadcasts {name}, so this script doesn't run.").format(name=subject)
         self._add("info", placed, block, subject, sentence)
 
-    def conflict(self, found: Conflict) -> None:
+    def report_conflict(self, found: Conflict) -> None:
         """Report two scripts that use the same resource of a robot, at the block of the second script."""
-        placed, name = found.second.placed, found.second.action.title
-        part = _PARTS.get(found.part)
+        placed, name = found.second.block, found.second.action.title
+        part = _RESOURCE_NAMES.get(found.resource)
         words = _("“{action}” and “{other}” both move {robot} at the same time: one replaces the other.")
-        if part is not None or found.part != "base":
+        if part is not None or found.resource != "base":
             words = _(
                 "“{action}” and “{other}” both use {part} of {robot} at the same time: "
                 "one replaces the other."
             )
         sentence = words.format(
             action=found.first.action.title, other=name, robot=found.second.robot,
-            part=_("the {part}").format(part=found.part) if part is None else _(part),
+            part=_("the {part}").format(part=found.resource) if part is None else _(part),
         )  # fmt: skip
         self._add(
             "warning", placed, self._catalogue.blocks.get(placed.type), name, sentence,
-            fix=_("Run one after the other") if found.put else None,
-            fix_action=f"after:{':'.join(found.put)}" if found.put else None,
+            fix=_("Run one after the other") if found.reordering else None,
+            fix_action=f"after:{':'.join(found.reordering)}" if found.reordering else None,
         )  # fmt: skip
 
-    def wrong_field(self, placed: Placed, block: Block, error: FieldError) -> None:
+    def report_invalid_field(self, placed: PlacedBlock, block: Block, error: FieldError) -> None:
         """Report an invalid field value."""
         name = self.label(placed, block)
         sentence = _("{block} {what_is_wrong}. It is kept but skipped.")
         self._add("error", placed, block, name, sentence.format(block=name, what_is_wrong=error))
 
-    def absent(self, placed: Placed, block: Block | None, holder: Placed | None) -> bool:
+    def report_unsupported(
+        self, placed: PlacedBlock, block: Block | None, holder: PlacedBlock | None
+    ) -> bool:
         """Report a block that no connected robot supports; return False if it isn't such a block."""
         robot = placed.fields.get("ROBOT")
         name = self.label(placed, block)
@@ -182,16 +186,16 @@ class ProblemCollector:
             )  # fmt: skip
             return True
         if block is None:
-            self._unknown(placed, name)
+            self._report_unknown(placed, name)
             return True
-        if isinstance(robot, str) and block.robot is not None and not self._can(robot, block):
+        if isinstance(robot, str) and block.robot is not None and not self._is_supported(robot, block):
             sentence = _("{robot} can't do this, so {block} will be skipped.")
             self._add("warning", placed, block, name, sentence.format(robot=robot, block=skipped))
             return True
         return False
 
-    def _unknown(self, placed: Placed, name: str) -> None:
-        own = self._catalogue.blocks.get(OURS.get(placed.type, ""))
+    def _report_unknown(self, placed: PlacedBlock, name: str) -> None:
+        own = self._catalogue.blocks.get(EQUIVALENT_BLOCKS.get(placed.type, ""))
         prefixes = {each.partition("_")[0] for each in self._catalogue.blocks}
         if placed.type.startswith("robot_"):
             sentence = _(
@@ -199,7 +203,7 @@ class ProblemCollector:
             )
             self._add("warning", placed, None, name, sentence.format(block=name), style="robot")
         elif own is not None:
-            words = label(Placed("", own.type), own)
+            words = label(PlacedBlock("", own.type), own)
             sentence = _(
                 "“{block}” belongs to another program and can't run here. It is kept but skipped. "
                 "“{own_block}” does the same."
@@ -220,9 +224,9 @@ class ProblemCollector:
         told = {id for id, _sentence in self._problems}
         for placed in self._enabled_blocks():
             if placed.type not in self._catalogue.blocks and placed.id not in told:
-                self._unknown(placed, self.label(placed, None))
+                self._report_unknown(placed, self.label(placed, None))
 
-    def _enabled_blocks(self) -> Iterator[Placed]:
+    def _enabled_blocks(self) -> Iterator[PlacedBlock]:
         waiting = [placed for script in reversed(self._workspace.scripts) for placed in reversed(script)]
         while waiting:
             placed = waiting.pop()
@@ -234,11 +238,11 @@ class ProblemCollector:
     def check_names(self) -> None:
         """Report variables whose names are missing in the file."""
         told: set[str] = set()
-        for placed in self._enabled_blocks() if self._workspace.nameless else ():
+        for placed in self._enabled_blocks() if self._workspace.nameless_variables else ():
             block = self._catalogue.blocks.get(placed.type)
             for argument in block.arguments if block is not None else ():
-                id = _variable(argument, placed)
-                if id not in self._workspace.nameless or id in told:
+                id = _variable_id(argument, placed)
+                if id not in self._workspace.nameless_variables or id in told:
                     continue
                 told.add(id)
                 name = self.label(placed, block)
@@ -261,7 +265,7 @@ class ProblemCollector:
             and placed.fields["ROBOT"] not in self._catalogue.connected
         )
 
-    def _can(self, name: str, block: Block) -> bool:
+    def _is_supported(self, name: str, block: Block) -> bool:
         use = block.robot
         robot = self._catalogue.connected[name]
         if use is None or not use.name:
@@ -275,27 +279,27 @@ class ProblemCollector:
         )
         return known is not None
 
-    def missing(self, placed: Placed, block: Block) -> str | None:
+    def report_empty_slot(self, placed: PlacedBlock, block: Block) -> str | None:
         """Report an empty slot without default and return the message; None if there is none."""
         for argument in block.arguments:
             if not isinstance(argument, ValueInput):
                 continue
             inner = placed.inputs.get(argument.name, ())
-            if (inner and inner[0].enabled) or not argument.is_there(placed.fields):
+            if (inner and inner[0].enabled) or not argument.is_present(placed.fields):
                 continue
             name = self.label(placed, block)
             sentence = _("{block} needs {what}. Drag one into its slot.").format(
-                block=name, what=_(_NEEDS[argument.check])
+                block=name, what=_(_SLOT_TYPE_NAMES[argument.check])
             )
             self._add("error", placed, block, name, sentence)
             return sentence
         return None
 
-    def check(self, placed: Placed, block: Block) -> None:
+    def report_hints(self, placed: PlacedBlock, block: Block) -> None:
         """Report hints about a block that will run."""
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
             self._add(
-                "info", placed, block, self.label(placed, block), self._wait_forever_sentence(placed, block),
+                "info", placed, block, self.label(placed, block), self._wait_forever_message(placed, block),
                 fix=_("Add a time limit"), fix_action=f"limit:{placed.id}",
             )  # fmt: skip
         robot = self._catalogue.connected.get(str(placed.fields.get("ROBOT")))
@@ -303,25 +307,25 @@ class ProblemCollector:
         if action is not None:
             self._check_input(placed, block, action)
 
-    def moves(self, placed: Placed, block: Block, topic: str, robots: Sequence[str]) -> None:
+    def report_motion(self, placed: PlacedBlock, block: Block, topic: str, robots: Sequence[str]) -> None:
         """Report a block that moves robots by publishing on their topics."""
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
-            who, name = listed(real), self.label(placed, block)
+            who, name = format_list(real), self.label(placed, block)
             said = _(
                 "{block} on {topic} moves {robots}. Studio asks for permission first; Stop ends the movement."
             )
             self._add("info", placed, block, name, said.format(block=name, topic=topic, robots=who))
 
-    def _wait_forever_sentence(self, placed: Placed, block: Block) -> str:
+    def _wait_forever_message(self, placed: PlacedBlock, block: Block) -> str:
         name = self.label(placed, block)
         condition = placed.inputs["CONDITION"][0]
-        words = reading(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
+        words = block_text(condition, self._catalogue.blocks, self._workspace.variables, robot=False)
         if any(word in words for word in ("face", "person", "people")):
             return _("{block} waits forever if no one appears.").format(block=name)
         return _("{block} waits forever if that never happens.").format(block=name)
 
-    def _check_input(self, placed: Placed, block: Block, action: Action) -> None:
+    def _check_input(self, placed: PlacedBlock, block: Block, action: Action) -> None:
         given: dict[str, object] = {}
         for at, name in block.keywords.get("X_INPUT", ()):
             found = _literal_value(placed, block, at)
@@ -332,12 +336,12 @@ class ProblemCollector:
         for problem in action.problems(action.complete(given)):
             if problem not in without:
                 name = self.label(placed, block)
-                self._add("error", placed, block, name, f"{name}: {problem.sentence}.")
+                self._add("error", placed, block, name, f"{name}: {problem.message}.")
 
     def _add(
         self,
         severity: Severity,
-        placed: Placed | None,
+        placed: PlacedBlock | None,
         block: Block | None,
         subject: str,
         sentence: str,
@@ -354,7 +358,7 @@ class ProblemCollector:
                 block_id=id,
                 category=block.style if block is not None else style,
                 subject=subject,
-                sentence=sentence,
+                message=sentence,
                 fix=fix,
                 fix_action=fix_action,
                 icon=block.icon if block is not None else "circle-help",
@@ -362,12 +366,12 @@ class ProblemCollector:
         )
 
 
-def _is_literal(placed: Placed, name: str) -> bool:
+def _is_literal(placed: PlacedBlock, name: str) -> bool:
     inner = placed.inputs.get(name, ())
     return bool(inner) and inner[0].type == "values_boolean"
 
 
-def _variable(argument: Argument, placed: Placed) -> str:
+def _variable_id(argument: Argument, placed: PlacedBlock) -> str:
     if not isinstance(argument, VariableField):
         return ""
     try:
@@ -376,7 +380,7 @@ def _variable(argument: Argument, placed: Placed) -> str:
         return ""
 
 
-def _literal_value(placed: Placed, block: Block, name: str) -> object:
+def _literal_value(placed: PlacedBlock, block: Block, name: str) -> object:
     # None for a value that is computed at run time.
     argument = block.argument(name)
     if isinstance(argument, Field):
@@ -387,10 +391,10 @@ def _literal_value(placed: Placed, block: Block, name: str) -> object:
     inner = placed.inputs.get(name, ())
     if not inner or inner[0].type not in _LITERALS:
         return None
-    return _plain(inner[0])
+    return _literal_block_value(inner[0])
 
 
-def _plain(placed: Placed) -> object:
+def _literal_block_value(placed: PlacedBlock) -> object:
     name = _LITERALS[placed.type]
     saved = placed.fields.get(name)
     if name == "TEXT":

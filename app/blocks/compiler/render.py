@@ -9,16 +9,16 @@ from collections.abc import Set as AbstractSet
 from app.blocks.model.template import literal
 from nep.system.syntax import parse_module
 
-Marks = Mapping[ast.AST, str]
+BlockIdByNode = Mapping[ast.AST, str]
 """Block ids by the first node of each block."""
 
 
-def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str]]:
+def render_source(body: Sequence[ast.stmt], marks: BlockIdByNode) -> tuple[str, dict[int, str]]:
     """Return readable source code, and the block ids of the lines at which a block begins."""
     parts: list[str] = []
     for before, statement in zip((None, *body[:-1]), body, strict=True):
         ast.fix_missing_locations(statement)
-        parts += (_gap(before, statement), ast.unparse(statement).strip("\n"), "\n")
+        parts += (_blank_lines_between(before, statement), ast.unparse(statement).strip("\n"), "\n")
     text = "".join(parts)
     lines: dict[int, str] = {}
     for ours, theirs in _matched_statements(body, parse_module(text).body):
@@ -29,8 +29,8 @@ def readable(body: Sequence[ast.stmt], marks: Marks) -> tuple[str, dict[int, str
     return text, lines
 
 
-def instrumented(
-    body: Sequence[ast.stmt], marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]
+def render_instrumented(
+    body: Sequence[ast.stmt], marks: BlockIdByNode, numbers: AbstractSet[str], calls: AbstractSet[str]
 ) -> str:
     """Return the code that is executed. Changes the tree, so call `readable` first.
 
@@ -40,14 +40,14 @@ def instrumented(
         numbers: Blocks that must return a number.
         calls: Blocks that call a function.
     """
-    stepper = _Stepper(marks, numbers, calls)
+    stepper = _Instrumenter(marks, numbers, calls)
     steps: list[ast.stmt] = []
     for statement in body:
-        steps += stepper.statement(statement)
+        steps += stepper.instrument_statement(statement)
     return ast.unparse(ast.fix_missing_locations(ast.Module(steps, []))) + "\n"
 
 
-def _gap(before: ast.stmt | None, statement: ast.stmt) -> str:
+def _blank_lines_between(before: ast.stmt | None, statement: ast.stmt) -> str:
     if before is None or (isinstance(before, ast.Assign) and isinstance(statement, ast.Assign)):
         return ""
     return "\n\n" if isinstance(before, ast.FunctionDef) or isinstance(statement, ast.FunctionDef) else "\n"
@@ -64,31 +64,31 @@ def _matched_statements(
                 yield from _matched_statements(inner, getattr(other, name))
 
 
-class _Stepper(ast.NodeTransformer):
+class _Instrumenter(ast.NodeTransformer):
     """Inserts ``step(id)`` before blocks and at the end of loop bodies, and wraps values.
 
     The step at the end of a loop body highlights the loop while its condition is evaluated, and lets Stop
     interrupt an empty loop.
     """
 
-    def __init__(self, marks: Marks, numbers: AbstractSet[str], calls: AbstractSet[str]) -> None:
+    def __init__(self, marks: BlockIdByNode, numbers: AbstractSet[str], calls: AbstractSet[str]) -> None:
         self._marks = marks
         self._numbers = numbers
         self._calls = calls
 
-    def statement(self, node: ast.stmt) -> list[ast.stmt]:
+    def instrument_statement(self, node: ast.stmt) -> list[ast.stmt]:
         id = self._marks.get(node)
         made = node
         self.generic_visit(made)
         for name in ("body", "orelse"):
             inner = getattr(made, name, None)
             if isinstance(inner, list):
-                setattr(made, name, [step for each in inner for step in self.statement(each)])
+                setattr(made, name, [step for each in inner for step in self.instrument_statement(each)])
         if id is None or isinstance(made, ast.FunctionDef):
             return [made]
         if isinstance(made, (ast.While, ast.For)):
-            made.body.append(_step(id))
-        return [_step(id), made]
+            made.body.append(_step_call(id))
+        return [_step_call(id), made]
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
         # Visits expressions only; `statement` handles nested statements.
@@ -111,5 +111,5 @@ class _Stepper(ast.NodeTransformer):
         return ast.Call(ast.Name(name, ast.Load()), [literal(id), later], [])
 
 
-def _step(id: str) -> ast.stmt:
+def _step_call(id: str) -> ast.stmt:
     return ast.Expr(ast.Call(ast.Name("step", ast.Load()), [literal(id)], []))

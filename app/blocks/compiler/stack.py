@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from app.blocks.compiler.lowering import PLAIN, RESULT
 from app.blocks.model.workspace import saved_blocks
 
-Saved = Mapping[str, object]
+SavedJson = Mapping[str, object]
 _HAT = {"type": "events_started", "id": "try hat"}
-SHOW = "try value"
+SHOW_BLOCK_ID = "try value"
 """Id of the block that prints a tried value."""
 
 
@@ -31,7 +31,7 @@ class Stack:
 
     id: str
     kind: str = "stack"
-    state: Saved | None = None
+    state: SavedJson | None = None
 
     @property
     def is_value(self) -> bool:
@@ -41,19 +41,19 @@ class Stack:
     @classmethod
     def from_json(cls, told: object) -> Stack:
         """Parse a request of the editor's page; an invalid one refers to no block."""
-        known: Saved = told if isinstance(told, Mapping) else {}
+        known: SavedJson = told if isinstance(told, Mapping) else {}
         state = known.get("state")
         return cls(
             str(known.get("id")), str(known.get("kind")), state if isinstance(state, Mapping) else None
         )
 
-    def workspace(self, behaviour: Saved) -> dict[str, object] | None:
+    def workspace(self, behaviour: SavedJson) -> dict[str, object] | None:
         """Return the behaviour reduced to this stack and its functions; None if the block doesn't exist."""
         made: dict[str, object] = copy.deepcopy(dict(behaviour))
         blocks = made.get("blocks")
         tops = blocks.get("blocks") if isinstance(blocks, dict) else None
-        found = copy.deepcopy(dict(self.state)) if self.state is not None else self._found(made)
-        first = self._below(found) if found is not None else None
+        found = copy.deepcopy(dict(self.state)) if self.state is not None else self._find_first_block(made)
+        first = self._blocks_to_run(found) if found is not None else None
         if first is None:
             return None
         functions = [
@@ -62,27 +62,27 @@ class Stack:
         made["blocks"] = {"languageVersion": 0, "blocks": [*functions, {**_HAT, "next": {"block": first}}]}
         return made
 
-    def type_in(self, behaviour: Saved) -> str:
+    def first_block_type(self, behaviour: SavedJson) -> str:
         """Return the type of the first block of the stack; "" if the block doesn't exist."""
-        found = self.state if self.state is not None else self._found(behaviour)
+        found = self.state if self.state is not None else self._find_first_block(behaviour)
         return str(found.get("type")) if found is not None else ""
 
-    def variable_in(self, behaviour: Saved) -> str | None:
+    def variable_id(self, behaviour: SavedJson) -> str | None:
         """Return the id of the variable if the stack is a variable block; None for anything else."""
-        found = self.state if self.state is not None else self._found(behaviour)
+        found = self.state if self.state is not None else self._find_first_block(behaviour)
         if not self.is_value or found is None or found.get("type") != "variables_get":
             return None
         fields = found.get("fields")
         chosen = fields.get("VAR") if isinstance(fields, Mapping) else None
         return str(chosen.get("id")) if isinstance(chosen, Mapping) else None
 
-    def _found(self, workspace: Saved) -> dict[str, object] | None:
+    def _find_first_block(self, workspace: SavedJson) -> dict[str, object] | None:
         return next((block for block in saved_blocks(workspace) if block.get("id") == self.id), None)
 
-    def _below(self, found: dict[str, object]) -> dict[str, object] | None:
+    def _blocks_to_run(self, found: dict[str, object]) -> dict[str, object] | None:
         # For an event block, only the blocks below it.
         if self.is_value:
-            return {"type": "messages_write", "id": SHOW, "inputs": {"VALUE": {"block": found}}}
+            return {"type": "messages_write", "id": SHOW_BLOCK_ID, "inputs": {"VALUE": {"block": found}}}
         if self.kind != "hat":
             return found
         below = found.get("next")

@@ -6,13 +6,13 @@ import copy
 from collections.abc import Mapping
 
 from app.blocks.compiler.lowering import CALL, CALL_RESULT, PLAIN, RESULT
-from app.blocks.model.mutators import inputs_of, name_of
-from app.blocks.model.workspace import Placed, is_enabled, saved_blocks
+from app.blocks.model.mutators import function_name, inputs_of
+from app.blocks.model.workspace import PlacedBlock, is_enabled, saved_blocks
 from app.blocks.toolbox.catalogue import categories
 
-LIMIT_S = 10
+DEFAULT_TIME_LIMIT_S = 10
 LEFT, TOP = 40, 40
-ASIDE = 420
+SCRIPT_SPACING = 420
 """Horizontal distance of a new script from the others, most of which are not wider."""
 
 
@@ -46,7 +46,7 @@ def _fix_scripts(made: dict[str, object], verb: str, object_: str) -> dict[str, 
     if verb == "receive":
         return _with_script(made, {"type": "events_received", "fields": {"NAME": object_}})
     if verb == "after":
-        return _joined_scripts(made, object_)
+        return _join_scripts(made, object_)
     if verb == "add":
         return _with_start(made, object_)
     return None
@@ -60,7 +60,7 @@ def _with_initial_value(workspace: dict[str, object], variable: str, *, is_list:
         "fields": {"VAR": {"id": variable}},
         "inputs": {"VALUE": empty if is_list else zero},
     }
-    for top in _tops(workspace):
+    for top in _top_blocks(workspace):
         if isinstance(top, dict) and top.get("type") == "events_started" and is_enabled(top):
             if isinstance(top.get("next"), dict):
                 setting["next"] = top["next"]
@@ -69,17 +69,17 @@ def _with_initial_value(workspace: dict[str, object], variable: str, *, is_list:
     return _with_script(workspace, {"type": "events_started", "next": {"block": setting}})
 
 
-def _tops(workspace: dict[str, object]) -> list[object]:
+def _top_blocks(workspace: dict[str, object]) -> list[object]:
     blocks = workspace.setdefault("blocks", {"languageVersion": 0, "blocks": []})
     tops = blocks.setdefault("blocks", []) if isinstance(blocks, dict) else None
     return tops if isinstance(tops, list) else []
 
 
 def _with_script(workspace: dict[str, object], block: dict[str, object]) -> dict[str, object]:
-    tops = _tops(workspace)
+    tops = _top_blocks(workspace)
     places = [top.get("x") for top in tops if isinstance(top, dict)]
-    right = max((x for x in places if isinstance(x, (int, float))), default=LEFT - ASIDE)
-    tops.append({**block, "x": right + ASIDE, "y": TOP})
+    right = max((x for x in places if isinstance(x, (int, float))), default=LEFT - SCRIPT_SPACING)
+    tops.append({**block, "x": right + SCRIPT_SPACING, "y": TOP})
     return workspace
 
 
@@ -87,18 +87,18 @@ def _add_time_limit(block: dict[str, object]) -> None:
     block["type"] = "control_wait_until_at_most"
     inputs = block.setdefault("inputs", {})
     if isinstance(inputs, dict):
-        inputs["SECONDS"] = {"shadow": {"type": "values_number", "fields": {"NUMBER": LIMIT_S}}}
+        inputs["SECONDS"] = {"shadow": {"type": "values_number", "fields": {"NUMBER": DEFAULT_TIME_LIMIT_S}}}
 
 
 def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -> dict[str, object]:
     extra = call.get("extraState")
     known: Mapping[str, object] = extra if isinstance(extra, Mapping) else {}
-    placed = Placed("", "", {}, extra=known)
+    placed = PlacedBlock("", "", {}, extra_state=known)
     definition: dict[str, object] = {
         "type": RESULT if call.get("type") == CALL_RESULT else PLAIN,
         "x": 40,
         "y": 40,
-        "fields": {"NAME": name_of(placed)},
+        "fields": {"NAME": function_name(placed)},
         "extraState": {"inputs": [{"id": each.id, "name": each.name} for each in inputs_of(known)]},
     }
     if isinstance(known.get("function"), str):
@@ -110,7 +110,7 @@ def _with_definition(workspace: dict[str, object], call: Mapping[str, object]) -
     return workspace
 
 
-def _joined_scripts(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
+def _join_scripts(workspace: dict[str, object], hats: str) -> dict[str, object] | None:
     # Removes the event block, which then starts nothing. ``hats`` are two ids joined by a colon; ids may
     # contain colons.
     blocks = workspace.get("blocks")

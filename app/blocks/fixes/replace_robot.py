@@ -6,7 +6,7 @@ import copy
 from collections.abc import Collection, Mapping
 
 from app.blocks.categories.robot import robot_blocks
-from app.blocks.model.robot_text import type_of
+from app.blocks.model.robot_text import block_type_of
 from app.blocks.model.workspace import saved_blocks
 from app.robots.description.description import Robot
 
@@ -16,7 +16,7 @@ def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, ob
     return tuple(block for block in saved_blocks(workspace) if _robot_of(block) == robot)
 
 
-def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
+def block_types_by_robot(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
     """Return the types of the blocks that use each robot."""
     found: dict[str, set[str]] = {}
     for block in saved_blocks(workspace):
@@ -26,7 +26,7 @@ def asked_of(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
     return {robot: frozenset(types) for robot, types in found.items()}
 
 
-def count_of(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[str, int]:
+def block_counts_by_robot(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[str, int]:
     """Count the blocks with these ids for each robot."""
     wanted = frozenset(ids)
     found: dict[str, int] = {}
@@ -37,33 +37,37 @@ def count_of(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[s
     return found
 
 
-def types_of(robot: Robot) -> frozenset[str]:
+def block_types_of(robot: Robot) -> frozenset[str]:
     """Return the types of all blocks of a robot."""
     return frozenset(block.type for block in robot_blocks(robot, [robot]))
 
 
-def can_do(asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None) -> bool:
+def supports_blocks(
+    asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None
+) -> bool:
     """Return True if a robot supports all blocks of these types, which belong to a robot of this model.
 
     ``known`` are the types of the robot's own blocks, if they were already determined.
     """
-    known = types_of(robot) if known is None else known
-    return bool(asked) and all(_translated(each, model, robot) in known for each in asked)
+    known = block_types_of(robot) if known is None else known
+    return bool(asked) and all(_translated_type(each, model, robot) in known for each in asked)
 
 
-def use_robot(workspace: Mapping[str, object], missing: str, model: str, robot: Robot) -> dict[str, object]:
+def with_robot_replaced(
+    workspace: Mapping[str, object], missing: str, model: str, robot: Robot
+) -> dict[str, object]:
     """Return the workspace with all blocks of the missing robot changed to another robot."""
     made: dict[str, object] = copy.deepcopy(dict(workspace))
     for block in blocks_of(made, missing):
-        block["type"] = _translated(str(block.get("type")), model, robot)
+        block["type"] = _translated_type(str(block.get("type")), model, robot)
         fields = block["fields"]
         if isinstance(fields, dict):
             fields["ROBOT"] = robot.name
     return made
 
 
-def _translated(block_type: str, model: str, robot: Robot) -> str:
-    ours, theirs = (type_of(each, "", "", plain=True) for each in (model, robot.model))
+def _translated_type(block_type: str, model: str, robot: Robot) -> str:
+    ours, theirs = (block_type_of(each, "", "", plain=True) for each in (model, robot.model))
     return theirs + block_type.removeprefix(ours) if block_type.startswith(ours) else block_type
 
 

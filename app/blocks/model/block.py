@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from app.blocks.model.fields import Argument, Say, StatementInput, ValueInput
-from app.blocks.model.template import holes
+from app.blocks.model.fields import Argument, StatementInput, Translate, ValueInput
+from app.blocks.model.template import placeholders
 
 Shape = Literal["hat", "definition", "statement", "cap", "value", "boolean"]
 Kind = Literal["action", "sensor", "event"]
 
-_HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
+_PLACEHOLDER = re.compile(r"%([A-Z][A-Z0-9_]*)")
 
 
 @dataclass(frozen=True)
@@ -50,24 +50,24 @@ class Block:
     variant: str | None = None
     check: str | None = None  # type of a value: "Number", "String", or None for any
     constants: Mapping[str, object] = field(default_factory=dict)
-    trees: Mapping[str, ast.expr] = field(default_factory=dict)  # constants that are syntax trees
+    constant_trees: Mapping[str, ast.expr] = field(default_factory=dict)  # constants that are syntax trees
     keywords: Mapping[str, tuple[tuple[str, str], ...]] = field(default_factory=dict)
     robot: RobotUse | None = None
     parameters: tuple[str, ...] = ()  # event blocks: parameters of the function
-    fails: bool = True  # values: the Python code may raise
+    can_fail: bool = True  # values: the Python code may raise
     needs_message: bool = False  # reads the message that started its script
     publishes: bool = False  # publishes on its topics instead of subscribing
     python_in_function: str = ""  # Python code inside a function, if different
     mutator: str = ""  # how the user changes its slots: "items", "branches", "function", "call"
-    extra: Mapping[str, object] = field(default_factory=dict)  # initial extraState in the toolbox
+    extra_state: Mapping[str, object] = field(default_factory=dict)  # initial extraState in the toolbox
     needs_function: str = ""  # only allowed in a function: "result" or "plain"
-    calls: bool = False  # runs blocks elsewhere
-    undefined: str = ""  # why it can't run: the function is undefined
+    calls_function: bool = False  # runs blocks elsewhere
+    undefined_message: str = ""  # why it can't run: the function is undefined
     in_toolbox: bool = True
     about: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # argument -> (name, details)
     help: str = ""  # longer description than the tooltip, with an example
-    words: str = ""  # search words separated by commas; those with ! rank first
-    english_words: str = ""  # English search words, if the language differs
+    search_words: str = ""  # search words separated by commas; those with ! rank first
+    english_search_words: str = ""  # English search words, if the language differs
 
     def argument(self, name: str) -> Argument | None:
         """Return the argument with this name, or None."""
@@ -82,43 +82,45 @@ class Block:
         """Return the errors of the description; empty if it is consistent."""
         known = {argument.name for argument in self.arguments} | {
             *self.constants,
-            *self.trees,
+            *self.constant_trees,
             *self.keywords,
         }
         named = {argument for pairs in self.keywords.values() for argument, _ in pairs}
-        missing = {hole for text in self.templates for hole in holes(text)} - known
+        missing = {hole for text in self.templates for hole in placeholders(text)} - known
         found = [f"{self.type}: its Python needs %{name}" for name in sorted(missing)]
-        shown = set(_HOLE.findall(self.text))
+        shown = set(_PLACEHOLDER.findall(self.text))
         found += [f"{self.type}: its text needs %{name}" for name in sorted(shown - known)]
-        used = {hole for text in self.templates for hole in holes(text)} | named | {self.variant}
+        used = {hole for text in self.templates for hole in placeholders(text)} | named | {self.variant}
         found += [
             f"{self.type}: %{argument.name} is used nowhere"
             for argument in self.arguments
-            if argument.name not in used and not argument.silent and self.shape != "definition"
+            if argument.name not in used and not argument.is_display_only and self.shape != "definition"
         ]
         return tuple(found)
 
-    def translated(self, say: Say) -> Block:
+    def translated(self, say: Translate) -> Block:
         """Return the block with its English texts translated by ``say``; type and Python code are unchanged.
 
         ``say`` is called for every text that the user reads; ``tools/words.py`` uses that to collect the
         texts.
         """
-        words = say(f"words to find {self.type}", self.words) if self.words else ""
+        words = say(f"words to find {self.type}", self.search_words) if self.search_words else ""
         return replace(
             self,
             text=say("block", self.text),
             tooltip=say(None, self.tooltip),
             help=say(None, self.help),
             arguments=tuple(argument.translated(say) for argument in self.arguments),
-            words=words,
-            english_words="" if words == self.words else f"{_plain(self.text)}, {self.words}",
+            search_words=words,
+            english_search_words=""
+            if words == self.search_words
+            else f"{_text_without_placeholders(self.text)}, {self.search_words}",
         )
 
     def to_blockly(self) -> dict[str, object]:
         """Return the definition in Blockly's JSON; each statement input is on a separate line."""
         definition: dict[str, object] = {"type": self.type, "style": self.style, "tooltip": self.tooltip}
-        definition.update(_messages(self))
+        definition.update(_message_json(self))
         definition["inputsInline"] = True
         if self.mutator:
             definition["mutator"] = f"nep_{self.mutator}"
@@ -137,29 +139,29 @@ class Block:
             entry["fields"] = dict(fields)
         inputs: dict[str, object] = {}
         for argument in self.arguments:
-            inputs |= argument.fillings()
-        if self.extra:
-            entry["extraState"] = dict(self.extra)
+            inputs |= argument.initial_inputs()
+        if self.extra_state:
+            entry["extraState"] = dict(self.extra_state)
         if inputs:
             entry["inputs"] = inputs
         return entry
 
 
-def _plain(text: str) -> str:
-    return " ".join(_HOLE.sub(" ", text).split())
+def _text_without_placeholders(text: str) -> str:
+    return " ".join(_PLACEHOLDER.sub(" ", text).split())
 
 
-def _messages(block: Block) -> dict[str, object]:
+def _message_json(block: Block) -> dict[str, object]:
     # Starts a new line after each statement input.
     lines: list[tuple[str, list[Mapping[str, object]]]] = [("", [])]
     if block.icon:
         lines[0] = ("%1 ", [{"type": "field_icon", "name": "ICON", "icon": block.icon}])
     position = 0
-    for match in _HOLE.finditer(block.text):
+    for match in _PLACEHOLDER.finditer(block.text):
         argument = block.argument(match[1])
         if argument is None:
             continue
-        words = _escaped(block.text[position : match.start()])
+        words = _escape_percent(block.text[position : match.start()])
         position = match.end()
         if isinstance(argument, StatementInput):
             if words.strip():
@@ -167,16 +169,16 @@ def _messages(block: Block) -> dict[str, object]:
             lines += [("%1", [argument.to_blockly()]), ("", [])]
             continue
         text, arguments = lines[-1]
-        if isinstance(argument, ValueInput) and argument.only is not None:
+        if isinstance(argument, ValueInput) and argument.only_if is not None:
             # An optional slot must not remove the words and fields before it.
             words = f"{words}%{len(arguments) + 1} "
             arguments = [*arguments, {"type": "input_dummy", "name": f"BEFORE_{argument.name}"}]
         lines[-1] = (f"{text}{words}%{len(arguments) + 1}", [*arguments, argument.to_blockly()])
-    lines[-1] = (lines[-1][0] + _escaped(block.text[position:]), lines[-1][1])
-    return _numbered(lines)
+    lines[-1] = (lines[-1][0] + _escape_percent(block.text[position:]), lines[-1][1])
+    return _numbered_messages(lines)
 
 
-def _numbered(lines: Sequence[tuple[str, list[Mapping[str, object]]]]) -> dict[str, object]:
+def _numbered_messages(lines: Sequence[tuple[str, list[Mapping[str, object]]]]) -> dict[str, object]:
     result: dict[str, object] = {}
     shown = [(text.strip(), arguments) for text, arguments in lines if text.strip()]
     for number, (text, arguments) in enumerate(shown):
@@ -186,6 +188,6 @@ def _numbered(lines: Sequence[tuple[str, list[Mapping[str, object]]]]) -> dict[s
     return result
 
 
-def _escaped(words: str) -> str:
+def _escape_percent(words: str) -> str:
     # Blockly would treat a per cent sign before a digit as an argument.
     return words.replace("%", "%%")

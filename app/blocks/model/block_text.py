@@ -15,16 +15,16 @@ from app.blocks.model.fields import (
     ValueInput,
     VariableField,
 )
-from app.blocks.model.workspace import Placed
+from app.blocks.model.workspace import PlacedBlock
 from nep.i18n import _
 
-_PLACE = re.compile(r"%([A-Z][A-Z0-9_]*)")
+_PLACEHOLDER = re.compile(r"%([A-Z][A-Z0-9_]*)")
 _JAPANESE = re.compile(r"[\u3040-\u30ff\u4e00-\u9fff]")
 _MAX_LENGTH = 80
 
 
-def reading(
-    placed: Placed, blocks: Mapping[str, Block], variables: Mapping[str, str], *, robot: bool = True
+def block_text(
+    placed: PlacedBlock, blocks: Mapping[str, Block], variables: Mapping[str, str], *, robot: bool = True
 ) -> str:
     """Return the block with its arguments as one line of limited length.
 
@@ -34,32 +34,32 @@ def reading(
     if block is None:
         return label_of_unknown(placed)
 
-    def place(match: re.Match[str]) -> str:
+    def replacement(match: re.Match[str]) -> str:
         argument = block.argument(match[1])
         if argument is None:
             return match[0]
         if match[1] == "ROBOT" and not robot:
             return ""
         if isinstance(argument, VariableField):
-            id = _saved_variable(argument, placed)
+            id = _variable_id(argument, placed)
             return variables.get(id, id or argument.value)
-        if isinstance(argument, Field) and not argument.silent:
-            words = _field(argument, placed)
+        if isinstance(argument, Field) and not argument.is_display_only:
+            words = _field_text(argument, placed)
             is_quoted = is_text and isinstance(argument, TextField)
             return _("“{name}”").format(name=words) if is_quoted else words
         if isinstance(argument, ValueInput):
-            if not argument.is_there(placed.fields):
+            if not argument.is_present(placed.fields):
                 return ""
             inner = placed.inputs.get(argument.name, ())
-            return reading(inner[0], blocks, variables) if inner else "…"
+            return block_text(inner[0], blocks, variables) if inner else "…"
         return ""
 
     is_text = block.shape == "value"
-    words = " ".join(_PLACE.sub(place, block.text).split())
+    words = " ".join(_PLACEHOLDER.sub(replacement, block.text).split())
     return words if len(words) <= _MAX_LENGTH else f"{words[: _MAX_LENGTH - 1]}…"
 
 
-def label(placed: Placed, block: Block) -> str:
+def label(placed: PlacedBlock, block: Block) -> str:
     """Return the label of a block: its text before the first slot, such as "wait until".
 
     For an action of a robot, the title of the action. In Japanese, where the verb comes last, the whole text
@@ -67,7 +67,7 @@ def label(placed: Placed, block: Block) -> str:
     """
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
-    pieces = _PLACE.split(block.text)  # words, argument, words, argument, …, words
+    pieces = _PLACEHOLDER.split(block.text)  # words, argument, words, argument, …, words
     found, is_verb_last = "", bool(_JAPANESE.search(block.text))
     for number, piece in enumerate(pieces):
         argument = block.argument(piece) if number % 2 else None
@@ -77,7 +77,7 @@ def label(placed: Placed, block: Block) -> str:
             elif found.strip():
                 break
         elif isinstance(argument, ChoiceField) and argument.name != "ROBOT":
-            found += _field(argument, placed)
+            found += _field_text(argument, placed)
         elif argument is None:
             found += piece
     if is_verb_last:
@@ -93,7 +93,7 @@ def label_of_type(block_type: str) -> str:
     return block_type.partition("_")[2].replace("_", " ") or block_type
 
 
-def label_of_unknown(placed: Placed) -> str:
+def label_of_unknown(placed: PlacedBlock) -> str:
     """Return the label of a block without description, as on the grey block in the editor."""
     if placed.type.startswith("robot_"):
         return label_of_type(placed.type)
@@ -106,17 +106,17 @@ def label_of_unknown(placed: Placed) -> str:
     return " ".join([words, *values])[:_MAX_LENGTH]
 
 
-def _field(argument: Field, placed: Placed) -> str:
+def _field_text(argument: Field, placed: PlacedBlock) -> str:
     try:
         value = argument.read(placed.fields.get(argument.name))
     except FieldError:
         return str(placed.fields.get(argument.name))
     if isinstance(argument, ChoiceField):
-        return argument.words(value)
+        return argument.option_text(value)
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _saved_variable(argument: VariableField, placed: Placed) -> str:
+def _variable_id(argument: VariableField, placed: PlacedBlock) -> str:
     try:
         return str(argument.read(placed.fields.get(argument.name)))
     except FieldError:

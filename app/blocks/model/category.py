@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.blocks.model.block import Block
-from app.blocks.model.fields import Say
+from app.blocks.model.fields import Translate
 from app.robots.description.description import Robot
 
 
@@ -47,13 +47,13 @@ class Category:
     order: int
     blocks: tuple[Block, ...] = ()
     button: tuple[str, str] | None = None
-    make: Callable[[Robot, Sequence[Robot]], tuple[Block, ...]] | None = None
+    make_blocks: Callable[[Robot, Sequence[Robot]], tuple[Block, ...]] | None = None
     dynamic: str = ""  # the editor adds user-defined blocks: "functions"
     headings: Mapping[str, str] = field(default_factory=dict)  # block type -> heading above it
-    within: str = ""  # category that includes these blocks, under their title
-    groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
+    parent: str = ""  # category that includes these blocks, under their title
+    make_groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
 
-    def translated(self, say: Say) -> Category:
+    def translated(self, say: Translate) -> Category:
         """Return the category with its English texts translated by ``say``; see `Block.translated`."""
         button = None if self.button is None else (say(None, self.button[0]), self.button[1])
         return replace(

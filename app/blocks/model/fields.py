@@ -14,12 +14,12 @@ from typing import Literal
 
 from nep.i18n import _
 
-Say = Callable[[str | None, str], str]
+Translate = Callable[[str | None, str], str]
 """Translates (context, English text); see `app.blocks.model.block.Block.translated`."""
 Check = Literal["Number", "String", "Boolean", "List"]
 
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
-_TOPIC_LIMIT = 200
+_MAX_TOPIC_BYTES = 200
 
 
 class FieldError(ValueError):
@@ -33,7 +33,7 @@ class Argument:
     name: str
 
     @property
-    def silent(self) -> bool:
+    def is_display_only(self) -> bool:
         """True if the argument is only displayed and not part of the Python code."""
         return False
 
@@ -41,11 +41,11 @@ class Argument:
         """Return the entry of the argument in Blockly's ``args``."""
         raise NotImplementedError
 
-    def fillings(self) -> dict[str, object]:
+    def initial_inputs(self) -> dict[str, object]:
         """Return the initial content of the argument's slots in the toolbox, by name of the slot."""
         return {}
 
-    def translated(self, say: Say) -> Argument:  # noqa: ARG002 (most have no words)
+    def translated(self, say: Translate) -> Argument:  # noqa: ARG002 (most have no words)
         """Return the argument with texts and initial values translated; names and values are unchanged."""
         return self
 
@@ -63,7 +63,7 @@ class ValueInput(Argument):
     check: Check | None = None
     default: str | float | bool | None = None
     unit: str = ""
-    only: tuple[str, str] | None = None
+    only_if: tuple[str, str] | None = None
     variable: str | None = None
 
     def to_blockly(self) -> dict[str, object]:
@@ -71,21 +71,21 @@ class ValueInput(Argument):
         entry: dict[str, object] = {"type": "input_value", "name": self.name}
         if self.check is not None:
             entry["check"] = self.check
-        if self.only is not None:
-            entry["only"] = list(self.only)
+        if self.only_if is not None:
+            entry["only"] = list(self.only_if)
         return entry
 
-    def is_there(self, fields: Mapping[str, object]) -> bool:
+    def is_present(self, fields: Mapping[str, object]) -> bool:
         """Return True if the slot exists with these saved fields."""
-        return self.only is None or str(fields.get(self.only[0], self.only[1])) == self.only[1]
+        return self.only_if is None or str(fields.get(self.only_if[0], self.only_if[1])) == self.only_if[1]
 
-    def translated(self, say: Say) -> Argument:
+    def translated(self, say: Translate) -> Argument:
         """Return the slot with its initial content translated."""
         variable = None if self.variable is None else say("variable", self.variable)
         default = say("example", self.default) if isinstance(self.default, str) else self.default
         return replace(self, variable=variable, default=default)
 
-    def fillings(self) -> dict[str, object]:
+    def initial_inputs(self) -> dict[str, object]:
         """Return a variable block, or a shadow block."""
         if self.variable is not None:
             variable = {"VAR": {"name": self.variable, "type": ""}}
@@ -157,7 +157,7 @@ class TextField(Field):
         """Return Blockly's text field."""
         return {"type": "field_input", "name": self.name, "text": self.value}
 
-    def translated(self, say: Say) -> Argument:
+    def translated(self, say: Translate) -> Argument:
         """Return the field with its initial text translated."""
         return replace(self, value=say("example", self.value))
 
@@ -181,7 +181,7 @@ class ChoiceField(Field):
         entry: dict[str, object] = {
             "type": "field_choice",
             "name": self.name,
-            "options": [[words, _key(value)] for words, value in self.options],
+            "options": [[words, _option_key(value)] for words, value in self.options],
         }
         if self.source is not None:
             entry["source"] = self.source
@@ -192,19 +192,19 @@ class ChoiceField(Field):
         if saved is None and self.options:
             return self.options[0][1]
         for _words, value in self.options:
-            if _key(value) == _key(saved):
+            if _option_key(value) == _option_key(saved):
                 return value
         if self.source is not None:
             return "" if saved is None else str(saved)
         raise FieldError(_("has no option “{saved}”").format(saved=saved))
 
-    def translated(self, say: Say) -> Argument:
+    def translated(self, say: Translate) -> Argument:
         """Return the field with translated options; names of robots are not translated."""
         if self.source is not None:
             return self
         return replace(self, options=tuple((say("choice", words), value) for words, value in self.options))
 
-    def words(self, value: object) -> str:
+    def option_text(self, value: object) -> str:
         """Return the text of the option with this value."""
         return next((words for words, option in self.options if option == value), str(value))
 
@@ -226,7 +226,7 @@ class TopicField(Field):
             raise FieldError(_("needs the name of a topic"))
         if any(character.isspace() or character == "{" or not character.isprintable() for character in topic):
             raise FieldError(_("needs a topic without spaces"))
-        if len(topic.encode("utf-8", "replace")) > _TOPIC_LIMIT:
+        if len(topic.encode("utf-8", "replace")) > _MAX_TOPIC_BYTES:
             raise FieldError(_("needs a shorter topic"))
         return topic
 
@@ -241,7 +241,7 @@ class BroadcastField(Field):
         """Return our drop-down of the broadcast names of the behaviour."""
         return {"type": "field_broadcast", "name": self.name, "value": self.value}
 
-    def translated(self, say: Say) -> Argument:
+    def translated(self, say: Translate) -> Argument:
         """Return the field with its initial name translated."""
         return replace(self, value=say("example", self.value))
 
@@ -258,11 +258,11 @@ class PathField(Field):
     """Path of a field in the messages of a topic, such as ``faces.0.name``, entered or selected."""
 
     value: str = "value"
-    topic: str = "TOPIC"
+    topic_field: str = "TOPIC"
 
     def to_blockly(self) -> dict[str, object]:
         """Return our topic field, which suggests fields of the topic in ``of``."""
-        return {"type": "field_topic", "name": self.name, "value": self.value, "of": self.topic}
+        return {"type": "field_topic", "name": self.name, "value": self.value, "of": self.topic_field}
 
     def read(self, saved: object) -> object:
         """Return the path; empty means the whole message."""
@@ -297,7 +297,7 @@ class VariableField(Field):
         """Return Blockly's variable field."""
         return {"type": "field_variable", "name": self.name, "variable": self.value}
 
-    def translated(self, say: Say) -> Argument:
+    def translated(self, say: Translate) -> Argument:
         """Return the field with the initial name translated."""
         return replace(self, value=say("variable", self.value))
 
@@ -315,7 +315,7 @@ class LiveField(Field):
     """Display of a sensor's newest value, filled by the editor and not saved."""
 
     @property
-    def silent(self) -> bool:
+    def is_display_only(self) -> bool:
         """True: the display is not part of the Python code."""
         return True
 
@@ -328,7 +328,7 @@ class LiveField(Field):
         return None
 
 
-def _key(value: object) -> str:
+def _option_key(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return str(value)

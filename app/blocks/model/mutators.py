@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from app.blocks.model.fields import Argument, Check, Say, StatementInput, ValueInput, VariableField
-from app.blocks.model.workspace import Placed
+from app.blocks.model.fields import Argument, Check, StatementInput, Translate, ValueInput, VariableField
+from app.blocks.model.workspace import PlacedBlock
 
 MAX_ITEMS = 50
 MAX_INPUTS = 12
@@ -24,14 +24,14 @@ class Items(Argument):
     count: int = 3
     texts: tuple[str, ...] = ()  # initial texts in the toolbox
 
-    def fillings(self) -> dict[str, object]:
+    def initial_inputs(self) -> dict[str, object]:
         """Return a text block for each slot."""
         return {
             f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": words}}}
             for number, words in enumerate(self.texts)
         }
 
-    def translated(self, say: Say) -> Argument:
+    def translated(self, say: Translate) -> Argument:
         """Return the argument with its initial texts translated."""
         return replace(self, texts=tuple(say("example", words) for words in self.texts))
 
@@ -39,7 +39,7 @@ class Items(Argument):
         """Return a placeholder at which the editor's mutator inserts the slots."""
         return {"type": "input_dummy", "name": self.name}
 
-    def gaps(self, extra: Mapping[str, object]) -> tuple[ValueInput, ...]:
+    def slots(self, extra: Mapping[str, object]) -> tuple[ValueInput, ...]:
         """Return the slots of a block with this saved state."""
         count = extra.get("items")
         sound = isinstance(count, int) and not isinstance(count, bool)
@@ -57,13 +57,17 @@ class ListInput(ValueInput):
     check: Check | None = "List"
     texts: tuple[str, ...] = ()
 
-    def fillings(self) -> dict[str, object]:
+    def initial_inputs(self) -> dict[str, object]:
         """Return a list block that is not a shadow block, because values can be put into its slots."""
         items = Items("ITEM", len(self.texts), self.texts)
-        held = {"type": "lists_create", "extraState": {"items": items.count}, "inputs": items.fillings()}
+        held = {
+            "type": "lists_create",
+            "extraState": {"items": items.count},
+            "inputs": items.initial_inputs(),
+        }
         return {self.name: {"block": held}}
 
-    def translated(self, say: Say) -> Argument:
+    def translated(self, say: Translate) -> Argument:
         """Return the argument with the initial texts translated."""
         return replace(self, texts=tuple(say("example", words) for words in self.texts))
 
@@ -76,7 +80,7 @@ class Branches:
     has_else: bool = False
 
     @classmethod
-    def of(cls, extra: Mapping[str, object], *, has_else: bool) -> Branches:
+    def from_extra_state(cls, extra: Mapping[str, object], *, has_else: bool) -> Branches:
         """Parse the saved state of a block; by default no "else if", and an "else" as given by the type."""
         count, told = extra.get("elseIfs"), extra.get("else")
         sound = isinstance(count, int) and not isinstance(count, bool)
@@ -115,7 +119,7 @@ class Inputs(Argument):
     """Inputs of a function: names on its definition, slots ``IN_<id>`` on its calls."""
 
     @property
-    def silent(self) -> bool:
+    def is_display_only(self) -> bool:
         """True: the compiler converts them to parameters and arguments."""
         return True
 
@@ -123,7 +127,7 @@ class Inputs(Argument):
         """Return a placeholder at which the editor's mutator inserts names or slots."""
         return {"type": "input_dummy", "name": self.name}
 
-    def gaps(self, inputs: tuple[FunctionInput, ...]) -> tuple[tuple[FunctionInput, ValueInput], ...]:
+    def slots(self, inputs: tuple[FunctionInput, ...]) -> tuple[tuple[FunctionInput, ValueInput], ...]:
         """Return each input of a call with its slot."""
         return tuple((each, ValueInput(f"IN_{each.id}")) for each in inputs)
 
@@ -139,7 +143,7 @@ class InputField(VariableField):
         return {"type": "field_function_input", "name": self.name}
 
 
-def name_of(placed: Placed) -> str:
+def function_name(placed: PlacedBlock) -> str:
     """Return the name of the function that a block defines or calls."""
-    saved = placed.fields.get("NAME", placed.extra.get("name"))
+    saved = placed.fields.get("NAME", placed.extra_state.get("name"))
     return " ".join(str(saved or "function").split())[:MAX_NAME_LENGTH] or "function"

@@ -8,10 +8,10 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
-_GAPS = re.compile(r"\W+")
+_NON_WORD_CHARACTERS = re.compile(r"\W+")
 
 
-class Unique:
+class UniqueTexts:
     """Generator of unique texts: duplicates get a number, starting with 2."""
 
     def __init__(self, before_number: str, taken: Iterable[str] = ()) -> None:
@@ -19,7 +19,7 @@ class Unique:
         self._taken = set(taken)
         self._next: dict[str, int] = {}  # next number to try: 4000 scripts may share a name
 
-    def of(self, text: str) -> str:
+    def make_unique(self, text: str) -> str:
         """Return the text, with the first unused number appended if the text was already used."""
         made, number = text, self._next.get(text, 2)
         while made in self._taken:
@@ -29,11 +29,11 @@ class Unique:
         return made
 
 
-class Names:
+class PythonNames:
     """Generator of unique Python names."""
 
     def __init__(self, taken: frozenset[str]) -> None:
-        self._unique = Unique("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
+        self._unique = UniqueTexts("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
 
     def new(self, words: str, otherwise: str) -> str:
         """Return a name similar to ``words``, such as ``when_started_2``.
@@ -41,9 +41,9 @@ class Names:
         If no valid character remains, the name is derived from ``otherwise``.
         """
         # Python normalizes names to NFKC: different names must stay different.
-        plain = _GAPS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]
+        plain = _NON_WORD_CHARACTERS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]
         if not plain.isidentifier():
             longer = f"{otherwise}_{plain}"
             plain = longer if plain and longer.isidentifier() else otherwise
         plain = unicodedata.normalize("NFKC", plain)
-        return self._unique.of(plain.lower() if plain.isascii() else plain)
+        return self._unique.make_unique(plain.lower() if plain.isascii() else plain)

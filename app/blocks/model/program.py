@@ -28,7 +28,7 @@ class Problem:
     block_id: str | None
     category: str | None
     subject: str
-    sentence: str
+    message: str
     fix: str | None = None
     fix_action: str | None = None
     icon: str = ""
@@ -113,8 +113,8 @@ class Program:
             publishes=_texts(saved["publishes"]),
             listens=_texts(saved["listens"]),
             moves=_texts(saved.get("moves", ())),
-            readings=_table(saved["readings"]),
-            labels=_table(saved["labels"]),
+            readings=_string_map(saved["readings"]),
+            labels=_string_map(saved["labels"]),
             variables=_variables(saved.get("variables", ())),
             breakpoints=_texts(saved.get("breakpoints", ())),
             shows_value=saved.get("shows_value") is True,
@@ -139,7 +139,7 @@ def _pairs(saved: object) -> tuple[tuple[str, str], ...]:
     return tuple((str(first), str(second)) for first, second in saved)
 
 
-def _table(saved: object) -> dict[str, str]:
+def _string_map(saved: object) -> dict[str, str]:
     if not isinstance(saved, Mapping):
         raise TypeError("not a table")
     return {str(key): str(value) for key, value in saved.items()}

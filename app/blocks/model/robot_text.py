@@ -15,15 +15,15 @@ from app.blocks.model.fields import (
     ValueInput,
 )
 from app.robots.description.description import Parameter
-from app.robots.description.inputs import pretty_number, pretty_unit, to_words
+from app.robots.description.inputs import display_unit, format_for_editing, format_number
 from nep.i18n import _, pgettext
 
-_PLACE = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
+_PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
 _RESERVED = ("ROBOT", "LIVE", "FIELD", "SENSOR", "SIDE", "LIMIT", "X_NAME", "X_INPUT", "X_FIELD", "ICON")
-_NUMBERS = ("number", "integer", "angle")
+_NUMBER_KINDS = ("number", "integer", "angle")
 
 
-class TextParts:
+class BlockTemplate:
     """Text of a description in which parameters are replaced by names of block arguments.
 
     Attributes:
@@ -37,14 +37,14 @@ class TextParts:
         for name in parameters:
             self.arguments[name] = _argument_name(name, taken)
         self.shown: frozenset[str] = frozenset(
-            name for name in _PLACE.findall(text) if name in self.arguments
+            name for name in _PLACEHOLDER.findall(text) if name in self.arguments
         )
         self._placed: set[str] = set()
-        self.text = _PLACE.sub(self._place, text)
+        self.text = _PLACEHOLDER.sub(self._replace_placeholder, text)
         if "%ROBOT" not in self.text:
             self.text = f"%ROBOT {self.text}"
 
-    def _place(self, match: re.Match[str]) -> str:
+    def _replace_placeholder(self, match: re.Match[str]) -> str:
         name = "ROBOT" if match[1] == "robot" else self.arguments.get(match[1])
         # Drop unknown placeholders, which would be read as block arguments, and duplicates.
         if name is None or name in self._placed:
@@ -53,25 +53,25 @@ class TextParts:
         return f"%{name}"
 
 
-def type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
+def block_type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
     """Return a block type such as ``robot_pepper_do_say``.
 
     With ``plain``, the type belongs to no action, sensor or event: ``robot_pepper_changes``.
     """
     middle = "" if plain else f"{verb}_"
-    return f"robot_{_word(model)}_{middle}{_word(name)}"
+    return f"robot_{_type_part(model)}_{middle}{_type_part(name)}"
 
 
 def input_of(parameter: Parameter, name: str) -> Argument:
     """Return the slot or field for a parameter of an action."""
     default = parameter.default
-    if parameter.kind in _NUMBERS:
+    if parameter.kind in _NUMBER_KINDS:
         number = default if isinstance(default, (int, float)) else (parameter.minimum or 0)
         return ValueInput(name, "Number", number, unit=parameter.unit or "")
     if parameter.kind in ("choice", "boolean", "colour"):
         return field_of(parameter, name)
     if isinstance(default, (list, tuple, Mapping)):
-        return ValueInput(name, None, to_words(default))
+        return ValueInput(name, None, format_for_editing(default))
     text = default if isinstance(default, str) else ""
     # Any value is accepted and converted to text.
     return ValueInput(name, None, text)
@@ -95,7 +95,7 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
         return ChoiceField(name, options_yes if default is not False else options_yes[::-1])
     if parameter.kind == "colour":
         return ColourField(name, default if isinstance(default, str) else "#37b6ff")
-    if parameter.kind in _NUMBERS:
+    if parameter.kind in _NUMBER_KINDS:
         number = default if isinstance(default, (int, float)) else 0
         return NumberField(name, number, parameter.minimum, parameter.maximum)
     return TextField(name, default if isinstance(default, str) else "hello")
@@ -103,9 +103,9 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
 
 def about(parameter: Parameter) -> str:
     """Format the limits and the unit of a parameter."""
-    unit = f" {pretty_unit(parameter.unit)}" if parameter.unit else ""
-    low = None if parameter.minimum is None else pretty_number(parameter.minimum)
-    high = None if parameter.maximum is None else pretty_number(parameter.maximum)
+    unit = f" {display_unit(parameter.unit)}" if parameter.unit else ""
+    low = None if parameter.minimum is None else format_number(parameter.minimum)
+    high = None if parameter.maximum is None else format_number(parameter.maximum)
     if low is not None and high is not None:
         return _("from {low} to {high_and_unit}").format(low=low, high_and_unit=f"{high}{unit}")
     if low is not None:
@@ -126,5 +126,5 @@ def _argument_name(name: str, taken: set[str]) -> str:
     return made
 
 
-def _word(name: str) -> str:
+def _type_part(name: str) -> str:
     return re.sub(r"\W+", "_", name.lower()).strip("_") or "x"

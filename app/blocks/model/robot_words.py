@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 from nep.i18n import ENGLISH, gettext, language, plazy
 
-_PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+_NAME_PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
 class _Ability(NamedTuple):
     """Kind of action or sensor: the parts of names that identify it, and its search words."""
 
     names: frozenset[str]
-    words: str
+    search_words: str
 
 
 def _ability(names: str, words: str) -> _Ability:
@@ -273,8 +273,10 @@ _ABILITY_OF_RESOURCE: Mapping[str, str] = {
 }
 """Ability by resource, for actions whose names are not recognized."""
 
-CHANGES = plazy("words to find “when … changes”", "sensor, change, new value, whenever, event, update")
-PASSES = plazy(
+CHANGE_SEARCH_WORDS = plazy(
+    "words to find “when … changes”", "sensor, change, new value, whenever, event, update"
+)
+PASS_SEARCH_WORDS = plazy(
     "words to find “when … goes below …”",
     "sensor, above, below, more, less, greater, smaller, threshold, limit, event",
 )
@@ -287,41 +289,41 @@ class SearchWords(NamedTuple):
     english: str
 
 
-def words_of_action(names: Iterable[str], uses: Iterable[str] = ()) -> SearchWords:
+def action_search_words(names: Iterable[str], uses: Iterable[str] = ()) -> SearchWords:
     """Return the search words of an action.
 
     ``names`` are its name, title and types; ``uses`` are its resources.
     """
-    parts = _parts(names)
-    found = _among(_ACTION_ABILITIES, parts) or [
+    parts = _name_parts(names)
+    found = _matching_abilities(_ACTION_ABILITIES, parts) or [
         _ACTION_ABILITIES[_ABILITY_OF_RESOURCE[part]] for part in uses if part in _ABILITY_OF_RESOURCE
     ]
-    return _found(parts, found)
+    return _collect_search_words(parts, found)
 
 
-def words_of_sensor(names: Iterable[str]) -> SearchWords:
+def sensor_search_words(names: Iterable[str]) -> SearchWords:
     """Return the search words of a sensor or event."""
-    parts = _parts(names)
-    return _found(parts, _among(_SENSOR_ABILITIES, parts))
+    parts = _name_parts(names)
+    return _collect_search_words(parts, _matching_abilities(_SENSOR_ABILITIES, parts))
 
 
-def in_both(english: str) -> SearchWords:
+def bilingual_search_words(english: str) -> SearchWords:
     """Return search words in the current language and in English."""
     return SearchWords(gettext(english), "" if language() == ENGLISH else str(english))
 
 
-def _parts(names: Iterable[str]) -> tuple[str, ...]:
-    found = (part.lower() for name in names for part in _PART.findall(name.rpartition(":")[2]))
+def _name_parts(names: Iterable[str]) -> tuple[str, ...]:
+    found = (part.lower() for name in names for part in _NAME_PART.findall(name.rpartition(":")[2]))
     return tuple(dict.fromkeys(found))
 
 
-def _among(abilities: Mapping[str, _Ability], parts: Iterable[str]) -> list[_Ability]:
+def _matching_abilities(abilities: Mapping[str, _Ability], parts: Iterable[str]) -> list[_Ability]:
     known = frozenset(parts)
     return [ability for ability in abilities.values() if ability.names & known]
 
 
-def _found(parts: Iterable[str], abilities: Iterable[_Ability]) -> SearchWords:
-    lists = [in_both(ability.words) for ability in abilities]
+def _collect_search_words(parts: Iterable[str], abilities: Iterable[_Ability]) -> SearchWords:
+    lists = [bilingual_search_words(ability.search_words) for ability in abilities]
     words = ", ".join(each.words for each in lists)
     english = ", ".join([*(each.english for each in lists if each.english), " ".join(parts)])
     return SearchWords(words, english)

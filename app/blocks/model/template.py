@@ -18,8 +18,8 @@ from typing import TypeVar
 
 from nep.system.syntax import parse_expression, parse_module
 
-_HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
-_PREFIX = "_hole_"
+_PLACEHOLDER = re.compile(r"%([A-Z][A-Z0-9_]*)")
+_PLACEHOLDER_PREFIX = "_hole_"
 Node = TypeVar("Node", bound=ast.AST)
 
 
@@ -53,7 +53,7 @@ def statements(
     """Return the filled statements of a template. Raises KeyError if a placeholder has no value."""
     filled: list[ast.stmt] = []
     filler = _Filler(expressions, bodies or {}, keywords or {})
-    for statement in _parsed(text).body:
+    for statement in _parse_template(text).body:
         made = filler.visit(_copy_node(statement))
         filled.extend(made if isinstance(made, list) else [made])
     return filled
@@ -71,14 +71,14 @@ def expression(
     raise ValueError(f"not an expression: {text}")
 
 
-def holes(text: str) -> frozenset[str]:
+def placeholders(text: str) -> frozenset[str]:
     """Return the names of the placeholders in a template."""
-    return frozenset(_HOLE.findall(text))
+    return frozenset(_PLACEHOLDER.findall(text))
 
 
 @lru_cache(maxsize=1024)
-def _parsed(text: str) -> ast.Module:
-    return parse_module(_HOLE.sub(_PREFIX + r"\1", text))
+def _parse_template(text: str) -> ast.Module:
+    return parse_module(_PLACEHOLDER.sub(_PLACEHOLDER_PREFIX + r"\1", text))
 
 
 def _copy_node(node: Node) -> Node:
@@ -91,9 +91,9 @@ def _copy_node(node: Node) -> Node:
     return type(node)(**fields)
 
 
-def _hole(node: ast.AST | None) -> str | None:
-    if isinstance(node, ast.Name) and node.id.startswith(_PREFIX):
-        return node.id[len(_PREFIX) :]
+def _placeholder_name(node: ast.AST | None) -> str | None:
+    if isinstance(node, ast.Name) and node.id.startswith(_PLACEHOLDER_PREFIX):
+        return node.id[len(_PLACEHOLDER_PREFIX) :]
     return None
 
 
@@ -109,14 +109,14 @@ class _Filler(ast.NodeTransformer):
         self._keywords = keywords
 
     def visit_Expr(self, node: ast.Expr) -> ast.stmt | list[ast.stmt]:
-        name = _hole(node.value)
+        name = _placeholder_name(node.value)
         if name is not None and name in self._bodies:
             return list(self._bodies[name]) or [ast.Pass()]
         node.value = self.visit(node.value)
         return node
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        name = _hole(node)
+        name = _placeholder_name(node)
         if name is None:
             return node
         filling = self._expressions[name]
@@ -126,7 +126,7 @@ class _Filler(ast.NodeTransformer):
     def visit_Call(self, node: ast.Call) -> ast.Call:
         keywords: list[ast.keyword] = []
         for keyword in node.keywords:
-            name = _hole(keyword.value)
+            name = _placeholder_name(keyword.value)
             if keyword.arg is None and name is not None and name in self._keywords:
                 keywords.extend(self._keywords[name])
             else:

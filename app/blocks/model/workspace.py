@@ -10,28 +10,28 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from app.blocks.model.names import Unique
+from app.blocks.model.names import UniqueTexts
 from nep.i18n import _
 
 MAX_DEPTH = 40
-_DISABLED_BY_PERSON = "MANUALLY_DISABLED"
+_DISABLED_BY_USER = "MANUALLY_DISABLED"
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedBlock:
     """Block in a workspace, with its saved fields and the blocks in its inputs; statements are in order."""
 
     id: str
     type: str
     fields: Mapping[str, object] = field(default_factory=dict)
-    inputs: Mapping[str, tuple[Placed, ...]] = field(default_factory=dict)
+    inputs: Mapping[str, tuple[PlacedBlock, ...]] = field(default_factory=dict)
     enabled: bool = True
-    pauses: bool = False  # has a breakpoint
+    has_breakpoint: bool = False  # has a breakpoint
     shadow: bool = False
-    extra: Mapping[str, object] = field(default_factory=dict)  # the editor's extraState
-    too_deep: bool = False  # inner blocks were dropped because of deep nesting
+    extra_state: Mapping[str, object] = field(default_factory=dict)  # the editor's extraState
+    is_too_deep: bool = False  # inner blocks were dropped because of deep nesting
 
-    def field_id(self, name: str) -> str:
+    def field_text(self, name: str) -> str:
         """Return the saved value of a field if that is text, else ""."""
         saved = self.fields.get(name)
         return saved if isinstance(saved, str) else ""
@@ -44,13 +44,13 @@ class Workspace:
     ``nameless`` are the ids of used variables that have no name in the file; their names are placeholders.
     """
 
-    scripts: tuple[tuple[Placed, ...], ...]
+    scripts: tuple[tuple[PlacedBlock, ...], ...]
     variables: Mapping[str, str]
-    nameless: frozenset[str] = frozenset()
+    nameless_variables: frozenset[str] = frozenset()
 
-    def all_blocks(self) -> list[Placed]:
+    def all_blocks(self) -> list[PlacedBlock]:
         """Return every block, including shadows."""
-        found: list[Placed] = []
+        found: list[PlacedBlock] = []
         waiting = [block for script in self.scripts for block in script]
         while waiting:
             block = waiting.pop()
@@ -63,7 +63,7 @@ class Workspace:
 def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
     """Yield every block of a saved workspace, including shadows, outermost first."""
     blocks = saved.get("blocks")
-    waiting = deque(_list(blocks.get("blocks") if isinstance(blocks, Mapping) else None))
+    waiting = deque(_as_list(blocks.get("blocks") if isinstance(blocks, Mapping) else None))
     while waiting:
         block = waiting.popleft()
         if not isinstance(block, dict):
@@ -79,16 +79,16 @@ def parse_workspace(saved: Mapping[str, object]) -> Workspace:
     """Parse Blockly's JSON. Never raises."""
     blocks = saved.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
-    ids = Unique("~")
-    scripts = tuple(_chain(top, 0, ids, shadow=False) for top in _list(tops))
+    ids = UniqueTexts("~")
+    scripts = tuple(_parse_chain(top, 0, ids, shadow=False) for top in _as_list(tops))
     variables: dict[str, str] = {}
-    for variable in _list(saved.get("variables")):
+    for variable in _as_list(saved.get("variables")):
         if isinstance(variable, Mapping) and isinstance(variable.get("id"), str):
             variables[str(variable["id"])] = str(variable.get("name") or variable["id"])
-    return _with_unlisted(Workspace(tuple(script for script in scripts if script), variables))
+    return _with_unlisted_variables(Workspace(tuple(script for script in scripts if script), variables))
 
 
-def _with_unlisted(workspace: Workspace) -> Workspace:
+def _with_unlisted_variables(workspace: Workspace) -> Workspace:
     names = dict(workspace.variables)
     nameless: set[str] = set()
     for block in workspace.all_blocks():
@@ -103,50 +103,50 @@ def _with_unlisted(workspace: Workspace) -> Workspace:
             else:
                 names[id] = _("unnamed variable")
                 nameless.add(id)
-    return replace(workspace, variables=names, nameless=frozenset(nameless))
+    return replace(workspace, variables=names, nameless_variables=frozenset(nameless))
 
 
-def _list(saved: object) -> Sequence[object]:
+def _as_list(saved: object) -> Sequence[object]:
     return saved if isinstance(saved, (list, tuple)) else ()
 
 
-def _chain(saved: object, depth: int, ids: Unique, *, shadow: bool) -> tuple[Placed, ...]:
+def _parse_chain(saved: object, depth: int, ids: UniqueTexts, *, shadow: bool) -> tuple[PlacedBlock, ...]:
     # A loop instead of recursion, because a script may be long.
-    chain: list[Placed] = []
+    chain: list[PlacedBlock] = []
     while isinstance(saved, Mapping) and isinstance(saved.get("type"), str):
-        chain.append(_block(saved, depth, ids, shadow=shadow))
+        chain.append(_parse_block(saved, depth, ids, shadow=shadow))
         following = saved.get("next")
         saved = following.get("block") if isinstance(following, Mapping) else None
     return tuple(chain)
 
 
-def _block(saved: Mapping[str, object], depth: int, ids: Unique, *, shadow: bool) -> Placed:
+def _parse_block(saved: Mapping[str, object], depth: int, ids: UniqueTexts, *, shadow: bool) -> PlacedBlock:
     fields = saved.get("fields")
     raw = saved.get("inputs")
     connections = raw if isinstance(raw, Mapping) else {}
-    inputs: dict[str, tuple[Placed, ...]] = {}
+    inputs: dict[str, tuple[PlacedBlock, ...]] = {}
     saved_id = saved.get("id")
-    id = ids.of(saved_id if isinstance(saved_id, str) and saved_id else "block")
+    id = ids.make_unique(saved_id if isinstance(saved_id, str) and saved_id else "block")
     if depth < MAX_DEPTH:
         for name, connection in connections.items():
             if isinstance(connection, Mapping):
                 real = connection.get("block")
                 inner = real if isinstance(real, Mapping) else connection.get("shadow")
-                inputs[str(name)] = _chain(inner, depth + 1, ids, shadow=not isinstance(real, Mapping))
-    return Placed(
+                inputs[str(name)] = _parse_chain(inner, depth + 1, ids, shadow=not isinstance(real, Mapping))
+    return PlacedBlock(
         id=id,
         type=str(saved["type"]),
         fields=dict(fields) if isinstance(fields, Mapping) else {},
         inputs=inputs,
         enabled=is_enabled(saved),
-        pauses=_pauses(saved),
+        has_breakpoint=_has_breakpoint(saved),
         shadow=shadow,
-        extra=dict(extra) if isinstance(extra := saved.get("extraState"), Mapping) else {},
-        too_deep=depth >= MAX_DEPTH and bool(connections),
+        extra_state=dict(extra) if isinstance(extra := saved.get("extraState"), Mapping) else {},
+        is_too_deep=depth >= MAX_DEPTH and bool(connections),
     )
 
 
-def _pauses(saved: Mapping[str, object]) -> bool:
+def _has_breakpoint(saved: Mapping[str, object]) -> bool:
     data = saved.get("data")
     if not isinstance(data, str) or '"pause"' not in data:
         return False
@@ -164,4 +164,4 @@ def is_enabled(saved: Mapping[str, object]) -> bool:
     """
     if saved.get("enabled") is False:
         return False
-    return _DISABLED_BY_PERSON not in _list(saved.get("disabledReasons"))
+    return _DISABLED_BY_USER not in _as_list(saved.get("disabledReasons"))

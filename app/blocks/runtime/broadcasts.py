@@ -19,7 +19,7 @@ class Delivery:
         self.done = False
         self._on_end = over
 
-    def end(self) -> None:
+    def finish(self) -> None:
         """Mark the delivery as done: the script has run, or another broadcast replaced this one."""
         if not self.done:
             self.done = True
@@ -36,21 +36,21 @@ class Receiver:
 
     def serve(self, scheduler: Scheduler) -> None:
         """Run the script for each broadcast until the program ends."""
-        self.runs_in = scheduler.me()
+        self.runs_in = scheduler.current_script()
         while True:
             scheduler.wait_for(lambda: self.waiting is not None, idle=True)
             taken: Delivery | None = None
             try:
                 with suppress(EndScript):
-                    scheduler.begin()
+                    scheduler.start_run()
                     # Read after getting the turn: the broadcast may have been sent again meanwhile.
                     taken, self.waiting = self.waiting, None
                     self.script()
             finally:
                 if taken is not None:
-                    taken.end()
-            scheduler.rest()
-            scheduler.poke()
+                    taken.finish()
+            scheduler.finish_run()
+            scheduler.wake_scripts()
 
 
 class Broadcasts:
@@ -68,9 +68,9 @@ class Broadcasts:
         self._on_begin()
         delivery = Delivery(self._on_end)
         if receiver.waiting is not None:
-            receiver.waiting.end()
+            receiver.waiting.finish()
         receiver.waiting = delivery
         if receiver.runs_in is not None:
             self._scheduler.end_run(receiver.runs_in)
-        self._scheduler.poke()
+        self._scheduler.wake_scripts()
         return delivery

@@ -32,7 +32,7 @@ import nep
 from app.blocks.model.program import Program
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.network import Network
-from app.blocks.runtime.publishing import PublishGuard, guarded
+from app.blocks.runtime.publishing import PublishGuard, guarded_topics
 from app.blocks.runtime.questions import ProgramQuestion
 from app.blocks.runtime.runtime import Runtime
 from app.blocks.runtime.variables import VariableWatch
@@ -40,19 +40,19 @@ from app.errors import AppError
 from app.robots.description.description import Robot, parse
 from nep.errors import NepError
 from nep.i18n import _
-from nep.system.crash_trace import say_where_it_crashes
+from nep.system.crash_trace import enable_crash_trace
 
-SAMPLE_S = 1 / 30
-VARIABLES_EVERY = 3
+SAMPLE_INTERVAL_S = 1 / 30
+VARIABLES_PERIOD_SAMPLES = 3
 """Number of samples between two reads of the variables, which are read ten times a second."""
-STOP_ANSWER_S = 1.0
-FLUSH_S = 0.03
+STOP_REPLY_TIMEOUT_S = 1.0
+FLUSH_TIMEOUT_S = 0.03
 MAX_LINE_LENGTH = 2000
 MAX_LINES = 10_000
 LINES_PER_SAMPLE = 50
 
 
-class Out:
+class RunnerOutput:
     """Writes lines to the runner. Printed text is limited: long lines are truncated, excess lines dropped."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -105,10 +105,10 @@ class Out:
             self._dropped = 0
 
 
-class Printed(io.TextIOBase):
+class PrintStream(io.TextIOBase):
     """Replacement for ``sys.stdout`` that sends printed lines to the runner."""
 
-    def __init__(self, out: Out) -> None:
+    def __init__(self, out: RunnerOutput) -> None:
         self._out = out
 
     def write(self, text: str) -> int:
@@ -121,7 +121,7 @@ class Printed(io.TextIOBase):
 class Run:
     """Execution of one program."""
 
-    def __init__(self, order: Mapping[str, object], out: Out) -> None:
+    def __init__(self, order: Mapping[str, object], out: RunnerOutput) -> None:
         program = order["program"]
         robots = order["robots"]
         if not isinstance(program, Mapping) or not isinstance(robots, list):
@@ -132,29 +132,29 @@ class Run:
         self._robots: tuple[Robot, ...] = tuple(
             robot for robot in everybody if robot.name in self._program.robots
         )
-        self._owners = _table(order.get("owners"))
-        self._guard = PublishGuard(guarded(everybody), self._program.moves)
+        self._owners = _string_map(order.get("owners"))
+        self._guard = PublishGuard(guarded_topics(everybody), self._program.moves)
         self._id = str(order.get("id") or f"program-{uuid.uuid4().hex[:8]}")
         self._master = None if order.get("master") is None else str(order["master"])
         self._out = out
         self._runtime = Runtime(
-            out.print, labels=self._program.labels, readings=self._program.readings, asked=self._asked
+            out.print, labels=self._program.labels, readings=self._program.readings, asked=self._send_question
         )
         self._network: Network | None = None
         self._variables = VariableWatch({}, ())
         self._started_at = time.monotonic()
-        self._stop_answer_s = STOP_ANSWER_S
+        self._stop_answer_s = STOP_REPLY_TIMEOUT_S
         self.set_pace(order)
         self._begins_paused = order.get("paused") is True
         if self._begins_paused:
             self._runtime.scheduler.pause()
 
-    def orders(self) -> dict[str, Callable[[], None]]:
+    def commands(self) -> dict[str, Callable[[], None]]:
         """Return the functions for commands that have no arguments, by name."""
         scheduler = self._runtime.scheduler
         return {
             "pause": self.pause,
-            "go": self.go_on,
+            "go": self.resume,
             "step": scheduler.step_once,
             "stop": self.stop,
         }
@@ -163,15 +163,15 @@ class Run:
         """Pause the scripts, their waits, and the motions of robots."""
         self._runtime.scheduler.pause()
         if self._network is not None:
-            self._network.hold_robots()
+            self._network.pause_robots()
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """Resume scripts, waits and motions."""
         if self._network is not None:
-            self._network.go_on()
-        self._runtime.scheduler.go_on()
+            self._network.resume_robots()
+        self._runtime.scheduler.resume()
 
-    def _asked(self, question: ProgramQuestion | None) -> None:
+    def _send_question(self, question: ProgramQuestion | None) -> None:
         if question is None:
             self._out.send("ask", question=0)
         else:
@@ -181,7 +181,7 @@ class Run:
         """Pass the user's answer to the question."""
         question, words = order.get("question"), order.get("text")
         if isinstance(question, int) and isinstance(words, str):
-            self._runtime.questions.answered(question, words)
+            self._runtime.questions.set_answer(question, words)
 
     def set_pace(self, order: Mapping[str, object]) -> None:
         """Set the delay before each block in seconds; 0 for full speed."""
@@ -189,13 +189,13 @@ class Run:
         if isinstance(pace_s, (int, float)):
             self._runtime.scheduler.set_pace(pace_s)
 
-    def know(self, order: Mapping[str, object]) -> None:
+    def update_robots(self, order: Mapping[str, object]) -> None:
         """Update the connected robots and the topics that move them."""
         topics = order.get("guarded")
         if isinstance(topics, Mapping):
-            self._guard.know({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
+            self._guard.set_topics({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
         if self._network is not None:
-            self._network.know(_table(order.get("owners")))
+            self._network.update_owners(_string_map(order.get("owners")))
 
     def stop(self) -> None:
         """Stop the scripts and return from `run` immediately; the runner waits for the robots' replies."""
@@ -207,20 +207,20 @@ class Run:
         """Run until the program ends and stop the robots; return True if no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
             self._out.told = partial(node.log.info, "%s")
-            silent = self._run_on(node)
+            silent = self._run_with_node(node)
             error = self._runtime.error
             if error is not None:
                 node.log.error("%s", error.sentence)
                 self._out.send("error", block=error.block, sentence=error.sentence)
-            self._send_replaced()
+            self._send_replacements()
             self._out.send_printed()
             self._send_variables()
             elapsed_s = round(time.monotonic() - self._started_at, 3)
             self._out.send("ended", ok=error is None, elapsed_s=elapsed_s, silent=silent)
-            node.close(FLUSH_S if self._stop_answer_s == 0.0 else 2 * STOP_ANSWER_S)
+            node.close(FLUSH_TIMEOUT_S if self._stop_answer_s == 0.0 else 2 * STOP_REPLY_TIMEOUT_S)
         return error is None
 
-    def _run_on(self, node: nep.Node) -> tuple[str, ...]:
+    def _run_with_node(self, node: nep.Node) -> tuple[str, ...]:
         network = Network(
             node,
             self._id,
@@ -234,7 +234,7 @@ class Run:
         network.guard = self._guard
         self._network = network
         if self._begins_paused:
-            network.hold_robots()
+            network.pause_robots()
         try:
             self._start_scripts(network)
             self._report_until_finished()
@@ -260,7 +260,7 @@ class Run:
         if block in self._breakpoints and not self._runtime.scheduler.is_paused:
             self.pause()
         if self._runtime.scheduler.pace_s:
-            with network.slow():
+            with network.suspend_motions():
                 self._runtime.step(block)
         else:
             self._runtime.step(block)
@@ -271,11 +271,11 @@ class Run:
         if isinstance(blocks, list):
             self._breakpoints = frozenset(map(str, blocks))
 
-    def put(self, order: Mapping[str, object]) -> None:
+    def set_variable(self, order: Mapping[str, object]) -> None:
         """Set a variable to a value entered by the user."""
         value = order.get("value")
         if isinstance(value, (str, int, float)):
-            self._variables.put(str(order.get("python")), value)
+            self._variables.set_value(str(order.get("python")), value)
 
     def _send_variables(self) -> None:
         changes = self._variables.changes()
@@ -283,36 +283,36 @@ class Run:
             self._out.send("variables", values=[value.to_json() for value in changes])
 
     def _report_until_finished(self) -> None:
-        runtime, saying, before = self._runtime, self._runtime.saying, None
+        runtime, saying, before = self._runtime, self._runtime.status_text, None
         looks = itertools.count()
-        while not runtime.finished.wait(SAMPLE_S):
-            if next(looks) % VARIABLES_EVERY == 0:
+        while not runtime.finished.wait(SAMPLE_INTERVAL_S):
+            if next(looks) % VARIABLES_PERIOD_SAMPLES == 0:
                 self._send_variables()
             now = runtime.scheduler.snapshot()
-            words, warning = saying.says(now.blocks), saying.warns(now.blocks)
+            words, warning = saying.text(now.blocks), saying.warning(now.blocks)
             self._out.send_printed()
-            self._send_replaced()
+            self._send_replacements()
             if (now, words, warning) == before:
                 continue
             before = (now, words, warning)
-            if now.paused:
-                reading = saying.reading(now.next_block)
+            if now.is_paused:
+                reading = saying.block_text(now.next_block)
                 self._out.send(
                     "paused", block=now.next_block, blocks=now.blocks, says=reading, warning=warning
                 )
             else:
                 self._out.send("running", blocks=now.blocks, says=words)
 
-    def _send_replaced(self) -> None:
-        for each in self._runtime.replaced.take_news():
-            self._out.send("warning", block=each.block, sentence=each.sentence, count=each.count)
+    def _send_replacements(self) -> None:
+        for each in self._runtime.replacements.take_new():
+            self._out.send("warning", block=each.block, sentence=each.message, count=each.count)
 
 
-def _table(told: object) -> dict[str, str]:
+def _string_map(told: object) -> dict[str, str]:
     return {str(key): str(value) for key, value in told.items()} if isinstance(told, Mapping) else {}
 
 
-def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
+def read_commands(stream: TextIO) -> Iterator[Mapping[str, object]]:
     """Yield the runner's commands until the pipe closes; invalid ones are ignored."""
     for line in stream:
         try:
@@ -325,9 +325,9 @@ def orders(stream: TextIO) -> Iterator[Mapping[str, object]]:
 
 def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
     """Run one program; return 0 if no block failed, else 1."""
-    out = Out(stdout or sys.stdout)
-    incoming = orders(stdin or sys.stdin)
-    sys.stdout = Printed(out)
+    out = RunnerOutput(stdout or sys.stdout)
+    incoming = read_commands(stdin or sys.stdin)
+    sys.stdout = PrintStream(out)
     out.send("ready")
     order = next((order for order in incoming if order.get("do") == "start"), None)
     if order is None:
@@ -347,11 +347,11 @@ def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
 
 
 def _run_commands(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
-    obeyed = run.orders()
+    obeyed = run.commands()
     told: dict[str, Callable[[Mapping[str, object]], None]] = {
         "pace": run.set_pace,
-        "robots": run.know,
-        "variable": run.put,
+        "robots": run.update_robots,
+        "variable": run.set_variable,
         "breakpoints": run.set_breakpoints,
         "answer": run.answer,
     }
@@ -368,7 +368,7 @@ def _run_commands(run: Run, incoming: Iterator[Mapping[str, object]]) -> None:
 if __name__ == "__main__":
     # Ctrl+C in a terminal also reaches this process; the runner decides what happens.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    say_where_it_crashes()
+    enable_crash_trace()
     code = main()
     # Scripts may hang in blocking calls; don't wait for them.
     sys.stderr.flush()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from app.errors import AppError
-from nep.i18n import _, lazy, listed
+from nep.i18n import _, format_list, lazy
 
-_KINDS = {
+_TYPE_NAMES = {
     "int": lazy("a number"),
     "float": lazy("a number"),
     "bool": lazy("true or false"),
@@ -14,7 +14,7 @@ _KINDS = {
     "dict": lazy("a message"),
     "NoneType": lazy("nothing"),
 }
-_ANOTHER = lazy("something else")
+_OTHER_TYPE_NAME = lazy("something else")
 
 
 class BehaviourError(AppError):
@@ -49,16 +49,16 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
                 _("{name} needs a value that isn't known yet.").format(name=name), block, unknown=True
             )
         return BehaviourError(
-            _("{name} doesn't work with {kinds}.").format(name=name, kinds=_kinds(str(error))), block
+            _("{name} doesn't work with {kinds}.").format(name=name, kinds=_type_names_in(str(error))), block
         )
     return BehaviourError(_("{name} failed: {error}.").format(name=name, error=error), block)
 
 
-def kind(value: object) -> str:
+def type_name(value: object) -> str:
     """Return the type of a value as words: "a text"."""
-    return _(_KINDS.get(type(value).__name__, _ANOTHER))
+    return _(_TYPE_NAMES.get(type(value).__name__, _OTHER_TYPE_NAME))
 
 
-def _kinds(sentence: str) -> str:
-    words = [word for quoted, word in _KINDS.items() if f"'{quoted}'" in sentence]
-    return listed([_(word) for word in dict.fromkeys(words)]) or _("these values")
+def _type_names_in(sentence: str) -> str:
+    words = [word for quoted, word in _TYPE_NAMES.items() if f"'{quoted}'" in sentence]
+    return format_list([_(word) for word in dict.fromkeys(words)]) or _("these values")

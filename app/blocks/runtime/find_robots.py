@@ -9,25 +9,25 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from app.errors import DescriptionError
-from app.robots.description.description import Robot, announced
+from app.robots.description.description import Robot, parse_announcement
 from app.robots.identity import (
     DESCRIPTION_TYPE,
     Identity,
     Senders,
-    foreign_topic,
+    description_topic_problem,
     identity_of,
-    publishing,
-    wrong_topic,
+    publisher_nodes,
+    topic_conflict,
 )
 from nep.errors import NepError
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
 RIZE = "rize"
-SLICE_S = 0.1
+POLL_INTERVAL_S = 0.1
 MAX_ROBOTS = 200
-MAX_REPORTED = 8
+MAX_STORED_DESCRIPTIONS = 8
 
 
 class Subscription(Protocol):
@@ -63,20 +63,20 @@ class FoundRobots:
 
     robots: tuple[Robot, ...] = ()
     owners: Mapping[str, Identity] = field(default_factory=dict)
-    claims: tuple[str, ...] = ()
+    rejected_claims: tuple[str, ...] = ()
 
 
 @dataclass
-class _Topic:
+class _DescriptionTopic:
     """Topic of a description: its owner, and the messages received on it."""
 
     subscription: Subscription
     owner: Identity
-    told: list[Message] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
     read: Message | None = None
-    twins: tuple[str, ...] = ()
+    duplicates: tuple[str, ...] = ()
     robot: Robot | None = None
-    wrong: str = ""
+    error: str = ""
 
 
 def find_robots(
@@ -103,7 +103,7 @@ def find_robots(
     wait = wait or threading.Event().wait
     until = clock() + timeout_s
     found: dict[str, Robot] = {}
-    asked: dict[str, _Topic] = {}
+    asked: dict[str, _DescriptionTopic] = {}
     senders = Senders()
     try:
         while True:
@@ -113,70 +113,74 @@ def find_robots(
                 if robot.dialect == RIZE and info is not None and info.subscribers:
                     found.setdefault(robot.name, robot)
             _update_topics(node, view, asked)
-            senders.learn(view, asked)
+            senders.update(view, asked)
             for topic, each in asked.items():
                 _read_descriptions(each, topic, senders)
             there = found | {each.robot.name: each.robot for each in asked.values() if each.robot is not None}
-            heard = sum(each.robot is not None or bool(each.wrong) for each in asked.values())
+            heard = sum(each.robot is not None or bool(each.error) for each in asked.values())
             missing = set(wanted) - there.keys() if wanted else heard < len(asked)
             if not missing or clock() >= until:
                 return _result(there, asked)
-            wait(SLICE_S)
+            wait(POLL_INTERVAL_S)
     finally:
         for each in asked.values():
             each.subscription.close()
 
 
-def _update_topics(node: GraphNode, view: GraphView, asked: dict[str, _Topic]) -> None:
+def _update_topics(node: GraphNode, view: GraphView, asked: dict[str, _DescriptionTopic]) -> None:
     for topic, info in view.topics.items():
-        nodes = publishing(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()
+        nodes = publisher_nodes(view, topic) if info.msg_type == DESCRIPTION_TYPE else ()
         if not nodes or (topic not in asked and len(asked) >= MAX_ROBOTS):
             continue
         if topic not in asked:
-            asked[topic] = _Topic(node.new_sub(topic, DESCRIPTION_TYPE), identity_of(view, nodes[0]))
+            asked[topic] = _DescriptionTopic(
+                node.new_sub(topic, DESCRIPTION_TYPE), identity_of(view, nodes[0])
+            )
         each = asked[topic]
         if each.owner.node_id not in nodes:
             each.owner, each.robot, each.read = identity_of(view, nodes[0]), None, None
-        each.twins = tuple(identity_of(view, id).words for id in nodes if id != each.owner.node_id)
+        each.duplicates = tuple(
+            identity_of(view, id).display_name for id in nodes if id != each.owner.node_id
+        )
 
 
-def _read_descriptions(each: _Topic, topic: str, senders: Senders) -> None:
-    message = each.subscription.receive(SLICE_S if each.robot is None else 0.0)
+def _read_descriptions(each: _DescriptionTopic, topic: str, senders: Senders) -> None:
+    message = each.subscription.receive(POLL_INTERVAL_S if each.robot is None else 0.0)
     while message is not None:
-        each.told = [*each.told[1 - MAX_REPORTED :], message]
+        each.messages = [*each.messages[1 - MAX_STORED_DESCRIPTIONS :], message]
         message = each.subscription.receive(0.0)
-    its_own = (told for told in reversed(each.told) if senders.node_of(told) == each.owner.node_id)
+    its_own = (told for told in reversed(each.messages) if senders.node_of(told) == each.owner.node_id)
     newest = next(its_own, None)
     if newest is None or newest is each.read:
         return
-    each.read, each.wrong = newest, ""
+    each.read, each.error = newest, ""
     try:
-        robot = announced(newest)
+        robot = parse_announcement(newest)
     except (NepError, DescriptionError) as error:
-        each.wrong = f"{topic}: {error}"  # the previous description stays valid
+        each.error = f"{topic}: {error}"  # the previous description stays valid
         return
-    each.wrong = wrong_topic(robot, topic) or ""
-    each.robot = None if each.wrong else robot
+    each.error = description_topic_problem(robot, topic) or ""
+    each.robot = None if each.error else robot
 
 
-def _result(there: Mapping[str, Robot], asked: Mapping[str, _Topic]) -> FoundRobots:
-    claims = [f"{each.wrong}." for each in asked.values() if each.wrong]
+def _result(there: Mapping[str, Robot], asked: Mapping[str, _DescriptionTopic]) -> FoundRobots:
+    claims = [f"{each.error}." for each in asked.values() if each.error]
     claims += [
         _(
             "{count} programs announce themselves as {robot}. {first} was first and is used; ignored: "
             "{others}."
         ).format(
-            count=len(each.twins) + 1,
+            count=len(each.duplicates) + 1,
             robot=each.robot.name,
-            first=each.owner.words,
-            others=listed(list(each.twins)),
+            first=each.owner.display_name,
+            others=format_list(list(each.duplicates)),
         )
         for each in asked.values()
-        if each.twins and each.robot is not None
+        if each.duplicates and each.robot is not None
     ]
     robots = {}
     for name in sorted(there):
-        claim = foreign_topic(there[name], there.values())
+        claim = topic_conflict(there[name], there.values())
         if claim is None:
             robots[name] = there[name]
         else:

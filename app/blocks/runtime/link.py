@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-LAST_STATES = ("succeeded", "failed", "canceled")
-STATES = ("accepted", "running", *LAST_STATES)
+FINAL_STATES = ("succeeded", "failed", "canceled")
+STATES = ("accepted", "running", *FINAL_STATES)
 
 
 @dataclass
@@ -22,21 +22,21 @@ class RobotCall:
     output: Mapping[str, object] = field(default_factory=dict)
     feedback: Mapping[str, object] = field(default_factory=dict)  # the newest non-empty one
     error: str = ""
-    began: bool = False  # the robot has started it
-    held: bool = False  # canceled by a pause
+    has_started: bool = False  # the robot has started it
+    is_canceled_by_pause: bool = False  # canceled by a pause
     waits_for: tuple[str, ...] = ()  # actions that the robot finishes first
-    heard_s: float = field(default_factory=time.monotonic)  # time of its robot's last answer
+    last_reply_s: float = field(default_factory=time.monotonic)  # time of its robot's last answer
 
     @property
     def done(self) -> bool:
         """True after the robot's final reply."""
-        return self.state in LAST_STATES
+        return self.state in FINAL_STATES
 
 
 class ProgramLink(Protocol):
     """Robots and topics as used by a program. Callbacks are called in the network's thread."""
 
-    def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
+    def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
         """Set the callbacks.
 
         ``poke`` is called for each reply and message, ``stopped_outside`` when another program stops a robot.

@@ -49,12 +49,12 @@ class Motions:
         self._slow: set[int] = set()  # scripts waiting at a block
         self._acting_for = threading.local()
 
-    def note_command(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
+    def record_command(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
         """Record a new command: the resources it uses no longer belong to an earlier motion."""
         action = robot.action(call.action)
         if action is None:
             return
-        motion = _Motion(robot, call.action, dict(input), frozenset(action.uses), self._script())
+        motion = _Motion(robot, call.action, dict(input), frozenset(action.uses), self._script_id())
         with self._lock:
             self._motions = {
                 key: known
@@ -69,7 +69,7 @@ class Motions:
         with self._lock:
             return call.id in self._unanswered
 
-    def ended(self, call: RobotCall) -> None:
+    def record_final_reply(self, call: RobotCall) -> None:
         """Record the final reply to a command."""
         with self._lock:
             motion = self._unanswered.pop(call.id, None)
@@ -94,7 +94,7 @@ class Motions:
             self._stop(robot)
         return tuple(moving)
 
-    def go_on(self) -> None:
+    def resume_all(self) -> None:
         """Resume all motions, because the program continues."""
         with self._lock:
             if not self._paused:
@@ -104,9 +104,9 @@ class Motions:
         self._resume(motions)
 
     @contextmanager
-    def slow(self) -> Iterator[None]:
+    def suspend(self) -> Iterator[None]:
         """Return a context in which the motions of the calling script are stopped, for a delay at a block."""
-        script = self._script()
+        script = self._script_id()
         with self._lock:
             moving = {
                 motion.robot.name: motion.robot
@@ -135,6 +135,6 @@ class Motions:
             finally:
                 del self._acting_for.script
 
-    def _script(self) -> int:
+    def _script_id(self) -> int:
         # Another script than the thread's own while motions are resumed.
         return getattr(self._acting_for, "script", None) or threading.get_ident()

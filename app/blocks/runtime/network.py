@@ -10,24 +10,31 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from typing import Protocol
 
-from app.blocks.runtime.link import LAST_STATES, STATES, RobotCall
+from app.blocks.runtime.link import FINAL_STATES, STATES, RobotCall
 from app.blocks.runtime.motions import Motions
 from app.blocks.runtime.publishing import PublishGuard
 from app.robots import rize
 from app.robots.description.description import Robot
 from app.robots.heartbeat import Heartbeat
 from app.robots.held_messages import HeldMessages
-from app.robots.identity import Senders, first_to_announce, hearing, publishing, said, said_of_stop
+from app.robots.identity import (
+    Senders,
+    first_announcer,
+    publisher_nodes,
+    safe_error_text,
+    stop_error_text,
+    subscriber_nodes,
+)
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
-from nep.system.log_rarely import SurvivedErrors
+from nep.system.log_rarely import SuppressedErrors
 from nep.text import bounded_str
 
 LOOKUP_INTERVAL_S = 0.2
 """Minimum interval of graph queries that look up unknown publishers."""
-MAX_UNKNOWN = 32
+MAX_HELD_PER_PUBLISHER = 32
 
 Callback = Callable[[object], None]
 _log = logging.getLogger(__name__)
@@ -118,7 +125,7 @@ class Network:
         self._senders = Senders()
         self._view = GraphView(0, 0)
         self._answers_lock = threading.Lock()  # serializes the handling of answers
-        self._unknown = HeldMessages(per_publisher=MAX_UNKNOWN)
+        self._unknown = HeldMessages(per_publisher=MAX_HELD_PER_PUBLISHER)
         self._lookup_requested = threading.Event()
         self._lookup_thread: threading.Thread | None = None
         self._stop_errors: dict[str, str] = {}
@@ -139,9 +146,9 @@ class Network:
         self._stopped_outside: Callable[[str], None] = _ignore
         self._arrived = threading.Condition()
         self._closed = threading.Event()
-        self._errors = SurvivedErrors(_log, "a message or answer of a robot")
+        self._errors = SuppressedErrors(_log, "a message or answer of a robot")
         self._ending = False
-        self._motions = Motions(self._rest, self._stand, self.invoke)
+        self._motions = Motions(self._stop_for_pause, self._stop_motion, self.invoke)
         self._alive = Heartbeat(program, "program alive")
         self._open((*sensors, *events), publishes, listens)
 
@@ -160,7 +167,7 @@ class Network:
             self._lookup()
         for robot in self._robots.values():
             if robot.dialect != "rize":
-                self._alive.beat(robot.name, self._publishers[robot.topics.command].publish)
+                self._alive.start(robot.name, self._publishers[robot.topics.command].publish)
 
     def _open_robot(self, robot: Robot) -> None:
         self._publisher(robot.topics.command, "json" if robot.dialect == "rize" else "robot/command")
@@ -169,7 +176,7 @@ class Network:
             topic = robot.topics.answer
             if topic not in self._subscribed:
                 self._subscribed.add(topic)
-                self._node.new_sub(topic, type_, sink=self._answers)
+                self._node.new_sub(topic, type_, sink=self._receive_replies)
 
     def close(self) -> None:
         """Stop the heartbeat. The node is not closed, because it belongs to the caller."""
@@ -179,14 +186,14 @@ class Network:
         if self._lookup_thread is not None:
             self._lookup_thread.join(timeout=3.0)
 
-    def know(self, owners: Mapping[str, str]) -> None:
+    def update_owners(self, owners: Mapping[str, str]) -> None:
         """Update the node ids of restarted robots."""
         with self._answers_lock:
             self._owners |= owners
 
     # ---- Link
 
-    def listen(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
+    def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
         """Set the callbacks for replies and messages, and for stops by other programs."""
         self._poke, self._stopped_outside = poke, stopped_outside
 
@@ -196,7 +203,7 @@ class Network:
         call = RobotCall(new_id("cmd"), robot, action)
         with self._lock:
             self._calls[call.id] = call
-        self._motions.note_command(call, described, input)
+        self._motions.record_command(call, described, input)
         if described.dialect == "rize":
             self._send(described, rize.to_command(described, action, input, call.id))
         else:
@@ -243,26 +250,26 @@ class Network:
 
     # ---- stopping
 
-    def hold_robots(self) -> None:
+    def pause_robots(self) -> None:
         """Stop robots that are in motion (a speed) until `go_on`, because the program is paused."""
         self._motions.stop_all()
 
-    def go_on(self) -> None:
+    def resume_robots(self) -> None:
         """Resume the motions that `hold_robots` stopped."""
-        self._motions.go_on()
+        self._motions.resume_all()
 
-    def slow(self) -> AbstractContextManager[None]:
+    def suspend_motions(self) -> AbstractContextManager[None]:
         """Return a context in which the motions of the calling script are stopped, for a delay at a block."""
-        return self._motions.slow()
+        return self._motions.suspend()
 
-    def _stand(self, robot: Robot) -> None:
+    def _stop_motion(self, robot: Robot) -> None:
         busy = [call for call in list(self._calls.values()) if call.robot == robot.name]
         if all(self._motions.is_motion(call) for call in busy):
             self._send_stop(robot)
 
-    def _rest(self, robot: Robot) -> None:
+    def _stop_for_pause(self, robot: Robot) -> None:
         for call in list(self._calls.values()):
-            call.held = call.held or call.robot == robot.name
+            call.is_canceled_by_pause = call.is_canceled_by_pause or call.robot == robot.name
         self._send_stop(robot)
 
     def _send_stop(self, robot: Robot) -> None:
@@ -294,7 +301,7 @@ class Network:
             )
             return tuple(dict.fromkeys(name for name, _ in waiting.values()))
 
-    def stop_words(self, name: str) -> str:
+    def stop_error(self, name: str) -> str:
         """Return why the stop of a robot is not confirmed, in the robot's own words if it replied.
 
         The text has no full stop.
@@ -303,8 +310,8 @@ class Network:
 
     def _stop_nodes(self, robot: Robot) -> set[str]:
         # The robot's own node, and others that answer its commands, must answer a stop.
-        heard = set(hearing(self._view, robot.topics.command))
-        others = heard & set(publishing(self._view, robot.topics.answer))
+        heard = set(subscriber_nodes(self._view, robot.topics.command))
+        others = heard & set(publisher_nodes(self._view, robot.topics.answer))
         owner = self._owners.get(robot.name)
         return {owner or "", *others}
 
@@ -328,7 +335,7 @@ class Network:
             if topic in self._subscribed:
                 return
             self._subscribed.add(topic)
-        self._node.new_sub(topic, sink=self._messages)
+        self._node.new_sub(topic, sink=self._receive_messages)
 
     def _lookup(self) -> None:
         # Queries the graph and resolves senders. Never call it in the node's own thread, which it would
@@ -337,14 +344,14 @@ class Network:
         topics = {robot.topics.answer for robot in self._robots.values()} | self._robot_of.keys()
         with self._answers_lock:
             self._view = view
-            self._senders.learn(view, topics)
+            self._senders.update(view, topics)
             for robot in self._robots.values():
-                first = first_to_announce(view, robot.topics.description)
+                first = first_announcer(view, robot.topics.description)
                 if robot.dialect != "rize" and first is not None:
                     self._owners.setdefault(robot.name, first.node_id)
             for message in self._unknown.pop_all():
                 if self._senders.node_of(message) is not None:
-                    self._judge_locked(message)
+                    self._handle_reply_locked(message)
         self._poke()
 
     def _request_lookup(self) -> None:
@@ -369,14 +376,14 @@ class Network:
         # program.
         robot = self._robot_of.get(message.topic)
         own = self._owners.get(robot) if robot is not None else None
-        if own is None or own not in publishing(self._view, message.topic):
+        if own is None or own not in publisher_nodes(self._view, message.topic):
             return True
         node = self._senders.node_of(message)
         if node is None:
             self._request_lookup()
         return node == own
 
-    def _messages(self, messages: Sequence[Message]) -> None:
+    def _receive_messages(self, messages: Sequence[Message]) -> None:
         for message in messages:
             with self._errors:
                 self._receive(message)
@@ -391,29 +398,29 @@ class Network:
             if payload is not None:
                 callback(payload)
 
-    def _answers(self, messages: Sequence[Message]) -> None:
+    def _receive_replies(self, messages: Sequence[Message]) -> None:
         with self._answers_lock:
             for message in messages:
                 with self._errors:
-                    self._judge_locked(message)
+                    self._handle_reply_locked(message)
         self._poke()
 
-    def _judge_locked(self, message: Message) -> None:
+    def _handle_reply_locked(self, message: Message) -> None:
         # Call with `_answers_lock` held. The sender must be known before an answer is used.
         node = self._senders.node_of(message)
         native = any(
             robot.dialect != "rize" and robot.topics.answer == message.topic
             for robot in self._robots.values()
         )
-        if native and (node is None or self._unknown.holds(message.publisher)):
-            self._unknown.put(message)
+        if native and (node is None or self._unknown.has_messages_of(message.publisher)):
+            self._unknown.add(message)
             self._request_lookup()
             return
         if native and not self._is_stop_node(message.topic, node or ""):
             return  # skip decoding
         payload = payload_of(message)
         if isinstance(payload, Mapping):
-            self._answer(message.topic, payload, node or "")
+            self._apply_reply(message.topic, payload, node or "")
 
     def _is_stop_node(self, topic: str, node: str) -> bool:
         # True for a robot's node, and for a node that must answer a stop.
@@ -421,16 +428,16 @@ class Network:
             must_answer = any(node in waiting for _name, waiting in self._stops.values())
         return must_answer or any(self._is_own(robot, topic, node) for robot in self._robots.values())
 
-    def _answer(self, topic: str, payload: Mapping[str, object], node: str) -> None:
+    def _apply_reply(self, topic: str, payload: Mapping[str, object], node: str) -> None:
         # Answers to a stop count from all nodes that must answer, others from the robot's own node only.
-        answer = payload if "state" in payload and "op" in payload else rize.from_answer(payload)
+        answer = payload if "state" in payload and "op" in payload else rize.from_reply(payload)
         if answer is None:
             return
         if answer.get("op") == "stop":
-            self._stop_answered(topic, answer, node)
+            self._record_stop_reply(topic, answer, node)
         if not any(self._is_own(robot, topic, node) for robot in self._robots.values()):
             return
-        self._note_sign_of_life(topic)
+        self._record_heartbeat(topic)
         if answer.get("op") == "stop":
             return
         call = self._calls.get(bounded_str(answer.get("id")))
@@ -442,29 +449,29 @@ class Network:
             return  # another robot's answer, or an invalid state
         output = answer.get("output")
         call.output = output if isinstance(output, Mapping) else {}
-        call.error = said(answer.get("error"))
+        call.error = safe_error_text(answer.get("error"))
         feedback = answer.get("feedback")
         call.feedback = feedback if isinstance(feedback, Mapping) and feedback else call.feedback
-        call.began = call.began or state == "running"
+        call.has_started = call.has_started or state == "running"
         waits_for = answer.get("waits_for")
         call.waits_for = tuple(map(bounded_str, waits_for)) if isinstance(waits_for, list) else call.waits_for
         call.state = state
-        if call.state in LAST_STATES:
+        if call.state in FINAL_STATES:
             self._calls.pop(call.id, None)
-            self._motions.ended(call)
+            self._motions.record_final_reply(call)
 
     def _is_own(self, robot: Robot, topic: str, node: str) -> bool:
         if robot.topics.answer != topic:
             return False
         return robot.dialect == "rize" or self._owners.get(robot.name) == node
 
-    def _note_sign_of_life(self, topic: str) -> None:
+    def _record_heartbeat(self, topic: str) -> None:
         now = time.monotonic()
         for call in list(self._calls.values()):
             if self._robots[call.robot].topics.answer == topic:
-                call.heard_s = now
+                call.last_reply_s = now
 
-    def _stop_answered(self, topic: str, answer: Mapping[str, object], node: str) -> None:
+    def _record_stop_reply(self, topic: str, answer: Mapping[str, object], node: str) -> None:
         if answer.get("state") not in ("succeeded", "failed"):
             return
         id = bounded_str(answer.get("id"))
@@ -475,7 +482,7 @@ class Network:
             name, waiting = self._stops.get(id, ("", set()))
             if name in robots and node in waiting:
                 if answer["state"] == "failed":
-                    self._stop_errors[name] = said_of_stop(name, answer.get("error"))
+                    self._stop_errors[name] = stop_error_text(name, answer.get("error"))
                 else:
                     waiting.discard(node)
                     self._stop_errors.pop(name, None)

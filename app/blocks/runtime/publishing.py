@@ -7,16 +7,16 @@ from collections.abc import Collection, Iterable, Mapping
 from app.blocks.runtime.errors import BehaviourError
 from app.robots.description.description import Robot
 from app.robots.identity import controls_of
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 from nep.programs.robots.moving import MovingTopics, RobotControls
 
 
-def moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:
+def robots_moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:
     """Return the names of the robots that a message on this topic may move, or whose world it changes."""
     return MovingTopics(map(controls_of, robots)).robots_on(topic)
 
 
-def guarded(robots: Iterable[Robot]) -> dict[str, tuple[str, ...]]:
+def guarded_topics(robots: Iterable[Robot]) -> dict[str, tuple[str, ...]]:
     """Return the topics that move these robots, each with the names of the robots."""
     return MovingTopics(map(controls_of, robots)).topics
 
@@ -26,9 +26,9 @@ class PublishGuard:
 
     def __init__(self, topics: Mapping[str, Collection[str]], allowed: Collection[str]) -> None:
         self._allowed = frozenset(allowed)
-        self.know(topics)
+        self.set_topics(topics)
 
-    def know(self, topics: Mapping[str, Collection[str]]) -> None:
+    def set_topics(self, topics: Mapping[str, Collection[str]]) -> None:
         """Update the topics that move connected robots."""
         moved: dict[str, set[str]] = {}
         for topic, names in topics.items():
@@ -40,7 +40,7 @@ class PublishGuard:
         """Raise BehaviourError if a message on this topic would move a robot that is not allowed to move."""
         names = [name for name in self._moving.robots_on(topic) if name not in self._allowed]
         if names:
-            who = listed(names)
+            who = format_list(names)
             raise BehaviourError(
                 _(
                     "Can't publish on {topic}: this would move {who} without permission. Stop the behaviour "

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.blocks.runtime.errors import BehaviourError, kind
+from app.blocks.runtime.errors import BehaviourError, type_name
 from app.blocks.runtime.scheduler import Scheduler
 from app.blocks.runtime.values import text
 from nep.i18n import _
@@ -31,14 +31,14 @@ class ProgramQuestion:
     """Possible answers; if empty, the user types the answer."""
 
 
-Asked = Callable[[ProgramQuestion | None], None]
+QuestionCallback = Callable[[ProgramQuestion | None], None]
 """Called with the question to be shown, or None."""
 
 
 class Questions:
     """Queue of questions. Scripts ask; answers arrive in another thread."""
 
-    def __init__(self, scheduler: Scheduler, asked: Asked | None) -> None:
+    def __init__(self, scheduler: Scheduler, asked: QuestionCallback | None) -> None:
         self._scheduler, self._asked = scheduler, asked
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
@@ -54,7 +54,7 @@ class Questions:
             raise BehaviourError(
                 _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
             )
-        self.answer = as_value(self._answer_to(text(words)))
+        self.answer = parse_answer(self._wait_for_answer(text(words)))
 
     def ask_with_choices(self, words: object, choices: object) -> None:
         """Ask a question with a button for each item of a list, and wait for the answer.
@@ -66,12 +66,12 @@ class Questions:
             raise BehaviourError(
                 _("Can't ask the question: the behaviour runs outside Studio. Run it in Studio.")
             )
-        offered = offers(choices)
-        chosen = self._answer_to(text(words), tuple(offered))
+        offered = choices_by_label(choices)
+        chosen = self._wait_for_answer(text(words), tuple(offered))
         value = offered.get(chosen, "")
-        self.answer = as_value(value) if isinstance(value, str) else value
+        self.answer = parse_answer(value) if isinstance(value, str) else value
 
-    def _answer_to(self, words: str, choices: tuple[str, ...] = ()) -> str:
+    def _wait_for_answer(self, words: str, choices: tuple[str, ...] = ()) -> str:
         question = ProgramQuestion(next(self._ids), words[:MAX_QUESTION_LENGTH], choices=choices)
         self._update_queue(self._waiting.append, question)
         try:
@@ -80,7 +80,7 @@ class Questions:
             self._update_queue(self._waiting.remove, question)
         return question.answer or ""
 
-    def answered(self, id: int, words: str) -> None:
+    def set_answer(self, id: int, words: str) -> None:
         """Store an answer; ignored if the question is no longer open."""
         with self._lock:
             for question in self._waiting:
@@ -95,11 +95,13 @@ class Questions:
                 self._asked(self._waiting[0] if self._waiting else None)
 
 
-def offers(choices: object) -> dict[str, object]:
+def choices_by_label(choices: object) -> dict[str, object]:
     """Return the items of a list by their texts on the buttons, without empty and duplicate texts."""
     if not isinstance(choices, list):
         raise BehaviourError(
-            _("A question with choices needs a list of choices, not {value}.").format(value=kind(choices))
+            _("A question with choices needs a list of choices, not {value}.").format(
+                value=type_name(choices)
+            )
         )
     found: dict[str, object] = {}
     for item in choices:
@@ -116,7 +118,7 @@ def offers(choices: object) -> dict[str, object]:
     return found
 
 
-def as_value(words: str) -> str | int | float:
+def parse_answer(words: str) -> str | int | float:
     """Convert an answer: a typed number becomes a number, so that it can be compared.
 
     "007" remains a text, as does a number with more digits than a float can represent.

@@ -20,28 +20,28 @@ from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.link import ProgramLink, RobotCall
 from app.blocks.runtime.scheduler import EndScript, Scheduler
 from app.robots.description.description import Action, Parameter, Robot
-from app.robots.description.inputs import from_words
-from app.robots.description.json_access import finite
-from nep.i18n import _, listed
+from app.robots.description.inputs import parse_value
+from app.robots.description.json_access import finite_float
+from nep.i18n import _, format_list
 
-FIRST_ANSWER_S = 3.0
-FIRST_VALUE_S = 2.0
-MAX_S = 60.0
-MARGIN_S = 2.0
-COMMAND_CHECK_S = 0.25
+FIRST_REPLY_TIMEOUT_S = 3.0
+FIRST_VALUE_TIMEOUT_S = 2.0
+DEFAULT_TIMEOUT_S = 60.0
+TIMEOUT_MARGIN_S = 2.0
+COMMAND_CHECK_INTERVAL_S = 0.25
 """Interval of checks of a pending command: is the robot silent, has the action started."""
 BEATS_MISSED, MIN_SILENCE_S = 4, 2.0
-HOLD_S = 3.0
+PAUSE_TIMEOUT_S = 3.0
 """Time limit for a robot to end an action cancelled by a pause; robots built with the kit reply within 1 s.
 """
-MAX_KEPT_COMMANDS = 64
+MAX_STORED_COMMANDS = 64
 """Number of stored commands; a robot reports soon that a command was replaced."""
-REPLACES = "replace"
-_PLACE = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
+REPLACE = "replace"
+_PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
-LEFT = "to_go"
+REMAINING_FIELD = "to_go"
 """Feedback field with the remaining amount, in the unit of one parameter of the action."""
 
 
@@ -57,19 +57,19 @@ class StatusText:
         """Set the activity of a robot for the block of the calling script; "" when it has ended."""
         _set_or_remove(self._told, self._block(), sentence)
 
-    def warn(self, sentence: str) -> None:
+    def set_warning(self, sentence: str) -> None:
         """Set a warning while the calling script is paused; "" when the script continues."""
         _set_or_remove(self._warned, self._block(), sentence)
 
-    def says(self, blocks: Sequence[str]) -> str:
+    def text(self, blocks: Sequence[str]) -> str:
         """Return the text for the run bar: the activity of a robot, or else the first block."""
-        return _first(self._told, blocks) or self.reading(blocks[0] if blocks else None)
+        return _first_text(self._told, blocks) or self.block_text(blocks[0] if blocks else None)
 
-    def warns(self, blocks: Sequence[str]) -> str:
+    def warning(self, blocks: Sequence[str]) -> str:
         """Return the warning at one of these blocks, or ""."""
-        return _first(self._warned, blocks)
+        return _first_text(self._warned, blocks)
 
-    def reading(self, block: str | None) -> str:
+    def block_text(self, block: str | None) -> str:
         """Return a block as text; "" for None."""
         return self._readings.get(block or "", "")
 
@@ -81,7 +81,7 @@ def _set_or_remove(sentences: dict[str | None, str], block: str | None, sentence
         sentences.pop(block, None)
 
 
-def _first(sentences: Mapping[str | None, str], blocks: Sequence[str]) -> str:
+def _first_text(sentences: Mapping[str | None, str], blocks: Sequence[str]) -> str:
     return next((sentences[block] for block in blocks if block in sentences), "")
 
 
@@ -90,7 +90,7 @@ class Replacement:
     """Command that another script's command replaced; ``count`` is the number of times in this run."""
 
     block: str
-    sentence: str
+    message: str
     count: int = 1
 
 
@@ -110,16 +110,16 @@ class Replacements:
     """
 
     def __init__(self) -> None:
-        self._commands: deque[_Command] = deque(maxlen=MAX_KEPT_COMMANDS)
+        self._commands: deque[_Command] = deque(maxlen=MAX_STORED_COMMANDS)
         self._lock = threading.Lock()
         self._counts: dict[tuple[str, str], int] = {}
         self._news: dict[tuple[str, str], Replacement] = {}
 
-    def note_command(self, call: RobotCall, action: Action, block: str | None) -> None:
+    def record_command(self, call: RobotCall, action: Action, block: str | None) -> None:
         """Record a command of the calling script at this block."""
         self._commands.append(_Command(call, action, block, threading.get_ident()))
 
-    def ended(self, call: RobotCall, *, names_robot: bool) -> None:
+    def record_early_end(self, call: RobotCall, *, names_robot: bool) -> None:
         """Record that the robot ended this command early, without a pause or stop.
 
         This is reported only if a later command of another script replaced the command. With ``names_robot``,
@@ -129,7 +129,7 @@ class Replacements:
         if loser is None or loser.block is None:
             return
         later = list(self._commands)[self._commands.index(loser) + 1 :]
-        winner = next((each for each in later if _takes_place(each, loser)), None)
+        winner = next((each for each in later if _replaces(each, loser)), None)
         if winner is None or winner.script == loser.script:
             return
         words = _("“{action}” was replaced by “{other}”")
@@ -141,17 +141,17 @@ class Replacements:
             count = self._counts[pair] = self._counts.get(pair, 0) + 1
             self._news[pair] = Replacement(loser.block, said, count)
 
-    def take_news(self) -> tuple[Replacement, ...]:
+    def take_new(self) -> tuple[Replacement, ...]:
         """Return the replacements since the last call; repeated ones are combined with their count."""
         with self._lock:
             news, self._news = tuple(self._news.values()), {}
         return news
 
 
-def _takes_place(winner: _Command, loser: _Command) -> bool:
+def _replaces(winner: _Command, loser: _Command) -> bool:
     return (
         winner.call.robot == loser.call.robot
-        and winner.action.on_busy == REPLACES
+        and winner.action.on_busy == REPLACE
         and bool(set(winner.action.uses) & set(loser.action.uses))
     )
 
@@ -160,19 +160,19 @@ class ProgramContext(Protocol):
     """Running program as used by `RobotHandle`."""
 
     scheduler: Scheduler
-    saying: StatusText
-    replaced: Replacements
+    status_text: StatusText
+    replacements: Replacements
 
     @property
     def robot_count(self) -> int:
         """Number of robots that the program uses."""
         ...
 
-    def described(self, name: str) -> Robot:
+    def robot_description(self, name: str) -> Robot:
         """Return the description of a connected robot."""
         ...
 
-    def linked(self) -> ProgramLink:
+    def link(self) -> ProgramLink:
         """Return the network link of the program."""
         ...
 
@@ -234,13 +234,13 @@ class RobotHandle:
             sensor: Name of the sensor.
             field: Name of a field of an object sensor.
         """
-        robot = self._runtime.described(self._name)
-        link, scheduler = self._runtime.linked(), self._runtime.scheduler
+        robot = self._runtime.robot_description(self._name)
+        link, scheduler = self._runtime.link(), self._runtime.scheduler
         if robot.sensor(sensor) is None:
             raise BehaviourError(_("{name} has no sensor “{sensor}”.").format(name=self._name, sensor=sensor))
         if link.sensor(self._name, sensor) is None:
             # Sensors publish several times a second: the first value may be in flight.
-            scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_S)
+            scheduler.wait_for(lambda: link.sensor(self._name, sensor) is not None, FIRST_VALUE_TIMEOUT_S)
         told = link.sensor(self._name, sensor)
         return told if field is None else values.part(told, field)
 
@@ -268,7 +268,7 @@ class RobotHandle:
         return self._runtime.on_pass(self._name, sensor, side, limit)
 
     def _invoke(self, name: str, given: Mapping[str, object]) -> RobotCall:
-        robot = self._runtime.described(self._name)
+        robot = self._runtime.robot_description(self._name)
         action = robot.action(name)
         if action is None:
             raise BehaviourError(_("{name} can't “{name_2}”.").format(name=self._name, name_2=name))
@@ -276,12 +276,12 @@ class RobotHandle:
         wrong = action.check(action.complete(input))
         if wrong:
             raise BehaviourError(_("{name} can't do this: {wrong}.").format(name=self._name, wrong=wrong[0]))
-        words = sentence(robot, action, input)
-        self._runtime.saying.set_text(words)
+        words = activity_text(robot, action, input)
+        self._runtime.status_text.set_text(words)
         try:
-            call = self._do(robot, action, action.complete(input), words)
+            call = self._run_action(robot, action, action.complete(input), words)
         finally:
-            self._runtime.saying.set_text("")
+            self._runtime.status_text.set_text("")
         if call.state == "failed":
             why = call.error or _("“{action}” failed").format(action=action.title)
             raise BehaviourError(
@@ -289,64 +289,68 @@ class RobotHandle:
             )
         return call
 
-    def _do(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> RobotCall:
+    def _run_action(self, robot: Robot, action: Action, input: Mapping[str, object], words: str) -> RobotCall:
         while True:
-            call = self._runtime.linked().invoke(self._name, action.name, input)
-            self._runtime.replaced.note_command(call, action, self._runtime.scheduler.block())
+            call = self._runtime.link().invoke(self._name, action.name, input)
+            self._runtime.replacements.record_command(call, action, self._runtime.scheduler.block())
             try:
-                self._wait_for_answer(robot, action, call, words)
+                self._wait_for_reply(robot, action, call, words)
             except EndScript:  # the program continues, but the robot must stop
-                self._runtime.linked().cancel(call)
+                self._runtime.link().cancel(call)
                 raise
-            if call.state == "canceled" and not call.held:
-                self._runtime.replaced.ended(call, names_robot=self._runtime.robot_count > 1)
-            if not call.held or call.state != "canceled":
+            if call.state == "canceled" and not call.is_canceled_by_pause:
+                self._runtime.replacements.record_early_end(call, names_robot=self._runtime.robot_count > 1)
+            if not call.is_canceled_by_pause or call.state != "canceled":
                 return call
-            self._wait_while_paused(action, is_unknown(action, input, call))
-            rest = rest_of(action, input, call)
+            self._wait_while_paused(action, is_remainder_unknown(action, input, call))
+            rest = remaining_input(action, input, call)
             if rest is None:
                 return call
             input = rest
 
     def _wait_while_paused(self, action: Action, unknown: bool) -> None:
         names = {"robot": self._name, "action": action.title}
-        saying = self._runtime.saying
+        saying = self._runtime.status_text
         ahead = _("{robot} doesn't report how much of “{action}” is left; Resume skips it")
-        saying.warn(ahead.format(**names) if unknown else "")
-        self._runtime.scheduler.hold()
-        saying.warn("")
+        saying.set_warning(ahead.format(**names) if unknown else "")
+        self._runtime.scheduler.wait_while_paused()
+        saying.set_warning("")
         if unknown:
             done = _("{robot} doesn't report how much of “{action}” is left, so it was skipped")
             self._runtime.write(done.format(**names))
 
-    def _wait_for_answer(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
+    def _wait_for_reply(self, robot: Robot, action: Action, call: RobotCall, words: str) -> None:
         scheduler = self._runtime.scheduler
-        if robot.dialect == "native" and not scheduler.wait_for(lambda: call.state != "sent", FIRST_ANSWER_S):
+        if robot.dialect == "native" and not scheduler.wait_for(
+            lambda: call.state != "sent", FIRST_REPLY_TIMEOUT_S
+        ):
             raise BehaviourError(
                 _("{name} is not responding. {check}").format(name=self._name, check=_check_hint(robot))
             )
         can_hold = action.cancellable and robot.dialect == "native"
-        limit = action.timeout_s or MAX_S
-        until = time.monotonic() + limit + MARGIN_S
+        limit = action.timeout_s or DEFAULT_TIMEOUT_S
+        until = time.monotonic() + limit + TIMEOUT_MARGIN_S
         waits = bool(call.waits_for) and call.state == "accepted"
         if waits:
-            self._runtime.saying.set_text(_waiting_text(robot, call))
+            self._runtime.status_text.set_text(_waiting_text(robot, call))
 
         def ready() -> bool:
-            return call.done or (can_hold and scheduler.holds())
+            return call.done or (can_hold and scheduler.is_script_paused())
 
-        while not scheduler.wait_for(ready, min(COMMAND_CHECK_S, max(0.0, until - time.monotonic()))):
+        while not scheduler.wait_for(
+            ready, min(COMMAND_CHECK_INTERVAL_S, max(0.0, until - time.monotonic()))
+        ):
             if waits:  # the time limit starts with the action
-                until = time.monotonic() + limit + MARGIN_S
-                waits = not call.began
-                self._runtime.saying.set_text(_waiting_text(robot, call) if waits else words)
+                until = time.monotonic() + limit + TIMEOUT_MARGIN_S
+                waits = not call.has_started
+                self._runtime.status_text.set_text(_waiting_text(robot, call) if waits else words)
             said = self._silence_error(robot, call)
             if said is None and time.monotonic() >= until:
                 said = _("{name} did not finish “{title}” within {limit:g} s.").format(
                     name=self._name, title=action.title, limit=limit
                 )
             if said is not None:
-                self._runtime.linked().cancel(call)
+                self._runtime.link().cancel(call)
                 raise BehaviourError(said)
         if not call.done:
             self._cancel_for_pause(call)
@@ -354,15 +358,15 @@ class RobotHandle:
     def _silence_error(self, robot: Robot, call: RobotCall) -> str | None:
         if robot.beat_s is None:
             return None
-        silence = time.monotonic() - call.heard_s
+        silence = time.monotonic() - call.last_reply_s
         if silence <= max(MIN_SILENCE_S, BEATS_MISSED * robot.beat_s):
             return None
         return _("{name} stopped responding. {check}").format(name=self._name, check=_check_hint(robot))
 
     def _cancel_for_pause(self, call: RobotCall) -> None:
-        call.held = True
-        self._runtime.linked().cancel(call)
-        if not self._runtime.scheduler.wait_for(lambda: call.done, HOLD_S):
+        call.is_canceled_by_pause = True
+        self._runtime.link().cancel(call)
+        if not self._runtime.scheduler.wait_for(lambda: call.done, PAUSE_TIMEOUT_S):
             raise BehaviourError(
                 _("{name} did not pause, so the behaviour was stopped.").format(name=self._name)
             )
@@ -373,13 +377,13 @@ def _waiting_text(robot: Robot, call: RobotCall) -> str:
     titles = [
         _("“{name}”").format(name=action.title if action is not None else name) for action, name in found
     ]
-    return _("{robot} is waiting for {actions}").format(robot=robot.name, actions=listed(titles))
+    return _("{robot} is waiting for {actions}").format(robot=robot.name, actions=format_list(titles))
 
 
-def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
+def activity_text(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
     """Return a sentence about what the robot is doing: "Pepper says “Touch my head.”"."""
 
-    def place(match: re.Match[str]) -> str:
+    def replacement(match: re.Match[str]) -> str:
         if match[1] == "robot":
             return robot.name
         parameter = action.parameter(match[1])
@@ -388,7 +392,7 @@ def sentence(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
             value = next((choice.title for choice in parameter.choices if choice.value == value), value)
         return values.text(value)
 
-    return " ".join(_PLACE.sub(place, action.says or action.text).split())
+    return " ".join(_PLACEHOLDER.sub(replacement, action.says or action.text).split())
 
 
 def _converted_input(action: Action, name: str, value: object) -> object:
@@ -402,16 +406,16 @@ def _converted_input(action: Action, name: str, value: object) -> object:
             ),
             unknown=True,
         )
-    return _as_kind(parameter, value)
+    return _convert_to_kind(parameter, value)
 
 
-def _as_kind(parameter: Parameter, value: object) -> object:
+def _convert_to_kind(parameter: Parameter, value: object) -> object:
     if parameter.kind in ("text", "image"):
         return values.text(value)
     if parameter.kind == "integer" and isinstance(value, float) and value.is_integer():
         return int(value)
     if parameter.kind in ("list", "object") and isinstance(value, str):
-        return from_words(parameter, value)
+        return parse_value(parameter, value)
     return value
 
 
@@ -425,36 +429,36 @@ def _check_hint(robot: Robot) -> str:
     return _("Check that it is switched on and connected to the same Wi-Fi.")
 
 
-def rest_of(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:
+def remaining_input(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:
     """Return the input for the remaining part of a cancelled call; None if nothing is left to do.
 
     An action that reports the remaining amount continues with that; other actions start again. An action that
     drives the robot without reporting the amount would go too far, so that its remaining part is skipped.
     """
-    if not call.began:
+    if not call.has_started:
         return dict(input)
-    if is_unknown(action, input, call):
+    if is_remainder_unknown(action, input, call):
         return None
-    name = measured_by(action, input)
+    name = remainder_parameter(action, input)
     if name is None:
         return dict(input)
-    left, whole = _number(call.feedback.get(LEFT)), _number(input[name])
+    left, whole = _number(call.feedback.get(REMAINING_FIELD)), _number(input[name])
     if abs(left) <= abs(whole) / 1000:
         return None
     return {**input, name: math.copysign(min(abs(left), abs(whole)), whole)}
 
 
-def is_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:
+def is_remainder_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:
     """Return True if the robot was driving somewhere without reporting the remaining amount."""
-    name = measured_by(action, input)
-    if not call.began or name is None:
-        return call.began and action.risk == "locomotes"
-    return not _is_number(call.feedback.get(LEFT))
+    name = remainder_parameter(action, input)
+    if not call.has_started or name is None:
+        return call.has_started and action.risk == "locomotes"
+    return not _is_number(call.feedback.get(REMAINING_FIELD))
 
 
-def measured_by(action: Action, input: Mapping[str, object]) -> str | None:
+def remainder_parameter(action: Action, input: Mapping[str, object]) -> str | None:
     """Return the parameter that the remaining amount refers to: the only number with the same unit."""
-    unit = next((field.unit for field in action.feedback if field.name == LEFT), None)
+    unit = next((field.unit for field in action.feedback if field.name == REMAINING_FIELD), None)
     same = [
         parameter.name
         for parameter in action.parameters
@@ -468,4 +472,4 @@ def _is_number(value: object) -> bool:
 
 
 def _number(value: object) -> float:
-    return finite(value) or 0.0
+    return finite_float(value) or 0.0

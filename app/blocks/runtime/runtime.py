@@ -18,11 +18,11 @@ from app.blocks.runtime.broadcasts import Broadcasts, Receiver
 from app.blocks.runtime.errors import BehaviourError, explain
 from app.blocks.runtime.link import ProgramLink
 from app.blocks.runtime.pure import calculation, clock, lists, texts
-from app.blocks.runtime.questions import Asked, Questions
+from app.blocks.runtime.questions import QuestionCallback, Questions
 from app.blocks.runtime.robot_handle import Replacements, RobotHandle, StatusText
-from app.blocks.runtime.scheduler import EndScript, Scheduler, Stopped
-from app.blocks.runtime.triggers import Hat, PassGate, changes, event_matches
-from app.blocks.runtime.variables import brief_words
+from app.blocks.runtime.scheduler import EndScript, Scheduler, StopProgram
+from app.blocks.runtime.triggers import Hat, ThresholdTrigger, change_detector, event_matches
+from app.blocks.runtime.variables import short_text
 from app.robots.description.description import Robot
 from nep.i18n import _, lazy, translate
 
@@ -40,9 +40,9 @@ _FUNCTION_MODULES: tuple[ModuleType, ...] = (calculation, clock, lists, texts)
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
 
-MESSAGES_WAITING = 16
-EVENTS_WAITING = 1
-MAX_DEPTH = 200
+MAX_QUEUED_MESSAGES = 16
+MAX_QUEUED_EVENTS = 1
+MAX_CALL_DEPTH = 200
 """Maximum depth of function calls."""
 _RECURSION_LIMIT = 6000  # recursion limit: one function call takes up to a dozen Python frames
 
@@ -59,16 +59,16 @@ class Calls:
         self._scheduler = scheduler
         self._local = threading.local()
 
-    def begin(self) -> None:
+    def raise_recursion_limit(self) -> None:
         """Raise Python's recursion limit for the process of the program."""
         sys.setrecursionlimit(max(sys.getrecursionlimit(), _RECURSION_LIMIT))
 
     def run(self, block: str, name: str, call: Callable[[], object]) -> object:
         """Call a function. Raises BehaviourError if calls are nested too deeply."""
         depth = int(getattr(self._local, "depth", 0))
-        if depth >= MAX_DEPTH:
+        if depth >= MAX_CALL_DEPTH:
             raise BehaviourError(
-                _("“{name}” calls itself more than {count} times.").format(name=name, count=MAX_DEPTH),
+                _("“{name}” calls itself more than {count} times.").format(name=name, count=MAX_CALL_DEPTH),
                 block,
             )
         self._local.depth = depth + 1
@@ -77,7 +77,7 @@ class Calls:
             result = call()
         finally:
             self._local.depth = depth
-        self._scheduler.return_to(before)
+        self._scheduler.restore_block(before)
         return result
 
 
@@ -100,7 +100,7 @@ class Runtime:
         *,
         labels: Mapping[str, str] | None = None,
         readings: Mapping[str, str] | None = None,
-        asked: Asked | None = None,
+        asked: QuestionCallback | None = None,
     ) -> None:
         self._printed = printed
         self._labels = labels or {}
@@ -113,8 +113,8 @@ class Runtime:
         self._running = 0
         self._timer_from_s = 0.0
         self.scheduler = Scheduler()
-        self.saying = StatusText(self.scheduler.block, readings or {})
-        self.replaced = Replacements()
+        self.status_text = StatusText(self.scheduler.block, readings or {})
+        self.replacements = Replacements()
         self._calls = Calls(self.scheduler)
         self.questions = Questions(self.scheduler, asked)
         self._broadcasts = Broadcasts(self.scheduler, self._add_running, self._remove_running)
@@ -137,39 +137,43 @@ class Runtime:
         self._link = link
         self.reset_timer()
         self._robots = {robot.name: robot for robot in robots}
-        self._calls.begin()
-        link.listen(self.scheduler.poke, self._stopped_outside)
+        self._calls.raise_recursion_limit()
+        link.set_callbacks(self.scheduler.wake_scripts, self._on_external_stop)
         for subscribe in self._subscriptions:
             subscribe(link)
         self._running = len(self._starts) + len(self._hats)
         if not self._running:
             self.finished.set()
-        with self.scheduler.opening():
+        with self.scheduler.defer_turns():
             self._start_scripts()
 
     def _start_scripts(self) -> None:
         for receiver in self._broadcasts.receivers:
             # Not counted: without other running scripts, it can't receive a broadcast any more.
-            self.scheduler.start(receiver.name, self._guarded(partial(receiver.serve, self.scheduler)))
+            self.scheduler.start(
+                receiver.name, self._with_error_reporting(partial(receiver.serve, self.scheduler))
+            )
         for script in self._starts:
-            body = self._guarded(partial(self._run_once, script), over=self._remove_running)
+            body = self._with_error_reporting(partial(self._run_once, script), over=self._remove_running)
             self.scheduler.start(script.__name__, body, idle=False)
         for hat, script in self._hats:
-            body = self._guarded(partial(self._run_for_events, hat, script), over=self._remove_running)
+            body = self._with_error_reporting(
+                partial(self._run_for_events, hat, script), over=self._remove_running
+            )
             self.scheduler.start(script.__name__, body)
 
     def _run_once(self, script: Script) -> None:
         with suppress(EndScript):
-            self.scheduler.begin()
+            self.scheduler.start_run()
             script()
 
     def _run_for_events(self, hat: Hat, script: Script) -> None:
         while True:
             arguments = hat.next(self.scheduler)
             with suppress(EndScript):
-                self.scheduler.begin()
+                self.scheduler.start_run()
                 script(*arguments)
-            self.scheduler.rest()
+            self.scheduler.finish_run()
             if hat.dropped:
                 self.write(
                     _("“{title}” could not keep up: {dropped} of its events were skipped").format(
@@ -178,7 +182,7 @@ class Runtime:
                 )
                 hat.dropped = 0
 
-    def _guarded(
+    def _with_error_reporting(
         self, body: Callable[[], None], over: Callable[[], None] = lambda: None
     ) -> Callable[[], None]:
         def run() -> None:
@@ -205,12 +209,12 @@ class Runtime:
             self.finished.set()
 
     def _fail(self, error: BehaviourError) -> None:
-        if self.error is None and not self.scheduler.stopping:
+        if self.error is None and not self.scheduler.is_stopping:
             self.error = error
         self.scheduler.stop()
         self.finished.set()
 
-    def _stopped_outside(self, robot: str) -> None:
+    def _on_external_stop(self, robot: str) -> None:
         self._fail(
             BehaviourError(
                 _("{robot} was stopped by another program, so the behaviour ended.").format(robot=robot)
@@ -221,11 +225,11 @@ class Runtime:
         """End all scripts."""
         self.scheduler.stop()
         self.finished.set()
-        raise Stopped
+        raise StopProgram
 
     def stop_others(self) -> None:
         """End the current runs of all other scripts. Events can start them again."""
-        self.scheduler.end_others()
+        self.scheduler.end_other_runs()
 
     # ---- blocks
 
@@ -279,7 +283,7 @@ class Runtime:
 
     def show(self, value: object) -> None:
         """Write a tried value in short form; an empty line if the value is unknown."""
-        self._printed("" if value is None else brief_words(value))
+        self._printed("" if value is None else short_text(value))
 
     # ---- questions
 
@@ -302,11 +306,11 @@ class Runtime:
 
         Time in which the program is paused doesn't count.
         """
-        return round(self.scheduler.running_s() - self._timer_from_s, 3)
+        return round(self.scheduler.running_time_s() - self._timer_from_s, 3)
 
     def reset_timer(self) -> None:
         """Restart the timer at 0."""
-        self._timer_from_s = self.scheduler.running_s()
+        self._timer_from_s = self.scheduler.running_time_s()
 
     # ---- topics
 
@@ -316,11 +320,11 @@ class Runtime:
         Raises:
             BehaviourError: The message would move a robot without permission.
         """
-        self._linked().publish(topic, payload)
+        self._require_link().publish(topic, payload)
 
     def newest(self, topic: str, path: str) -> object:
         """Return a field of the newest message of a topic; None until a message is received."""
-        message = self._linked().newest(topic)
+        message = self._require_link().newest(topic)
         return None if message is None else values.part(message, path)
 
     def broadcast(self, name: str) -> None:
@@ -343,10 +347,10 @@ class Runtime:
         """Return a decorator for scripts that run for each message on a topic and take its payload."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
-            link.on_message(topic, lambda payload: hat.happened((payload,)))
+            link.on_message(topic, lambda payload: hat.enqueue((payload,)))
 
-        return self._hat(
-            _("when a message arrives on {topic}").format(topic=topic), prepare, MESSAGES_WAITING
+        return self._hat_decorator(
+            _("when a message arrives on {topic}").format(topic=topic), prepare, MAX_QUEUED_MESSAGES
         )
 
     def on_broadcast(self, name: str) -> Decorator:
@@ -377,39 +381,43 @@ class Runtime:
             description = self._robots[robot].event(event)
             source = self._robots[robot].source
 
-            def told(data: object) -> None:
+            def on_data(data: object) -> None:
                 if event_matches(data, filters, description, source):
-                    hat.happened(())
+                    hat.enqueue(())
 
-            link.on_event(robot, event, told)
+            link.on_event(robot, event, on_data)
 
-        return self._hat(_("when {robot} {event}").format(robot=robot, event=event), prepare, EVENTS_WAITING)
+        return self._hat_decorator(
+            _("when {robot} {event}").format(robot=robot, event=event), prepare, MAX_QUEUED_EVENTS
+        )
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
         """Return a decorator for scripts that run each time the value of the sensor changes."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
-            link.on_sensor(robot, sensor, changes(lambda: hat.happened(())))
+            link.on_sensor(robot, sensor, change_detector(lambda: hat.enqueue(())))
 
-        return self._hat(
-            _("when {robot} {sensor} changes").format(robot=robot, sensor=sensor), prepare, EVENTS_WAITING
+        return self._hat_decorator(
+            _("when {robot} {sensor} changes").format(robot=robot, sensor=sensor), prepare, MAX_QUEUED_EVENTS
         )
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
         """Return a decorator for scripts that run each time the sensor passes the limit to this side."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
-            link.on_sensor(robot, sensor, PassGate(side, limit, lambda: hat.happened(())))
+            link.on_sensor(robot, sensor, ThresholdTrigger(side, limit, lambda: hat.enqueue(())))
 
-        return self._hat(
+        return self._hat_decorator(
             _("when {robot} {sensor} goes {side} {limit}").format(
                 robot=robot, sensor=sensor, side=translate("choice", side), limit=f"{limit:g}"
             ),
             prepare,
-            EVENTS_WAITING,
+            MAX_QUEUED_EVENTS,
         )
 
-    def _hat(self, title: str, prepare: Callable[[Hat, ProgramLink], None], waiting: int) -> Decorator:
+    def _hat_decorator(
+        self, title: str, prepare: Callable[[Hat, ProgramLink], None], waiting: int
+    ) -> Decorator:
         def decorate(script: Script) -> Script:
             hat = Hat(title, most=waiting)
             self._hats.append((hat, script))
@@ -424,7 +432,7 @@ class Runtime:
         """Return the handle of a robot."""
         return RobotHandle(name, self)
 
-    def described(self, name: str) -> Robot:
+    def robot_description(self, name: str) -> Robot:
         """Return the description of a robot. Raises BehaviourError if it is not connected."""
         if name not in self._robots:
             raise BehaviourError(_("{name} is not connected.").format(name=name))
@@ -435,11 +443,11 @@ class Runtime:
         """Number of robots that the program uses."""
         return len(self._robots)
 
-    def linked(self) -> ProgramLink:
+    def link(self) -> ProgramLink:
         """Return the network link of the program."""
-        return self._linked()
+        return self._require_link()
 
-    def _linked(self) -> ProgramLink:
+    def _require_link(self) -> ProgramLink:
         if self._link is None:
             raise BehaviourError(_("the program has not started yet."))
         return self._link

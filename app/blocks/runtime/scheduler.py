@@ -16,10 +16,10 @@ from dataclasses import dataclass
 
 from nep.i18n import _
 
-POLL_S = 0.02
+POLL_INTERVAL_S = 0.02
 
 
-class Stopped(BaseException):
+class StopProgram(BaseException):
     """Raised in a script when the program ends. Programs never catch it."""
 
 
@@ -29,10 +29,10 @@ class Snapshot:
 
     blocks: tuple[str, ...]
     next_block: str | None
-    paused: bool
+    is_paused: bool
 
 
-class EndScript(Stopped):
+class EndScript(StopProgram):
     """Raised in a script whose run ends while the program continues. An event can start the script again."""
 
 
@@ -84,49 +84,49 @@ class Scheduler:
             self._local.script = script
             try:
                 body()
-            except Stopped:
+            except StopProgram:
                 pass
             finally:
-                self._end(script)
+                self._remove_script(script)
 
         thread = threading.Thread(target=run, name=f"script {name}", daemon=True)
         thread.start()
         return thread
 
     @contextmanager
-    def opening(self) -> Iterator[None]:
+    def defer_turns(self) -> Iterator[None]:
         """Return a context for starting several scripts: none gets the turn before the context ends."""
         with self._lock:
             self._opening = True
         yield
         with self._lock:
             self._opening = False
-            self._grant_locked()
+            self._grant_turn_locked()
 
-    def begin(self) -> None:
+    def start_run(self) -> None:
         """Wait for the turn to start a run of the script. Raises Stopped when the program ends."""
-        script = self._script()
+        script = self._current_script()
         with self._lock:
             script.idle = False
-            self._enter_locked(script)
+            self._acquire_turn_locked(script)
 
-    def look(self) -> None:
+    def acquire_turn(self) -> None:
         """Wait for the turn to evaluate the condition of an idle script; `rest` gives the turn back.
 
         Waits while the program is paused.
         """
-        script = self._script()
+        script = self._current_script()
         with self._lock:
             while self._paused and not self._stopping:
                 script.wake.wait()
-            self._enter_locked(script)
+            self._acquire_turn_locked(script)
 
-    def rest(self) -> None:
+    def finish_run(self) -> None:
         """End the script's run until its next event."""
-        script = self._script()
+        script = self._current_script()
         with self._lock:
             script.idle, script.block, script.ended = True, None, False
-            self._leave_locked(script)
+            self._release_turn_locked(script)
 
     def step(self, block: str) -> None:
         """Record that the script has reached a block.
@@ -134,24 +134,24 @@ class Scheduler:
         Other scripts get the turn, and a pause holds the script here. With a pace, the script first waits for
         that duration.
         """
-        script = self._script()
+        script = self._current_script()
         with self._lock:
-            self._raise_if_over(script)
+            self._raise_if_ended(script)
             script.block = block
             if self._stepping is script:
                 self._stepping = None
             if self.pace_s and not self._paused:
-                self._stay_locked(script, lambda: self.pace_s, step_ends=True)
+                self._wait_locked(script, lambda: self.pace_s, step_ends=True)
             if self._stepping is script:
                 return  # a step was requested while the script waited here
             if not self._parked and not self._resuming and not self._paused:
                 return
-            self._leave_locked(script, then_park=True)
+            self._release_turn_locked(script, then_park=True)
             self._await_turn_locked(script)
 
-    def me(self) -> Script:
+    def current_script(self) -> Script:
         """Return the calling script."""
-        return self._script()
+        return self._current_script()
 
     def end_run(self, script: Script) -> None:
         """End the current run of a script: EndScript is raised at its next call.
@@ -161,9 +161,9 @@ class Scheduler:
         with self._lock:
             self._end_run_locked(script)
 
-    def end_others(self) -> None:
+    def end_other_runs(self) -> None:
         """End the current runs of all scripts except the calling one."""
-        mine = self._script()
+        mine = self._current_script()
         with self._lock:
             for script in self._scripts:
                 if script is not mine:
@@ -182,12 +182,12 @@ class Scheduler:
 
     def wait_until(self, condition: Callable[[], bool] | None, at_most_s: float | None) -> bool:
         """Wait until the condition, evaluated 50 times a second, is true; return False on timeout."""
-        script = self._script()
+        script = self._current_script()
         remaining = at_most_s
         while condition is None or not condition():
             if remaining is not None and remaining <= 0:
                 return False
-            slice_s = remaining if condition is None else POLL_S
+            slice_s = remaining if condition is None else POLL_INTERVAL_S
             if remaining is not None and slice_s is not None:
                 slice_s = min(slice_s, remaining)
             used = self._wait_slice(script, slice_s)
@@ -196,7 +196,7 @@ class Scheduler:
 
     def _wait_slice(self, script: Script, seconds: float | None) -> float:
         with self._lock:
-            return self._stay_locked(script, lambda: seconds)
+            return self._wait_locked(script, lambda: seconds)
 
     def wait_for(
         self, ready: Callable[[], bool], timeout_s: float | None = None, *, idle: bool = False
@@ -205,32 +205,32 @@ class Scheduler:
 
         ``ready`` is called with the lock held and should only read a value.
         """
-        script = self._script()
+        script = self._current_script()
         until = None if timeout_s is None else self._clock() + timeout_s
         with self._lock:
             script.busy = not idle
-            self._leave_locked(script)
-            while not self._is_over(script) and not ready():
+            self._release_turn_locked(script)
+            while not self._has_ended(script) and not ready():
                 left = None if until is None else until - self._clock()
                 if left is not None and left <= 0:
                     break
                 script.wake.wait(left)
             script.busy = False
-            self._raise_if_over(script)
+            self._raise_if_ended(script)
             if not idle:
-                self._enter_locked(script)
+                self._acquire_turn_locked(script)
             return ready()
 
-    def holds(self) -> bool:
+    def is_script_paused(self) -> bool:
         """Return True if a pause holds the calling script. May be called with the lock held."""
-        return self._paused and self._stepping is not self._script()
+        return self._paused and self._stepping is not self._current_script()
 
-    def hold(self) -> None:
+    def wait_while_paused(self) -> None:
         """Wait within a block until the pause ends or the script is stepped."""
         with self._lock:
-            self._stay_locked(self._script(), lambda: None if self._paused else 0.0, step_ends=True)
+            self._wait_locked(self._current_script(), lambda: None if self._paused else 0.0, step_ends=True)
 
-    def poke(self) -> None:
+    def wake_scripts(self) -> None:
         """Wake waiting scripts so that they check their conditions."""
         with self._lock:
             self._wake_all_locked()
@@ -250,16 +250,16 @@ class Scheduler:
         """True while scripts are paused, even during a single step."""
         return self._paused
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """End the pause."""
         with self._lock:
             if self._paused:
                 self._paused_total_s += self._clock() - self._paused_since_s
             self._paused, self._stepping = False, None
-            self._grant_locked()
+            self._grant_turn_locked()
             self._wake_all_locked()
 
-    def running_s(self) -> float:
+    def running_time_s(self) -> float:
         """Return the time of a clock in seconds that stops while the program is paused."""
         with self._lock:
             return (self._paused_since_s if self._paused else self._clock()) - self._paused_total_s
@@ -267,7 +267,7 @@ class Scheduler:
     def set_pace(self, seconds: float) -> None:
         """Set the duration that each script waits at a block, in seconds; 0 for full speed."""
         self.pace_s = max(0.0, seconds)
-        self.poke()
+        self.wake_scripts()
 
     def step_once(self) -> None:
         """Run one block of the script that has waited longest. Has an effect only while paused."""
@@ -277,7 +277,7 @@ class Scheduler:
             if self._parked:
                 self._stepping = self._parked.popleft()
                 self._resuming.append(self._stepping)
-                self._grant_locked()
+                self._grant_turn_locked()
                 return
             self._stepping = next((script for script in self._scripts if script.frozen), None)
             self._wake_all_locked()
@@ -289,17 +289,17 @@ class Scheduler:
             self._wake_all_locked()
 
     @property
-    def stopping(self) -> bool:
+    def is_stopping(self) -> bool:
         """True after `stop`."""
         return self._stopping
 
-    def return_to(self, block: str | None) -> None:
+    def restore_block(self, block: str | None) -> None:
         """Set the current block of the calling script after a function call."""
-        self._script().block = block
+        self._current_script().block = block
 
     def block(self) -> str | None:
         """Return the current block of the calling script."""
-        return self._script().block
+        return self._current_script().block
 
     def snapshot(self) -> Snapshot:
         """Return the current blocks of the scripts."""
@@ -313,13 +313,13 @@ class Scheduler:
 
     # ---- the turn; call with the lock held
 
-    def _stay_locked(
+    def _wait_locked(
         self, script: Script, limit_s: Callable[[], float | None], *, step_ends: bool = False
     ) -> float:
         used = 0.0
         script.frozen = True
-        self._leave_locked(script)
-        while not self._is_over(script) and not (step_ends and self._stepping is script):
+        self._release_turn_locked(script)
+        while not self._has_ended(script) and not (step_ends and self._stepping is script):
             most = limit_s()
             if most is not None and used >= most:
                 break
@@ -330,35 +330,35 @@ class Scheduler:
             script.wake.wait(None if most is None else most - used)
             used += self._clock() - began
         script.frozen = False
-        self._enter_locked(script)
+        self._acquire_turn_locked(script)
         return used
 
-    def _script(self) -> Script:
+    def _current_script(self) -> Script:
         script = getattr(self._local, "script", None)
         if isinstance(script, Script):
             return script
         raise RuntimeError(_("this only works in a script; put it below “when started”"))
 
-    def _leave_locked(self, script: Script, *, then_park: bool = False) -> None:
+    def _release_turn_locked(self, script: Script, *, then_park: bool = False) -> None:
         if self._owner is script:
             self._owner = None
         if then_park:
             self._parked.append(script)
-        self._grant_locked()
+        self._grant_turn_locked()
 
-    def _enter_locked(self, script: Script) -> None:
+    def _acquire_turn_locked(self, script: Script) -> None:
         self._resuming.append(script)
-        self._grant_locked()
+        self._grant_turn_locked()
         self._await_turn_locked(script)
 
     def _await_turn_locked(self, script: Script) -> None:
-        while self._owner is not script and not self._is_over(script):
+        while self._owner is not script and not self._has_ended(script):
             script.wake.wait()
-        if self._is_over(script) and self._owner is not script:
-            self._forget_turn_locked(script)
-        self._raise_if_over(script)
+        if self._has_ended(script) and self._owner is not script:
+            self._discard_turn_locked(script)
+        self._raise_if_ended(script)
 
-    def _grant_locked(self) -> None:
+    def _grant_turn_locked(self) -> None:
         if self._owner is not None or self._opening:
             return
         if self._resuming:
@@ -372,24 +372,24 @@ class Scheduler:
         for script in self._scripts:
             script.wake.notify()
 
-    def _end(self, script: Script) -> None:
+    def _remove_script(self, script: Script) -> None:
         with self._lock:
             self._scripts.remove(script)
-            self._forget_turn_locked(script)
-            self._leave_locked(script)
+            self._discard_turn_locked(script)
+            self._release_turn_locked(script)
 
-    def _forget_turn_locked(self, script: Script) -> None:
+    def _discard_turn_locked(self, script: Script) -> None:
         if self._stepping is script:
             self._stepping = None
         for queue in (self._parked, self._resuming):
             if script in queue:
                 queue.remove(script)
 
-    def _is_over(self, script: Script) -> bool:
+    def _has_ended(self, script: Script) -> bool:
         return self._stopping or script.ended
 
-    def _raise_if_over(self, script: Script) -> None:
+    def _raise_if_ended(self, script: Script) -> None:
         if self._stopping:
-            raise Stopped
+            raise StopProgram
         if script.ended:
             raise EndScript

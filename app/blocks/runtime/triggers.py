@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 
-from app.blocks.runtime.scheduler import POLL_S, Scheduler
+from app.blocks.runtime.scheduler import POLL_INTERVAL_S, Scheduler
 from app.robots.description.description import Event
 
 
@@ -23,7 +23,7 @@ class Hat:
         self._condition = condition
         self._was_true: bool | None = None
 
-    def happened(self, arguments: tuple[object, ...]) -> None:
+    def enqueue(self, arguments: tuple[object, ...]) -> None:
         """Queue an event. The caller has to poke the scheduler."""
         if len(self._waiting) == self._waiting.maxlen and self._waiting.maxlen > 1:
             self.dropped += 1
@@ -34,25 +34,25 @@ class Hat:
         if self._condition is None:
             scheduler.wait_for(lambda: bool(self._waiting), idle=True)
             return self._waiting.popleft()
-        while not self._becomes_true(scheduler):
-            scheduler.wait_for(lambda: False, POLL_S, idle=True)
+        while not self._has_become_true(scheduler):
+            scheduler.wait_for(lambda: False, POLL_INTERVAL_S, idle=True)
         return ()
 
-    def _becomes_true(self, scheduler: Scheduler) -> bool:
+    def _has_become_true(self, scheduler: Scheduler) -> bool:
         if self._condition is None:
             return False
-        scheduler.look()
+        scheduler.acquire_turn()
         try:
             is_so = self._condition()
         finally:
-            scheduler.rest()
+            scheduler.finish_run()
         # A condition that is true from the start is not a change.
         became = is_so and self._was_true is False
         self._was_true = is_so
         return became
 
 
-class PassGate:
+class ThresholdTrigger:
     """Threshold trigger: calls ``passed`` when a number passes a limit to one side.
 
     An initial value beyond the limit doesn't count.
@@ -74,16 +74,16 @@ class PassGate:
         self._was_beyond = beyond
 
 
-def changes(changed: Callable[[], None]) -> Callable[[object], None]:
+def change_detector(changed: Callable[[], None]) -> Callable[[object], None]:
     """Return a callback that calls ``changed`` for each value that differs from the previous one."""
     before: list[object] = []
 
-    def told(value: object) -> None:
+    def on_value(value: object) -> None:
         if before and before[0] != value:
             changed()
         before[:] = [value]
 
-    return told
+    return on_value
 
 
 def event_matches(
@@ -99,14 +99,14 @@ def event_matches(
     """
     fields: Mapping[str, object] = data if isinstance(data, Mapping) else {}
     for name, wanted in filters.items():
-        if not _same(wanted, fields.get(name)):
+        if not _values_match(wanted, fields.get(name)):
             return False
     if event is None or not _has_level(event.name, source):
         return True
     return all(fields.get(field.name) is not False for field in event.fields if field.kind == "boolean")
 
 
-def _same(wanted: object, told: object) -> bool:
+def _values_match(wanted: object, told: object) -> bool:
     if isinstance(wanted, str) and isinstance(told, str):
         return wanted.strip().casefold() == told.strip().casefold()
     return wanted == told

@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 
-from app.blocks.runtime.errors import BehaviourError, kind
+from app.blocks.runtime.errors import BehaviourError, type_name
 from nep.i18n import _, lazy
 
 MAX_TEXT_LENGTH = 1_000_000
@@ -17,8 +17,8 @@ MAX_BITS = 14_000
 """Maximum size of a printed integer: Python rejects more than 4300 digits. Larger ones are shown as
 1.2e+4932.
 """
-_MAX_ROUNDS = 10**9
-_JOINER = "\u200d"
+_MAX_ITERATIONS = 10**9
+_ZERO_WIDTH_JOINER = "\u200d"
 
 
 def text(value: object) -> str:
@@ -33,13 +33,13 @@ def text(value: object) -> str:
         try:
             return json.dumps(value, ensure_ascii=False, default=str)
         except ValueError:  # an integer with too many digits, or a list that contains itself
-            return json.dumps(_writable(value, ()), ensure_ascii=False, default=str)
+            return json.dumps(_json_safe(value, ()), ensure_ascii=False, default=str)
     if isinstance(value, int) and value.bit_length() > MAX_BITS:
         return f"{Decimal(value):.16e}"
     return str(value)
 
 
-def _writable(value: object, around: tuple[int, ...]) -> object:
+def _json_safe(value: object, around: tuple[int, ...]) -> object:
     if isinstance(value, int) and value.bit_length() > MAX_BITS:
         return text(value)
     if not isinstance(value, (Mapping, list, tuple)):
@@ -48,8 +48,8 @@ def _writable(value: object, around: tuple[int, ...]) -> object:
         return "…"
     inside = (*around, id(value))
     if isinstance(value, Mapping):
-        return {str(_writable(key, inside)): _writable(each, inside) for key, each in value.items()}
-    return [_writable(each, inside) for each in value]
+        return {str(_json_safe(key, inside)): _json_safe(each, inside) for key, each in value.items()}
+    return [_json_safe(each, inside) for each in value]
 
 
 def is_known(value: object) -> bool:
@@ -71,10 +71,10 @@ def length(value: object) -> int:
     """Return the number of characters of a text, or of items of a list or message."""
     if isinstance(value, (list, tuple, Mapping)):
         return len(value)
-    return len(letters(text(value)))
+    return len(grapheme_clusters(text(value)))
 
 
-def letters(words: str) -> Sequence[str]:
+def grapheme_clusters(words: str) -> Sequence[str]:
     """Return the grapheme clusters of a text: accents and skin tones belong to the previous character."""
     if words.isascii():
         return words
@@ -88,7 +88,7 @@ def letters(words: str) -> Sequence[str]:
 
 
 def _is_combining(before: str, character: str) -> bool:
-    if before[-1] == _JOINER or character in (_JOINER, "\ufe0f"):
+    if before[-1] == _ZERO_WIDTH_JOINER or character in (_ZERO_WIDTH_JOINER, "\ufe0f"):
         return True
     if "\U0001f3fb" <= character <= "\U0001f3ff" or "\U000e0020" <= character <= "\U000e007f":
         return True  # skin tones, letters of a region's flag
@@ -104,7 +104,9 @@ def number(value: object, what: str) -> int | float:
             _("{what} needs a value that isn't known yet.").format(what=_(what)), unknown=True
         )
     if not isinstance(value, (int, float)):
-        raise BehaviourError(_("{what} needs a number, not {value}.").format(what=_(what), value=kind(value)))
+        raise BehaviourError(
+            _("{what} needs a number, not {value}.").format(what=_(what), value=type_name(value))
+        )
     if not math.isfinite(value):
         raise BehaviourError(_("{what} needs a finite number.").format(what=_(what)))
     return value
@@ -136,7 +138,7 @@ def random_number(low: object, high: object) -> int | float:
 
 def repeat(times: object) -> range:
     """Return the range for a loop: the number is rounded, and at least 0."""
-    return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MAX_ROUNDS)))
+    return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MAX_ITERATIONS)))
 
 
 def part(message: object, path: str) -> object:
@@ -145,11 +147,11 @@ def part(message: object, path: str) -> object:
     An empty path returns the whole message. If the message is a plain value, the path ``value`` returns it. A
     list is copied, so that changes don't affect the message.
     """
-    found = _found(message, path)
+    found = _value_at(message, path)
     return list(found) if isinstance(found, list) else found
 
 
-def _found(message: object, path: str) -> object:
+def _value_at(message: object, path: str) -> object:
     if not path:
         return message
     if isinstance(message, Mapping) and path in message:

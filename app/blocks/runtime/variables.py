@@ -15,13 +15,13 @@ ValueKind = Literal["number", "text", "boolean", "list", "unknown", "other"]
 MAX_TEXT_LENGTH = 200
 MAX_ITEM_LENGTH = 80
 MAX_ITEMS = 100
-MAX_INSIDE = 20
+MAX_NESTING_DEPTH = 20
 """Maximum depth of nested values that are displayed."""
-MAX_CHARACTERS = 200_000
+MAX_TOTAL_CHARACTERS = 200_000
 """Maximum number of characters sent at once. The remaining variables follow with the next read."""
 _MAX_PRINTED_BITS = 600
 """Maximum size of a printed integer. Larger ones are described by their number of digits, to save time."""
-_CUT = "…"
+_ELLIPSIS = "…"
 
 
 @dataclass(frozen=True)
@@ -87,13 +87,13 @@ class VariableWatch:
         """
         found, characters = [], 0
         for python, variable in self._variables.items():
-            if characters > MAX_CHARACTERS:
+            if characters > MAX_TOTAL_CHARACTERS:
                 break
             value = self._names.get(python)
-            if python in self._told and self._is_same(python, value):
+            if python in self._told and self._is_unchanged(python, value):
                 continue
             try:
-                told = brief(variable.id, value)
+                told = display_value(variable.id, value)
             except RuntimeError:
                 continue  # a script is changing the value; the next read gets it
             self._seen[python] = _comparable(value)
@@ -103,12 +103,12 @@ class VariableWatch:
                 characters += len(told.text) + sum(map(len, told.items))
         return found
 
-    def put(self, python: str, value: str | float | bool) -> None:
+    def set_value(self, python: str, value: str | float | bool) -> None:
         """Set a variable of the program. Names that aren't variables are ignored."""
         if python in self._variables:
             self._names[python] = value
 
-    def _is_same(self, python: str, value: object) -> bool:
+    def _is_unchanged(self, python: str, value: object) -> bool:
         seen = self._seen.get(python)
         if isinstance(value, list):
             return isinstance(seen, tuple) and seen == _comparable(value) and all(map(_is_plain, seen[1]))
@@ -123,13 +123,13 @@ def _is_plain(value: object) -> bool:
     return value is None or isinstance(value, (str, int, float))
 
 
-def brief(id: str, value: object) -> VariableValue:
+def display_value(id: str, value: object) -> VariableValue:
     """Return a value for display. Raises RuntimeError if a script changes the value meanwhile."""
     if value is None:
         return VariableValue(id, "unknown", _("unknown"))
     if isinstance(value, (list, tuple)):
-        items = tuple(words(each, MAX_ITEM_LENGTH) for each in value[:MAX_ITEMS])
-        return VariableValue(id, "list", words(value, MAX_TEXT_LENGTH), items, len(value))
+        items = tuple(limited_text(each, MAX_ITEM_LENGTH) for each in value[:MAX_ITEMS])
+        return VariableValue(id, "list", limited_text(value, MAX_TEXT_LENGTH), items, len(value))
     kind: ValueKind = "other"
     if isinstance(value, bool):
         kind = "boolean"
@@ -137,56 +137,56 @@ def brief(id: str, value: object) -> VariableValue:
         kind = "number"
     elif isinstance(value, str):
         kind = "text"
-    return VariableValue(id, kind, words(value, MAX_TEXT_LENGTH))
+    return VariableValue(id, kind, limited_text(value, MAX_TEXT_LENGTH))
 
 
-def brief_words(value: object) -> str:
+def short_text(value: object) -> str:
     """Return a value as short text."""
-    return words(value, MAX_TEXT_LENGTH)
+    return limited_text(value, MAX_TEXT_LENGTH)
 
 
-def words(value: object, most: int) -> str:
+def limited_text(value: object, most: int) -> str:
     """Return a value as text of at most ``most`` characters; parts that aren't shown aren't read."""
     if isinstance(value, str):
-        return _cut(value[: most + 1], most)
+        return _truncate(value[: most + 1], most)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _MAX_PRINTED_BITS:
         about = round(value.bit_length() * 0.30103)
         return _("a number with about {count} digits").format(count=about)
     if isinstance(value, (list, tuple, Mapping)):
         parts: list[str] = []
         left = most
-        for part in _parts(value, 0):
+        for part in _text_parts(value, 0):
             parts.append(part)
             left -= len(part)
             if left < 0:
                 break
-        return _cut("".join(parts), most)
-    return _cut(values.text(value), most)
+        return _truncate("".join(parts), most)
+    return _truncate(values.text(value), most)
 
 
-def _parts(value: object, depth: int) -> Iterator[str]:
+def _text_parts(value: object, depth: int) -> Iterator[str]:
     if isinstance(value, Mapping):
-        yield from _inside("{", "}", ((f"{key}: ", each) for key, each in value.items()), depth)
+        yield from _bracketed_parts("{", "}", ((f"{key}: ", each) for key, each in value.items()), depth)
     elif isinstance(value, (list, tuple)):
-        yield from _inside("[", "]", (("", each) for each in value), depth)
+        yield from _bracketed_parts("[", "]", (("", each) for each in value), depth)
     else:
-        yield words(value, MAX_ITEM_LENGTH)
+        yield limited_text(value, MAX_ITEM_LENGTH)
 
 
-def _inside(begin: str, end: str, parts: Iterator[tuple[str, object]], depth: int) -> Iterator[str]:
-    if depth >= MAX_INSIDE:
-        yield _CUT
+def _bracketed_parts(begin: str, end: str, parts: Iterator[tuple[str, object]], depth: int) -> Iterator[str]:
+    if depth >= MAX_NESTING_DEPTH:
+        yield _ELLIPSIS
         return
     yield begin
     for place, (name, each) in enumerate(parts):
         yield (", " if place else "") + name[:MAX_ITEM_LENGTH]
         if place >= MAX_ITEMS:
-            yield _CUT
+            yield _ELLIPSIS
             break
-        yield from _parts(each, depth + 1)
+        yield from _text_parts(each, depth + 1)
     yield end
 
 
-def _cut(text: str, most: int) -> str:
+def _truncate(text: str, most: int) -> str:
     text = text.replace("\n", " ")
-    return text if len(text) <= most else text[: most - 1] + _CUT
+    return text if len(text) <= most else text[: most - 1] + _ELLIPSIS

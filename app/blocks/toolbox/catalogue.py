@@ -12,7 +12,7 @@ from app.robots.description.description import Robot
 from nep.i18n import ENGLISH, language, translate
 from nep.system.plugins import discover
 
-_HOLE = re.compile(r"%[A-Za-z_][A-Za-z0-9_]*")
+_PLACEHOLDER = re.compile(r"%[A-Za-z_][A-Za-z0-9_]*")
 
 
 class Catalogue:
@@ -33,17 +33,17 @@ class Catalogue:
                 self.blocks[block.type] = block
         for robot in known:
             for category in categories():
-                for block in category.make(robot, known) if category.make else ():
+                for block in category.make_blocks(robot, known) if category.make_blocks else ():
                     self.blocks.setdefault(block.type, block)
 
 
 def categories() -> tuple[Category, ...]:
     """Return all categories in toolbox order, in the current language."""
-    return english_categories() if language() == ENGLISH else _translated(language())
+    return english_categories() if language() == ENGLISH else _translated_categories(language())
 
 
 @lru_cache(maxsize=1)
-def _translated(_language: str) -> tuple[Category, ...]:
+def _translated_categories(_language: str) -> tuple[Category, ...]:
     return tuple(category.translated(_translate) for category in english_categories())
 
 
@@ -54,10 +54,10 @@ def english_categories() -> tuple[Category, ...]:
     return tuple(sorted(found.values(), key=lambda category: (category.order, category.name)))
 
 
-def has_words(english: str) -> bool:
+def is_translatable(english: str) -> bool:
     """Return True if a text contains words that can be translated; "%A %SIGN %B" and "+" don't."""
-    return any(letter.isalpha() for letter in _HOLE.sub("", english))
+    return any(letter.isalpha() for letter in _PLACEHOLDER.sub("", english))
 
 
 def _translate(context: str | None, english: str) -> str:
-    return translate(context, english) if has_words(english) else english
+    return translate(context, english) if is_translatable(english) else english

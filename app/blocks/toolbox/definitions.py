@@ -43,11 +43,11 @@ def _toolbox(catalogue: Catalogue) -> dict[str, object]:
         robot.name: [
             group
             for category in categories()
-            for group in (category.groups(robot, known) if category.groups else ())
+            for group in (category.make_groups(robot, known) if category.make_groups else ())
         ]
         for robot in catalogue.connected.values()
     }
-    contents += [_category(each, groups) for each in categories() if each.blocks and not each.within]
+    contents += [_category(each, groups) for each in categories() if each.blocks and not each.parent]
     for robot in catalogue.connected.values():
         contents.append(_heading(robot, connected=True))
         contents += [_group(robot, group) for group in groups[robot.name]]
@@ -64,7 +64,7 @@ def _category(category: Category, groups: Mapping[str, Sequence[Group]]) -> dict
     if category.button is not None:
         words, key = category.button
         contents.append({"kind": "button", "text": words, "callbackkey": key})
-    parts = [each for each in categories() if category.name in (each.name, each.within)]
+    parts = [each for each in categories() if category.name in (each.name, each.parent)]
     for part in parts:
         if part is not category:
             contents.append({"kind": "label", "text": part.title})

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 
 from app.blocks.model.block import Block
-from app.blocks.model.block_text import reading
+from app.blocks.model.block_text import block_text
 from app.blocks.model.fields import (
     Argument,
     BroadcastField,
@@ -23,7 +23,7 @@ from app.blocks.model.fields import (
 )
 from app.blocks.model.mutators import Inputs, Items
 from app.blocks.model.workspace import parse_workspace
-from nep.i18n import _, lazy, listed, translate
+from nep.i18n import _, format_list, lazy, translate
 
 EXAMPLES: Mapping[str, str] = {
     "events_started": "For example: when started, Pepper says “Hello”.",
@@ -118,21 +118,21 @@ EXAMPLES: Mapping[str, str] = {
     "messages_message": "For example: write “message” to the console.",
     "messages_field": "For example: say “name” of the message.",
 }
-_HOLE = re.compile(r"%([A-Z][A-Z0-9_]*)")
-_NAMES = {
+_PLACEHOLDER = re.compile(r"%([A-Z][A-Z0-9_]*)")
+_SLOT_NAMES = {
     "A": "first value",
     "B": "second value",
     "BODY": "inside",
     "ELSE": "inside, below “else”",
     "VAR": "variable",
 }
-_TYPE_WORDS = {
+_TYPE_TEXTS = {
     "Number": lazy("a number"),
     "String": lazy("a text"),
     "Boolean": lazy("yes or no, such as a comparison"),
     "List": lazy("a list"),
 }
-_ANY = lazy("any value")
+_ANY_TYPE_TEXT = lazy("any value")
 _MAX_CHOICES = 6
 _MAX_UNIT_LENGTH = 3  # maximum length of a unit
 
@@ -145,9 +145,9 @@ def help_of(block: Block) -> dict[str, object]:
     fields.
     """
     gaps = [
-        [name_of_gap(block, argument), words]
+        [slot_name(block, argument), words]
         for argument in block.arguments
-        if (words := _takes(block, argument))
+        if (words := _argument_text(block, argument))
     ]
     return {
         "title": title(block),
@@ -156,27 +156,27 @@ def help_of(block: Block) -> dict[str, object]:
         "more": block.help,
         "gaps": gaps,
         "example": _example(block),
-        "words": block.words,
-        "english": block.english_words,
-        "choices": _choices(block),
+        "words": block.search_words,
+        "english": block.english_search_words,
+        "choices": _choice_texts(block),
     }
 
 
 def _example(block: Block) -> str:
     told = EXAMPLES.get(block.type)
-    return _(told) if told else _("For example: {block}.").format(block=_filled(block))
+    return _(told) if told else _("For example: {block}.").format(block=_block_with_defaults(block))
 
 
 def title(block: Block) -> str:
     """Return the text on the block with slots in parentheses: "wait (seconds) s"."""
 
-    def place(hole: re.Match[str]) -> str:
+    def slot_text(hole: re.Match[str]) -> str:
         argument = block.argument(hole[1])
         if argument is None or isinstance(argument, (LiveField, StatementInput)):
             return ""
-        return f"({name_of_gap(block, argument)})"
+        return f"({slot_name(block, argument)})"
 
-    return " ".join(_HOLE.sub(place, block.text).split())
+    return " ".join(_PLACEHOLDER.sub(slot_text, block.text).split())
 
 
 def name(block: Block) -> str:
@@ -184,50 +184,50 @@ def name(block: Block) -> str:
 
     The name is "" if the block has no words. The robot slot and a unit after the last slot are left out.
     """
-    words = [part.strip() for part in _HOLE.split(block.text.removeprefix("%ROBOT "))[::2]]
+    words = [part.strip() for part in _PLACEHOLDER.split(block.text.removeprefix("%ROBOT "))[::2]]
     if len(words) > 1 and len(words[-1]) <= _MAX_UNIT_LENGTH:
         words[-1] = ""
     told = re.sub(r"\s*…[\s…]*", " … ", "…".join(words)).strip().removesuffix(" …")
     return told if sum(letter.isalpha() for letter in told) >= _MAX_UNIT_LENGTH - 1 and told != "…" else ""
 
 
-def name_of_gap(block: Block, argument: Argument) -> str:
+def slot_name(block: Block, argument: Argument) -> str:
     """Return the display name of a slot or field."""
     told = block.about.get(argument.name)
     if told:
         return told[0]
-    return translate("gap", english_name_of_gap(argument))
+    return translate("gap", english_slot_name(argument))
 
 
-def english_name_of_gap(argument: Argument) -> str:
+def english_slot_name(argument: Argument) -> str:
     """Return the default name of a slot in English."""
-    return _NAMES.get(argument.name, argument.name.lower().replace("_", " "))
+    return _SLOT_NAMES.get(argument.name, argument.name.lower().replace("_", " "))
 
 
-def _takes(block: Block, argument: Argument) -> str:
-    words = _kind(argument)
+def _argument_text(block: Block, argument: Argument) -> str:
+    words = _kind_text(argument)
     told = block.about.get(argument.name)
     if words and told and told[1]:
         return _("{kind}, {more}").format(kind=words, more=told[1])
     return words
 
 
-def _kind(argument: Argument) -> str:
+def _kind_text(argument: Argument) -> str:
     if argument.name == "ROBOT":
         return _("which robot")
     if isinstance(argument, ValueInput):
-        return _value(argument)
+        return _value_text(argument)
     if isinstance(argument, ChoiceField):
-        return _choice(argument)
+        return _choice_text(argument)
     if isinstance(argument, NumberField):
-        return _number(argument)
-    for kind, words in _FIELD_WORDS.items():
+        return _number_text(argument)
+    for kind, words in _FIELD_TEXTS.items():
         if isinstance(argument, kind):
             return _(words)
     return ""
 
 
-_FIELD_WORDS: Mapping[type[Argument], str] = {
+_FIELD_TEXTS: Mapping[type[Argument], str] = {
     StatementInput: lazy("blocks"),
     TextField: lazy("a text, typed into the block"),
     BroadcastField: lazy("name of a message; choose one or create a new one"),
@@ -240,29 +240,29 @@ _FIELD_WORDS: Mapping[type[Argument], str] = {
 }
 
 
-def _value(gap: ValueInput) -> str:
-    words = _(_TYPE_WORDS.get(gap.check or "", _ANY))
+def _value_text(gap: ValueInput) -> str:
+    words = _(_TYPE_TEXTS.get(gap.check or "", _ANY_TYPE_TEXT))
     if isinstance(gap.default, (int, float)) and not isinstance(gap.default, bool):
         words = _("{kind}; {value} by default").format(kind=words, value=f"{gap.default:g}")
-    if gap.only is None:
+    if gap.only_if is None:
         return words
     return _("{kind}; only if you choose an item by its number").format(kind=words)
 
 
-def _choice(field: ChoiceField) -> str:
+def _choice_text(field: ChoiceField) -> str:
     names = [f"“{words}”" for words, _value in field.options]
     if len(names) > _MAX_CHOICES:
         few = ", ".join(names[: _MAX_CHOICES - 1])
         return _("one of {count} choices: {few} and others").format(count=len(names), few=few)
-    return listed(names, "or") if len(names) > 1 else _("choose one")
+    return format_list(names, "or") if len(names) > 1 else _("choose one")
 
 
-def _choices(block: Block) -> list[str]:
+def _choice_texts(block: Block) -> list[str]:
     fields = [each for each in block.arguments if isinstance(each, ChoiceField) and each.name != "ROBOT"]
     return [words for field in fields for words, _value in field.options]
 
 
-def _number(field: NumberField) -> str:
+def _number_text(field: NumberField) -> str:
     low, high = (None if each is None else f"{each:g}" for each in (field.minimum, field.maximum))
     if low is not None and high is not None:
         return _("a number from {low} to {high}").format(low=low, high=high)
@@ -271,12 +271,12 @@ def _number(field: NumberField) -> str:
     return _("a number") if high is None else _("a number of at most {high}").format(high=high)
 
 
-def _filled(block: Block) -> str:
+def _block_with_defaults(block: Block) -> str:
     workspace = parse_workspace({"blocks": {"blocks": [block.to_toolbox()]}})
-    return reading(workspace.scripts[0][0], _readable(block), {})
+    return block_text(workspace.scripts[0][0], _blocks_for_text(block), {})
 
 
-def _readable(block: Block) -> dict[str, Block]:
+def _blocks_for_text(block: Block) -> dict[str, Block]:
     number = Block("values_number", "%NUMBER", "value", "", "", "", "", (NumberField("NUMBER"),))
     words = Block("values_text", "%TEXT", "value", "", "", "", "", (TextField("TEXT"),))
     variable = Block("variables_get", "%VAR", "value", "", "", "", "", (VariableField("VAR"),))

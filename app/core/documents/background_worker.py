@@ -29,12 +29,12 @@ class BackgroundWorker(Generic[T]):
         self._thread: threading.Thread | None = None
         self._closed = False
 
-    def ask(self, owner: str, work: Callable[[], T]) -> None:
+    def submit(self, owner: str, work: Callable[[], T]) -> None:
         """Queue a job for an owner, replacing the owner's pending job."""
         with self._changed:
             self._pending[owner] = work
             if self._thread is None and not self._closed:
-                self._thread = threading.Thread(target=self._work, name=self._name, daemon=True)
+                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
                 start_deep(self._thread)
             self._changed.notify_all()
 
@@ -57,7 +57,7 @@ class BackgroundWorker(Generic[T]):
                 JOIN_TIMEOUT_S,
             )
 
-    def forget(self, owner: str) -> None:
+    def discard(self, owner: str) -> None:
         """Discard the owner's pending job and result."""
         with self._changed:
             self._pending.pop(owner, None)
@@ -73,7 +73,7 @@ class BackgroundWorker(Generic[T]):
         if self._thread is not None:
             self._thread.join(JOIN_TIMEOUT_S)
 
-    def _work(self) -> None:
+    def _run(self) -> None:
         while True:
             with self._changed:
                 self._current_owner = None

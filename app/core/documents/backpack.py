@@ -16,7 +16,7 @@ from typing import NamedTuple
 from uuid import uuid4
 
 from app.core.storage import deep_json
-from app.core.storage.atomic_file import make_private, read_whole, write_atomically
+from app.core.storage.atomic_file import make_private, read_regular_file, write_atomically
 from app.core.storage.file_lock import locked
 from app.core.storage.settings import home
 from app.errors import BackpackError
@@ -30,14 +30,14 @@ MAX_BYTES = 4_000_000
 """Maximum file size in bytes."""
 FULL = lazy("the backpack can hold at most {most} stacks; remove something first")
 _MIN_DISTANCE_S = 0.001
-_SPARE = 1_000_000  # tolerance for files of other instances when reading
+_SIZE_TOLERANCE_BYTES = 1_000_000  # tolerance for files of other instances when reading
 
 Json = Mapping[str, object]
 Stamp = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class Packed:
+class BackpackStack:
     """Stack of blocks as saved by Blockly, with the names of its variables.
 
     ``at`` is the time it was added.
@@ -52,13 +52,13 @@ class Packed:
         return {"id": self.id, "at": self.at, "block": self.block}
 
 
-class _Found(NamedTuple):
+class _Content(NamedTuple):
     """Content of the file.
 
     ``unknown`` are entries that this version can't read. The entries are preserved unchanged.
     """
 
-    items: tuple[Packed, ...] = ()
+    items: tuple[BackpackStack, ...] = ()
     unknown: tuple[object, ...] = ()
 
 
@@ -74,18 +74,18 @@ class Backpack:
         self.revision = 0
         """Counter that increases when the content changes."""
         self._clock = clock
-        self._known = _Found()
+        self._known = _Content()
         self._stamp: Stamp | None = None
         self._problem = ""
         self._reported = ""
         make_private(self.path.parent, "backpack*.json")
 
     @property
-    def items(self) -> tuple[Packed, ...]:
+    def items(self) -> tuple[BackpackStack, ...]:
         """Stacks that this version can read, newest first."""
         return self._known.items
 
-    def take_trouble(self) -> str:
+    def take_problem(self) -> str:
         """Return and clear the message about a problem with the file; "" if there is none."""
         trouble, self._problem = self._problem, ""
         return trouble
@@ -99,53 +99,54 @@ class Backpack:
         except BackpackError as error:
             self._report_once(str(error))
 
-    def put(self, blocks: Sequence[Json]) -> list[Packed]:
+    def add(self, blocks: Sequence[Json]) -> list[BackpackStack]:
         """Add stacks of blocks, the first on top. Raises BackpackError when it is full."""
         # Newer than all existing stacks, even if the clock was set back.
         newest = max([self._clock(), *(item.at + len(blocks) * _MIN_DISTANCE_S for item in self.items[:1])])
         items = [
-            Packed(uuid4().hex, newest - place * _MIN_DISTANCE_S, each) for place, each in enumerate(blocks)
+            BackpackStack(uuid4().hex, newest - place * _MIN_DISTANCE_S, each)
+            for place, each in enumerate(blocks)
         ]
         self.restore(items)
         return items
 
-    def restore(self, items: Sequence[Packed]) -> None:
+    def restore(self, items: Sequence[BackpackStack]) -> None:
         """Restore removed stacks at their positions. Raises BackpackError when it is full."""
         ids = {item.id for item in items}
         self._change(lambda found: (*(item for item in found if item.id not in ids), *items))
 
-    def remove(self, ids: Sequence[str]) -> list[Packed]:
+    def remove(self, ids: Sequence[str]) -> list[BackpackStack]:
         """Remove stacks; return those that existed. Raises BackpackError."""
-        gone: list[Packed] = []
+        gone: list[BackpackStack] = []
 
-        def without(found: tuple[Packed, ...]) -> tuple[Packed, ...]:
+        def filter_stacks(found: tuple[BackpackStack, ...]) -> tuple[BackpackStack, ...]:
             gone.extend(item for item in found if item.id in ids)
             return tuple(item for item in found if item.id not in ids)
 
-        self._change(without)
+        self._change(filter_stacks)
         return gone
 
-    def empty(self) -> list[Packed]:
+    def empty(self) -> list[BackpackStack]:
         """Remove all known stacks and return them. Raises BackpackError."""
         return self.remove([item.id for item in self.items])
 
     # -- file ------------------------------------------------------------------------------------------------
 
-    def _change(self, change: Callable[[tuple[Packed, ...]], tuple[Packed, ...]]) -> None:
+    def _change(self, change: Callable[[tuple[BackpackStack, ...]], tuple[BackpackStack, ...]]) -> None:
         with locked(self.path):
             found = self._read()
-            now = _Found(_sorted(change(found.items)), found.unknown)
+            now = _Content(_sorted(change(found.items)), found.unknown)
             if _ids(now) != _ids(found):
                 self._write(now, grows=len(now.items) > len(found.items))
             self._apply(now)
 
-    def _apply(self, found: _Found) -> None:
+    def _apply(self, found: _Content) -> None:
         if _ids(found) != _ids(self._known):
             self.revision += 1
         self._known = found
         self._stamp = _stamp(self.path)
 
-    def _write(self, found: _Found, *, grows: bool) -> None:
+    def _write(self, found: _Content, *, grows: bool) -> None:
         if grows and len(found.items) > MAX_STACKS:
             raise BackpackError(
                 _("the backpack can hold at most {most} stacks; remove something first").format(
@@ -172,12 +173,12 @@ class Backpack:
                 )
             ) from error
 
-    def _read(self) -> _Found:
+    def _read(self) -> _Content:
         # Raises BackpackError when it can't be read now; a damaged file is renamed.
         try:
-            data = read_whole(self.path, MAX_BYTES + _SPARE)
+            data = read_regular_file(self.path, MAX_BYTES + _SIZE_TOLERANCE_BYTES)
         except (FileNotFoundError, NotADirectoryError):
-            return _Found()
+            return _Content()
         except OSError as error:
             raise BackpackError(
                 _("can't read the backpack from '{path}': {reason}").format(
@@ -187,15 +188,15 @@ class Backpack:
         try:
             whole = deep_json.loads(data)
         except (ValueError, RecursionError):
-            return self._set_aside()
+            return self._rename_damaged_file()
         if isinstance(whole, dict) and _is_newer(whole.get("backpack")):
-            return self._use_own_file()
+            return self._switch_to_own_file()
         if not isinstance(whole, dict) or whole.get("backpack") != VERSION:
-            return self._set_aside()
+            return self._rename_damaged_file()
         entries = whole.get("items")
         if not isinstance(entries, list):
-            return self._set_aside()
-        parsed = [(entry, _packed(entry)) for entry in entries]
+            return self._rename_damaged_file()
+        parsed = [(entry, _parse_stack(entry)) for entry in entries]
         unknown = tuple(entry for entry, item in parsed if item is None)
         if unknown:
             self._report_once(
@@ -205,14 +206,14 @@ class Backpack:
                     len(unknown),
                 ).format(count=len(unknown), path=self.path)
             )
-        return _Found(_sorted(item for _entry, item in parsed if item is not None), unknown)
+        return _Content(_sorted(item for _entry, item in parsed if item is not None), unknown)
 
-    def _use_own_file(self) -> _Found:
+    def _switch_to_own_file(self) -> _Content:
         # The file of a newer Studio stays unchanged; a file of this version is used in addition.
         newer = self.path
         self.path = newer.with_name(f"backpack.format-{VERSION}.json")
         if self.path == newer:
-            return self._set_aside()
+            return self._rename_damaged_file()
         if not self.path.exists():
             self._report_once(
                 _(
@@ -222,7 +223,7 @@ class Backpack:
             )
         return self._read()
 
-    def _set_aside(self) -> _Found:
+    def _rename_damaged_file(self) -> _Content:
         # The damaged file is kept under another name.
         place = self.path.with_name(f"{self.path.stem}.damaged.json")
         again = 2
@@ -242,7 +243,7 @@ class Backpack:
                 path=place
             )
         )
-        return _Found()
+        return _Content()
 
     def _report_once(self, sentence: str) -> None:
         # Once: a persistent problem is not repeated at each read.
@@ -254,16 +255,16 @@ def _is_newer(version: object) -> bool:
     return isinstance(version, int) and not isinstance(version, bool) and version > VERSION
 
 
-def _sorted(items: Iterable[Packed]) -> tuple[Packed, ...]:
+def _sorted(items: Iterable[BackpackStack]) -> tuple[BackpackStack, ...]:
     return tuple(sorted(items, key=lambda item: (-item.at, item.id)))
 
 
-def _ids(found: _Found) -> list[str]:
+def _ids(found: _Content) -> list[str]:
     # Identifies the content: a stack in the backpack never changes.
     return [item.id for item in found.items]
 
 
-def _packed(entry: object) -> Packed | None:
+def _parse_stack(entry: object) -> BackpackStack | None:
     if not isinstance(entry, Mapping):
         return None
     id, at, block = entry.get("id"), entry.get("at"), entry.get("block")
@@ -271,7 +272,7 @@ def _packed(entry: object) -> Packed | None:
         return None
     if not isinstance(block, Mapping) or not isinstance(block.get("type"), str):
         return None
-    return Packed(id, float(at), block)
+    return BackpackStack(id, float(at), block)
 
 
 def _stamp(path: Path) -> Stamp | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from app.blocks.model.workspace import Placed, parse_workspace
+from app.blocks.model.workspace import PlacedBlock, parse_workspace
 from app.core.storage import deep_json
 
 Workspace = Mapping[str, object]
@@ -22,11 +22,11 @@ class Difference:
         changed: Number of blocks whose fields, values or texts differ.
     """
 
-    blocks: int
+    block_count: int
     added: int = 0
     removed: int = 0
     changed: int = 0
-    moved: bool = False
+    is_rearranged: bool = False
     """True if the same blocks are arranged differently."""
 
 
@@ -43,14 +43,14 @@ def difference(then: Workspace, now: Workspace) -> Difference:
         removed=len(old.keys() - new.keys()),
         changed=sum(old[id] != new[id] for id in stayed),
     )
-    if result != Difference(len(old)) or _same(then, now):
+    if result != Difference(len(old)) or _are_equal(then, now):
         return result
-    return Difference(len(old), moved=True)
+    return Difference(len(old), is_rearranged=True)
 
 
-def _same(then: Workspace, now: Workspace) -> bool:
+def _are_equal(then: Workspace, now: Workspace) -> bool:
     try:
-        return deep_json.same(then, now)
+        return deep_json.are_equal(then, now)
     except RecursionError:
         return False
 
@@ -62,7 +62,7 @@ def _blocks(workspace: Workspace) -> Iterator[tuple[str, object]]:
             yield block.id, _content(block)
 
 
-def _content(block: Placed) -> object:
+def _content(block: PlacedBlock) -> object:
     inside = {
         name: [_content(inner) for inner in held if inner.shadow] for name, held in block.inputs.items()
     }
@@ -70,6 +70,6 @@ def _content(block: Placed) -> object:
         block.type,
         dict(block.fields),
         block.enabled,
-        dict(block.extra),
+        dict(block.extra_state),
         {k: v for k, v in inside.items() if v},
     )

@@ -13,23 +13,23 @@ from pathlib import Path
 from app.blocks import Problem, Program, compile_behaviour, editor_definitions
 from app.blocks.compiler.stack import Stack
 from app.blocks.fixes.fixes import fix
-from app.blocks.fixes.replace_robot import blocks_of, use_robot
+from app.blocks.fixes.replace_robot import blocks_of, with_robot_replaced
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.documents.examples import translated
 from app.core.documents.file_format import (
-    DIVIDE,
-    TOO_DEEP,
+    SPLIT_ADVICE,
+    TOO_DEEP_MESSAGE,
     BehaviourFile,
     Descriptions,
     Workspace,
     read_file,
     write_file,
 )
-from app.core.documents.journal import Journal, Unsaved
-from app.core.documents.rename import path_named, rename_file, why_not
+from app.core.documents.journal import Journal, UnsavedWork
+from app.core.documents.rename import name_problem, rename_file, renamed_path
 from app.core.documents.titles import name_of
-from app.core.documents.versions import Stamp, follow_file, stamp_of
-from app.core.documents.workspace_json import LONG_CHARACTERS, WorkspaceJson
+from app.core.documents.versions import Stamp, rename_versions, stamp_of
+from app.core.documents.workspace_json import LONG_TEXT_LENGTH, WorkspaceJson
 from app.core.storage import deep_json
 from app.errors import DescriptionError, DocumentError
 from app.robots.description.description import Robot, parse
@@ -45,12 +45,12 @@ _keys = itertools.count(1)
 
 
 @dataclass(frozen=True)
-class Compiled:
+class CompiledProgram:
     """Compiled program, the key of its source, and the compile time."""
 
     key: Key
     program: Program
-    seconds: float
+    compile_s: float
 
 
 class Document:
@@ -74,7 +74,7 @@ class Document:
         self.path: Path | None = None
         self.name = _(UNNAMED)
         self.others: Mapping[str, object] = {}
-        self._json = WorkspaceJson.of({})
+        self._json = WorkspaceJson.from_blocks({})
         self.robots: dict[str, Mapping[str, object]] = {}
         self._read: dict[str, tuple[Mapping[str, object], Robot | None]] = {}
         """Cache of parsed robot descriptions: parsing one takes 15 ms, and every edit needs all of them."""
@@ -90,7 +90,7 @@ class Document:
         self._compiled: tuple[Key, Program] | None = None
         self._compile_s: float | None = None
         self._compiling_key: Key | None = None
-        self.compiler: BackgroundWorker[Compiled] | None = None
+        self.compiler: BackgroundWorker[CompiledProgram] | None = None
         self.journal_writer: BackgroundWorker[bool] | None = None
         self._definitions: tuple[int, Mapping[str, object]] | None = None
         self._journal_error: str | None = None
@@ -104,17 +104,17 @@ class Document:
 
     @workspace.setter
     def workspace(self, blocks: Workspace) -> None:
-        self._json = WorkspaceJson.of(blocks)
+        self._json = WorkspaceJson.from_blocks(blocks)
 
     @property
     def has_blocks(self) -> bool:
         """True if the behaviour contains at least one block."""
         return self._json.has_blocks
 
-    def edited(self, workspace: Workspace | WorkspaceJson) -> None:
+    def apply_edit(self, workspace: Workspace | WorkspaceJson) -> None:
         """Apply an edit from the editor and write it to the journal. Does not block on the disk."""
-        edited = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.of(workspace)
-        if edited.same_as(self._json):
+        edited = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.from_blocks(workspace)
+        if edited.is_equal_to(self._json):
             return
         self._json = edited
         self.dirty = True
@@ -132,7 +132,7 @@ class Document:
         self.saved_at = path.stat().st_mtime
         self._stamp = stamp_of(path)
 
-    def example(self, path: Path) -> None:
+    def open_example(self, path: Path) -> None:
         """Open an example as a new, unsaved behaviour, translated into the current language.
 
         Raises DocumentError.
@@ -146,21 +146,21 @@ class Document:
     def duplicate(self, other: Document, name: str) -> None:
         """Copy the blocks of another behaviour into this one, which is new and unsaved."""
         self._replace(BehaviourFile(name, {}, other.robots, other.others), None)
-        self.edited(other.workspace)
+        self.apply_edit(other.workspace)
 
-    def recover(self, unsaved: Unsaved) -> None:
+    def recover(self, unsaved: UnsavedWork) -> None:
         """Restore the unsaved work of a crashed session.
 
         The behaviour is unsaved, and is written to a new journal before the old one is deleted.
         """
-        found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.others)
+        found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.unknown_fields)
         self._replace(found, unsaved.path)
         now = stamp_of(unsaved.path) if unsaved.path is not None else None
         if now is not None and now[0] <= unsaved.edited_s * 1e9:
             self._stamp = now  # the file was not changed after that work
         self.dirty = True
         self._write_journal()
-        if self.is_kept:
+        if self.is_on_disk:
             unsaved.journal.unlink(missing_ok=True)
 
     def save(self, path: Path | None = None) -> None:
@@ -185,14 +185,14 @@ class Document:
         If DocumentError is raised, nothing has changed.
         """
         wanted = name.strip()
-        problem = why_not(wanted, self.path)
+        problem = name_problem(wanted, self.path)
         if problem:
             raise DocumentError(self.path, problem)
-        new = path_named(self.path, wanted) if self.path is not None else None
+        new = renamed_path(self.path, wanted) if self.path is not None else None
         if self.path is not None and new is not None and new != self.path:
-            changed = self.changed_outside
+            changed = self.is_changed_externally
             rename_file(self.path, new)
-            follow_file(self.path, new)
+            rename_versions(self.path, new)
             self.path = new
             self._stamp = self._stamp if changed else stamp_of(new)
         elif self.path is not None and wanted != self.name:
@@ -207,10 +207,10 @@ class Document:
 
         Returns False if the action does not change blocks.
         """
-        fixed = deep_json.deeply(lambda: fix(self.workspace, action))
+        fixed = deep_json.run_deep(lambda: fix(self.workspace, action))
         if fixed is None:
             return False
-        self.edited(fixed)
+        self.apply_edit(fixed)
         self.fixes += 1
         return True
 
@@ -219,37 +219,39 @@ class Document:
 
         Return False if no block uses the missing one.
         """
-        known = next((each for each in self._known() if each.name == missing), None)
+        known = next((each for each in self._known_robots() if each.name == missing), None)
         if known is None or not blocks_of(self.workspace, missing):
             return False
-        workspace = deep_json.deeply(lambda: use_robot(self.workspace, missing, known.model, robot))
-        self.edited(workspace)
+        workspace = deep_json.run_deep(
+            lambda: with_robot_replaced(self.workspace, missing, known.model, robot)
+        )
+        self.apply_edit(workspace)
         self.fixes += 1
         return True
 
-    def lose_file(self) -> None:
+    def detach_file(self) -> None:
         """Detach the file, because another behaviour was saved to it: the blocks become unsaved."""
         self.path, self.dirty = None, True
         self._write_journal()
 
-    def file_went_back(self) -> None:
+    def on_file_reverted(self) -> None:
         """Mark the behaviour as unsaved, because the last save of its file was undone."""
         self.dirty, self._stamp = True, stamp_of(self.path) if self.path is not None else None
         self._write_journal()
 
     @property
-    def changed_outside(self) -> bool:
+    def is_changed_externally(self) -> bool:
         """True if another program changed the file since it was opened or saved."""
         now = stamp_of(self.path) if self.path is not None else None
         return now is not None and now != self._stamp
 
     @property
-    def blank(self) -> bool:
+    def is_blank(self) -> bool:
         """True for a new, unchanged and empty behaviour, whose tab may be used for another one."""
         return self.path is None and not self.dirty and not self.workspace
 
     @property
-    def journal(self) -> str:
+    def journal_name(self) -> str:
         """File name of the journal."""
         return self._journal.name
 
@@ -264,16 +266,16 @@ class Document:
         return self._journal_error
 
     @property
-    def is_kept(self) -> bool:
+    def is_on_disk(self) -> bool:
         """True if the newest state is on disk. Waits at most 2 s for a write in progress."""
         finished = self.journal_writer is None or self.journal_writer.finish(self._journal.name)
         return finished and self.journal_error is None
 
-    def keep_again(self) -> bool:
+    def retry_journal(self) -> bool:
         """Retry a failed write of the journal; return True if all unsaved work is on disk."""
-        if self.dirty and not self.is_kept:
+        if self.dirty and not self.is_on_disk:
             self._write_journal()
-        return not self.dirty or self.is_kept
+        return not self.dirty or self.is_on_disk
 
     def close(self) -> None:
         """Close the behaviour when the window closes.
@@ -301,29 +303,31 @@ class Document:
             self.definitions_revision += 1
 
     @property
-    def absent(self) -> tuple[Robot, ...]:
+    def absent_robots(self) -> tuple[Robot, ...]:
         """Robots that the behaviour uses and that are not connected."""
         there = {robot.name for robot in self._connected}
-        return tuple(robot for robot in self._known() if robot.name not in there)
+        return tuple(robot for robot in self._known_robots() if robot.name not in there)
 
     def program(self) -> Program:
         """Return the compiled program for the known robots. The result is cached until the next edit."""
         key = self._key()
         if self._compiled is None or self._compiled[0] != key:
             began = self._timer()
-            self._compiled = (key, self._compiling()())
+            self._compiled = (key, self._compile_job()())
             self._compile_s = self._timer() - began
         return self._compiled[1]
 
-    def try_program(self, stack: Stack) -> Program | None:
+    def trial_program(self, stack: Stack) -> Program | None:
         """Compile one stack of blocks as a program; None if the stack no longer exists."""
-        workspace = deep_json.deeply(lambda: stack.workspace(self.workspace))
+        workspace = deep_json.run_deep(lambda: stack.workspace(self.workspace))
         if workspace is None:
             return None
-        program = _compile(WorkspaceJson.of(workspace), self._connected, self.absent, self.name)
+        program = _compile(
+            WorkspaceJson.from_blocks(workspace), self._connected, self.absent_robots, self.name
+        )
         return replace(program, shows_value=stack.is_value)
 
-    def newest(self) -> Program | None:
+    def newest_program(self) -> Program | None:
         """Return the newest compiled program; long behaviours are compiled in the background.
 
         The program may be that of an earlier edit; None while a long behaviour is compiled for the first
@@ -336,25 +340,25 @@ class Document:
             return self.program()
         done = self.compiler.pop_result(self.key)
         if done is not None:
-            self._compiled, self._compile_s = (done.key, done.program), done.seconds
+            self._compiled, self._compile_s = (done.key, done.program), done.compile_s
         if self._compiling_key != key:
             if self._is_quick_to_compile():
                 return self.program()
             self._compiling_key = key
-            self.compiler.ask(self.key, partial(_compiled, key, self._compiling(), self._timer))
+            self.compiler.submit(self.key, partial(_compile_timed, key, self._compile_job(), self._timer))
         return self._compiled[1] if self._compiled is not None else None
 
     def _is_quick_to_compile(self) -> bool:
         if self._compile_s is not None:
             return self._compile_s < INLINE_COMPILE_S
-        return self._compiling_key is None and not self._json.is_longer_than(LONG_CHARACTERS)
+        return self._compiling_key is None and not self._json.is_longer_than(LONG_TEXT_LENGTH)
 
     def _key(self) -> Key:
         return self.revision, self.edits, self.definitions_revision
 
-    def _compiling(self) -> Callable[[], Program]:
+    def _compile_job(self) -> Callable[[], Program]:
         # Compiles the current state; it may run in any thread, and parses there.
-        return partial(_compile, self._json, self._connected, self.absent, self.name)
+        return partial(_compile, self._json, self._connected, self.absent_robots, self.name)
 
     def problems(self) -> tuple[Problem, ...]:
         """Return the problems that the compiler found."""
@@ -363,7 +367,7 @@ class Document:
     def definitions(self) -> Mapping[str, object]:
         """Return the block and toolbox definitions for the editor, including those of connected robots."""
         if self._definitions is None or self._definitions[0] != self.definitions_revision:
-            definitions = editor_definitions(self._connected, self.absent, self._topics)
+            definitions = editor_definitions(self._connected, self.absent_robots, self._topics)
             self._definitions = (self.definitions_revision, definitions)
         return self._definitions[1]
 
@@ -374,7 +378,7 @@ class Document:
         self._journal = self._make_journal()
         self.name = name_of(path, found.name) if path is not None else found.name
         self.path, self.workspace = path, found.workspace
-        self.robots, self.others = dict(found.robots), found.others
+        self.robots, self.others = dict(found.robots), found.unknown_fields
         self._compile_s = self._compiling_key = None
         self.dirty = False
         self.saved_at = self._stamp = None
@@ -385,7 +389,7 @@ class Document:
         name, path, robots = self.name, self.path, dict(self.robots)
         work = partial(_write_entry, self._journal, name, path, self._json, robots, self.others)
         if self.journal_writer is not None:
-            self.journal_writer.ask(self._journal.name, work)
+            self.journal_writer.submit(self._journal.name, work)
         else:
             self._apply_journal_result(work)
 
@@ -399,16 +403,16 @@ class Document:
             )
         except RecursionError:
             self._journal_error = _("can't back up unsaved work: {reason}; {advice}").format(
-                reason=_(TOO_DEEP), advice=_(DIVIDE)
+                reason=_(TOO_DEEP_MESSAGE), advice=_(SPLIT_ADVICE)
             )
         else:
             self._journal_error = None if ended else self._journal_error
 
     def _discard_journal(self) -> None:
         if self.journal_writer is not None:
-            self.journal_writer.forget(self._journal.name)
+            self.journal_writer.discard(self._journal.name)
             self.journal_writer.finish(self._journal.name)  # otherwise it would write the discarded state
-            self.journal_writer.forget(self._journal.name)
+            self.journal_writer.discard(self._journal.name)
         self._journal.discard()
         self._journal_error = None
 
@@ -422,12 +426,12 @@ class Document:
             if json.dumps(robot.name, ensure_ascii=False) in text:
                 self.robots[robot.name] = dict(robot.source)
 
-    def _known(self) -> list[Robot]:
+    def _known_robots(self) -> list[Robot]:
         before, self._read = self._read, {}
         for name, description in self.robots.items():
             known = before.get(name)
-            is_known = known is not None and _are_same(known[0], description)
-            self._read[name] = known if known and is_known else (description, _parsed(description))
+            is_known = known is not None and _are_equal(known[0], description)
+            self._read[name] = known if known and is_known else (description, _parse_robot(description))
         return [robot for _description, robot in self._read.values() if robot is not None]
 
 
@@ -443,23 +447,23 @@ def _write_entry(
     return True
 
 
-def _compiled(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> Compiled:
+def _compile_timed(key: Key, compiling: Callable[[], Program], timer: Callable[[], float]) -> CompiledProgram:
     began = timer()
-    return Compiled(key, compiling(), timer() - began)
+    return CompiledProgram(key, compiling(), timer() - began)
 
 
 def _compile(told: WorkspaceJson, robots: Sequence[Robot], absent: Sequence[Robot], name: str) -> Program:
     return compile_behaviour(told.blocks, robots, absent=absent, name=name)
 
 
-def _are_same(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
+def _are_equal(one: Mapping[str, object], other: Mapping[str, object]) -> bool:
     try:
         return one == other
     except RecursionError:
         return False  # a file may be nested arbitrarily deep
 
 
-def _parsed(description: Mapping[str, object]) -> Robot | None:
+def _parse_robot(description: Mapping[str, object]) -> Robot | None:
     try:
         return parse(description)
     except DescriptionError:

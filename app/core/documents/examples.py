@@ -26,11 +26,11 @@ NAME, ABOUT, TEXT, LABEL, NOTE = (
 function, and the comment next to the blocks.
 """
 
-Say = Callable[[str, str], str]
+TranslateText = Callable[[str, str], str]
 """Translates an English text in a context."""
 
 
-def translated(example: BehaviourFile, translate_text: Say = translate) -> BehaviourFile:
+def translated(example: BehaviourFile, translate_text: TranslateText = translate) -> BehaviourFile:
     """Return a translated copy of an example of Studio; don't use it for a file of the user.
 
     Equal English texts get equal translations, so that comparisons still work.
@@ -45,15 +45,15 @@ def translated(example: BehaviourFile, translate_text: Say = translate) -> Behav
             names[english] = english if is_taken else translation
         return names[english]
 
-    workspace = _translated(example.workspace, translate_text, label)
-    others = dict(example.others)
+    workspace = _translate_value(example.workspace, translate_text, label)
+    others = dict(example.unknown_fields)
     if isinstance(about := others.get("description"), str):
         others["description"] = translate_text(ABOUT, about)
     return replace(
         example,
         name=translate_text(NAME, example.name),
         workspace=workspace if isinstance(workspace, Mapping) else example.workspace,
-        others=others,
+        unknown_fields=others,
     )
 
 
@@ -67,13 +67,13 @@ def example_block_ids() -> frozenset[str]:
     )
 
 
-def _translated(value: object, say: Say, label: Callable[[str], str]) -> object:
+def _translate_value(value: object, say: TranslateText, label: Callable[[str], str]) -> object:
     # A part of the blocks in Blockly's format.
     if isinstance(value, list):
-        return [_translated(each, say, label) for each in value]
+        return [_translate_value(each, say, label) for each in value]
     if not isinstance(value, Mapping):
         return value
-    result = {key: _translated(each, say, label) for key, each in value.items()}
+    result = {key: _translate_value(each, say, label) for key, each in value.items()}
     kind, fields = result.get("type"), result.get("fields")
     if kind == "values_text" and isinstance(fields, dict) and _has_letters(fields.get("TEXT")):
         fields["TEXT"] = say(TEXT, str(fields["TEXT"]))

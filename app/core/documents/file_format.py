@@ -11,19 +11,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.core.storage import deep_json
-from app.core.storage.atomic_file import MAX_BYTES, read_whole, write_atomically
+from app.core.storage.atomic_file import MAX_BYTES, read_regular_file, write_atomically
 from app.errors import DocumentError
 from nep.i18n import _, lazy, number
 
 FORMAT = "nep-behaviour"
 VERSION = 1
 SUFFIX = ".nepb"
-TOO_DEEP = lazy("one stack has more than 4000 blocks")
-FROM_BEFORE = lazy("open an earlier copy")
-DIVIDE = lazy("split it into several scripts")
-FULL = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
+TOO_DEEP_MESSAGE = lazy("one stack has more than 4000 blocks")
+OPEN_EARLIER_ADVICE = lazy("open an earlier copy")
+SPLIT_ADVICE = lazy("split it into several scripts")
+DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
 """Error numbers that mean a full disk, a file at its maximum size or an exhausted quota."""
-OURS = frozenset({"format", "version", "name", "workspace", "robots"})
+KNOWN_FIELDS = frozenset({"format", "version", "name", "workspace", "robots"})
 
 Workspace = Mapping[str, object]
 Descriptions = Mapping[str, Mapping[str, object]]
@@ -36,7 +36,7 @@ class BehaviourFile:
     name: str
     workspace: Workspace
     robots: Descriptions
-    others: Mapping[str, object] = field(default_factory=dict)
+    unknown_fields: Mapping[str, object] = field(default_factory=dict)
 
 
 def read_file(path: Path, name: str = "") -> BehaviourFile:
@@ -46,7 +46,7 @@ def read_file(path: Path, name: str = "") -> BehaviourFile:
     """
     name = name or path.name
     try:
-        data = read_whole(path)
+        data = read_regular_file(path)
     except OSError as error:
         words = _("can't read {file} ({reason})")
         raise DocumentError(path, words.format(file=name, reason=error.strerror or error)) from error
@@ -66,20 +66,20 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
         content = deep_json.loads(data)  # UTF-8, or UTF-16 or UTF-32 as some editors on Windows save it
     except (ValueError, RecursionError) as error:
         damaged = _("{file} is damaged or not a behaviour").format(file=name)
-        raise DocumentError(path, damaged, _(FROM_BEFORE)) from error
+        raise DocumentError(path, damaged, _(OPEN_EARLIER_ADVICE)) from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise DocumentError(path, _("{file} is not a behaviour").format(file=name), what_behaviours_are())
+        raise DocumentError(path, _("{file} is not a behaviour").format(file=name), file_type_hint())
     version = content.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise DocumentError(path, _("{file} has no format version").format(file=name), _(FROM_BEFORE))
+        raise DocumentError(path, _("{file} has no format version").format(file=name), _(OPEN_EARLIER_ADVICE))
     if version > VERSION:
         newer = _("{file} was saved by a newer NEP Studio (version {version}) and is unchanged")
         raise DocumentError(path, newer.format(file=name, version=version), _("update this one"))
     workspace, robots = content.get("workspace"), content.get("robots", {})
     if not isinstance(workspace, dict) or not isinstance(robots, dict):
-        raise DocumentError(path, _("{file} has no blocks").format(file=name), _(FROM_BEFORE))
+        raise DocumentError(path, _("{file} has no blocks").format(file=name), _(OPEN_EARLIER_ADVICE))
     described = {str(name): td for name, td in robots.items() if isinstance(td, dict)}
-    others = {name: value for name, value in content.items() if name not in OURS}
+    others = {name: value for name, value in content.items() if name not in KNOWN_FIELDS}
     called = content.get("name")
     return BehaviourFile(
         called if isinstance(called, str) and called else path.stem, workspace, described, others
@@ -97,7 +97,7 @@ def file_bytes(behaviour: BehaviourFile) -> bytes:
         "name": behaviour.name,
         "workspace": behaviour.workspace,
         "robots": behaviour.robots,
-        **behaviour.others,
+        **behaviour.unknown_fields,
     }
     return deep_json.dumps(content, indent=1).encode("utf-8", "surrogatepass")
 
@@ -116,19 +116,19 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
             raise DocumentError(path, template, advice)
         write_atomically(path, data)
     except RecursionError as error:
-        words = _("can't write {file}: {reason}").format(file=path.name, reason=_(TOO_DEEP))
-        raise DocumentError(path, words, _(DIVIDE)) from error
+        words = _("can't write {file}: {reason}").format(file=path.name, reason=_(TOO_DEEP_MESSAGE))
+        raise DocumentError(path, words, _(SPLIT_ADVICE)) from error
     except OSError as error:
         reason = error.strerror or str(error)
         words = _("can't write {file} ({reason})").format(file=path.name, reason=reason)
         advice = (
             _("free some space or choose another folder")
-            if error.errno in FULL
+            if error.errno in DISK_FULL_ERRNOS
             else _("save it in another folder")
         )
         raise DocumentError(path, words, advice) from error
 
 
-def what_behaviours_are() -> str:
+def file_type_hint() -> str:
     """Return a hint about the file extension of behaviours, for a file that isn't one."""
     return _("the file name of a behaviour ends in {suffix}").format(suffix=SUFFIX)

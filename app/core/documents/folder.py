@@ -12,8 +12,8 @@ from app.core.documents.file_format import SUFFIX
 from nep.i18n import _
 
 MAX_ENTRIES = 5000
-REFUSED = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
-RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+INVALID_CHARACTERS = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
+RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 """File names that Windows reserves. They are rejected everywhere, so that files work on every system."""
 MAX_NAME_LENGTH = 120
 
@@ -50,21 +50,21 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
     return tuple(entries)
 
 
-def name_refusal(name: str) -> str:
+def name_problem(name: str) -> str:
     """Return why a name is invalid for a file or folder; "" if it is valid."""
-    bad = REFUSED.search(name)
+    bad = INVALID_CHARACTERS.search(name)
     if bad:
         return _("A name can't contain “{sign}”.").format(sign=bad[0])
     if name.startswith("."):
         return _("A name that begins with a full stop hides the file.")
-    if RESERVED.fullmatch(name) or name.endswith((".", " ")):
+    if RESERVED_NAMES.fullmatch(name) or name.endswith((".", " ")):
         return _("Some computers don't support this file name. Choose another one.")
     if len(name) > MAX_NAME_LENGTH:
         return _("This name is too long.")
     return ""
 
 
-def whole_path(typed: str) -> Path | None:
+def parse_absolute_path(typed: str) -> Path | None:
     """Return the path if the typed text is an absolute path; None if it is a name."""
     path = Path(typed).expanduser() if typed.startswith("~") else Path(typed)
     return path if path.is_absolute() and path.name else None

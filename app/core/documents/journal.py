@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.core.storage import deep_json
-from app.core.storage.atomic_file import make_private, read_whole, write_atomically
+from app.core.storage.atomic_file import make_private, read_regular_file, write_atomically
 from app.core.storage.settings import home
 from nep.system.lazy_import import lazy_module
 
@@ -36,7 +36,7 @@ reduced.
 
 
 @dataclass(frozen=True, slots=True)
-class Unsaved:
+class UnsavedWork:
     """Unsaved work of a crashed session, with its name, its file and the time of the last edit."""
 
     journal: Path
@@ -45,7 +45,7 @@ class Unsaved:
     edited_s: float
     workspace: Mapping[str, object]
     robots: Mapping[str, Mapping[str, object]]
-    others: Mapping[str, object] = field(default_factory=dict)
+    unknown_fields: Mapping[str, object] = field(default_factory=dict)
 
 
 class Journal:
@@ -78,7 +78,7 @@ class Journal:
         entry = {
             "format": FORMAT,
             "pid": os.getpid(),
-            "born_s": _own_birth(os.getpid()),
+            "born_s": _process_start_s(os.getpid()),
             "name": name,
             "path": str(path) if path is not None else None,
             "edited_s": self._clock(),
@@ -98,7 +98,7 @@ class Journal:
             self._file.unlink(missing_ok=True)
 
 
-def left_behind(folder: Path | None = None) -> list[Unsaved]:
+def unsaved_work(folder: Path | None = None) -> list[UnsavedWork]:
     """Return the unsaved work of crashed sessions, newest first. Unreadable journals are left unchanged."""
     folder = folder if folder is not None else home() / "journal"
     make_private(folder, "*.json")
@@ -106,7 +106,7 @@ def left_behind(folder: Path | None = None) -> list[Unsaved]:
     return sorted((entry for entry in found if entry is not None), key=lambda entry: -entry.edited_s)
 
 
-def of_newer(folder: Path | None = None) -> list[str]:
+def newer_work_names(folder: Path | None = None) -> list[str]:
     """Return the names of unsaved work written by a newer Studio; those journals are left unchanged."""
     folder = folder if folder is not None else home() / "journal"
     found = []
@@ -120,8 +120,8 @@ def of_newer(folder: Path | None = None) -> list[str]:
 def _entry(file: Path) -> dict[str, object] | None:
     # None for a malformed journal, or one that is still in use.
     try:
-        entry = deep_json.loads(read_whole(file, MAX_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
-        if not isinstance(entry, dict) or _alive(int(entry["pid"]), float(entry["born_s"])):
+        entry = deep_json.loads(read_regular_file(file, MAX_JOURNAL_BYTES).decode("utf-8", "surrogatepass"))
+        if not isinstance(entry, dict) or _is_running(int(entry["pid"]), float(entry["born_s"])):
             return None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
@@ -134,32 +134,32 @@ def _format_of(entry: Mapping[str, object]) -> int:
     return found if isinstance(found, int) else 1
 
 
-def _read(file: Path) -> Unsaved | None:
+def _read(file: Path) -> UnsavedWork | None:
     entry: Any = _entry(file)
     if entry is None or _format_of(entry) > FORMAT:
         return None
     try:
         path = entry["path"]
-        return Unsaved(
+        return UnsavedWork(
             journal=file,
             name=str(entry["name"]),
             path=Path(path) if path is not None else None,
             edited_s=float(entry["edited_s"]),
             workspace=dict(entry["workspace"]),
             robots={str(name): dict(td) for name, td in dict(entry["robots"]).items()},
-            others=dict(entry.get("others", {})),
+            unknown_fields=dict(entry.get("others", {})),
         )
     except (ValueError, KeyError, TypeError):
         return None
 
 
 @lru_cache(maxsize=1)
-def _own_birth(pid: int) -> float:
+def _process_start_s(pid: int) -> float:
     # Cached by process id, because a fork has another one.
     return psutil.Process(pid).create_time()
 
 
-def _alive(pid: int, born_s: float) -> bool:
+def _is_running(pid: int, born_s: float) -> bool:
     # the process id alone may have been reused
     try:
         process = psutil.Process(pid)

@@ -10,14 +10,14 @@ from pathlib import Path
 
 from app.blocks import editor_definitions
 from app.core.documents.background_worker import BackgroundWorker
-from app.core.documents.document import UNNAMED, Compiled, Document
-from app.core.documents.journal import Unsaved
-from app.core.documents.titles import told_apart
+from app.core.documents.document import UNNAMED, CompiledProgram, Document
+from app.core.documents.journal import UnsavedWork
+from app.core.documents.titles import unique_titles
 from app.errors import DocumentError
 from app.robots.description.description import Robot
 from nep.i18n import _
 
-CLOSED_KEPT = 20
+MAX_CLOSED = 20
 
 
 class Documents:
@@ -28,7 +28,7 @@ class Documents:
         self._robots: tuple[Robot, ...] = ()
         self._topics: tuple[str, ...] = ()
         self._closed: list[Path] = []
-        self._compiler: BackgroundWorker[Compiled] = BackgroundWorker("studio-compiler")
+        self._compiler: BackgroundWorker[CompiledProgram] = BackgroundWorker("studio-compiler")
         # a separate worker, so that unsaved work never waits for a long compilation
         self._journal_writer: BackgroundWorker[bool] = BackgroundWorker("studio-journal")
         self.revision = 0
@@ -51,7 +51,7 @@ class Documents:
 
     def new(self) -> Document:
         """Open an empty behaviour in a new tab; if the current tab is empty and unchanged, use that."""
-        if self.current.blank:
+        if self.current.is_blank:
             return self.current
         document = self._new_document()
         document.new(self._free_name(_(UNNAMED)))
@@ -59,14 +59,14 @@ class Documents:
 
     def open(self, path: Path) -> Document:
         """Open a file in a new tab, or switch to its tab. If DocumentError is raised, nothing has changed."""
-        there = self.with_path(path)
+        there = self.find_by_path(path)
         if there is not None:
             return self._make_current(there)
         return self._open_with(lambda document: document.open(path))
 
-    def example(self, path: Path) -> Document:
+    def open_example(self, path: Path) -> Document:
         """Open an example as a new behaviour in a tab. Raises DocumentError."""
-        return self._with_unique_name(self._open_with(lambda document: document.example(path)))
+        return self._with_unique_name(self._open_with(lambda document: document.open_example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
         """Open a file as a new behaviour with another name in a new tab. Raises DocumentError."""
@@ -86,27 +86,27 @@ class Documents:
         self._closed = [document.path if each == before and document.path else each for each in self._closed]
         self.revision += 1
 
-    def recover(self, unsaved: Unsaved) -> Document:
+    def recover(self, unsaved: UnsavedWork) -> Document:
         """Restore unsaved work into the tab of its file, or into a new tab."""
-        there = self.with_path(unsaved.path) if unsaved.path is not None else None
+        there = self.find_by_path(unsaved.path) if unsaved.path is not None else None
         if there is None or there.dirty:
             return self._open_with(lambda document: document.recover(unsaved))
         there.recover(unsaved)
         return self._make_current(there)
 
-    def with_path(self, path: Path) -> Document | None:
+    def find_by_path(self, path: Path) -> Document | None:
         """Return the open behaviour of a file, or None."""
         wanted = path.resolve()
         return next((each for each in self._open if each.path and each.path.resolve() == wanted), None)
 
-    def with_key(self, key: str) -> Document | None:
+    def find_by_key(self, key: str) -> Document | None:
         """Return the open behaviour with this key, or None."""
         return next((each for each in self._open if each.key == key), None)
 
     def title(self, document: Document) -> str:
         """Return the title of a behaviour, unique among the open ones."""
         opened = [*self._open, *([document] if document not in self._open else [])]
-        return told_apart([(each.name, each.path) for each in opened])[opened.index(document)]
+        return unique_titles([(each.name, each.path) for each in opened])[opened.index(document)]
 
     # -- tabs --------------------------------------------------------------------------------------------
 
@@ -136,9 +136,9 @@ class Documents:
         place = self._open.index(document)
         if document.path is not None:
             self._closed = [*(each for each in self._closed if each != document.path), document.path]
-            del self._closed[:-CLOSED_KEPT]
+            del self._closed[:-MAX_CLOSED]
         document.close()
-        self._compiler.forget(document.key)
+        self._compiler.discard(document.key)
         self._open.remove(document)
         if not self._open:
             self._open.append(self._new_document())
@@ -150,15 +150,15 @@ class Documents:
         """Reopen the tab closed last; None if there is none. Raises DocumentError."""
         while self._closed:
             path = self._closed.pop()
-            if self.with_path(path) is None:
+            if self.find_by_path(path) is None:
                 return self.open(path)
         return None
 
-    def saved(self, document: Document) -> None:
+    def on_saved(self, document: Document) -> None:
         """Detach other tabs from the file that ``document`` was saved to; their blocks become unsaved."""
         for other in self._open:
             if other is not document and other.path == document.path:
-                other.lose_file()
+                other.detach_file()
         self.revision += 1
 
     # -- common input --------------------------------------------------------------------------------------
@@ -186,7 +186,7 @@ class Documents:
         They contain the connected robots and all robots used in any open behaviour, so that hidden tabs keep
         their blocks.
         """
-        absent = {robot.name: robot for document in self._open for robot in document.absent}
+        absent = {robot.name: robot for document in self._open for robot in document.absent_robots}
         return editor_definitions(self._robots, tuple(absent.values()), self._topics)
 
     @property
@@ -194,14 +194,14 @@ class Documents:
         """Message why unsaved work of a behaviour can't be written; None if there is no such problem."""
         return next((each.journal_error for each in self._open if each.journal_error), None)
 
-    def unkept(self) -> list[Document]:
+    def retry_journals(self) -> list[Document]:
         """Retry failed journal writes; return the behaviours whose unsaved work still can't be written.
 
         Called when the window closes.
         """
-        return [each for each in self._open if not each.keep_again()]
+        return [each for each in self._open if not each.retry_journal()]
 
-    def end(self) -> None:
+    def close_all(self) -> None:
         """Close all documents and background threads when the window closes.
 
         Unsaved work stays in the journals.
@@ -213,17 +213,19 @@ class Documents:
 
     # -- between sessions --------------------------------------------------------------------------------
 
-    def kept(self) -> dict[str, object]:
+    def tabs_state(self) -> dict[str, object]:
         """Return the open tabs as JSON data for the settings."""
         tabs = [
-            {"path": str(each.path) if each.path is not None else None, "journal": each.journal}
+            {"path": str(each.path) if each.path is not None else None, "journal": each.journal_name}
             for each in self._open
-            if not each.blank
+            if not each.is_blank
         ]
-        shown = [each for each in self._open if not each.blank]
+        shown = [each for each in self._open if not each.is_blank]
         return {"tabs": tabs, "current": shown.index(self.current) if self.current in shown else 0}
 
-    def put_back(self, kept: Mapping[str, object], left: Iterable[Unsaved], *, ended_well: bool) -> set[Path]:
+    def restore_tabs(
+        self, kept: Mapping[str, object], left: Iterable[UnsavedWork], *, ended_well: bool
+    ) -> set[Path]:
         """Restore the tabs of the last session; return the paths of the journals that were restored.
 
         Args:
@@ -262,7 +264,7 @@ class Documents:
                 path = tab.get("path")
                 document = recovered.get(str(tab.get("journal")))
                 if document is None and isinstance(path, str):
-                    document = self.with_path(Path(path))
+                    document = self.find_by_path(Path(path))
                 if document is not None and document not in found.values():
                     found[number] = document
         placed = list(found.values())
@@ -271,7 +273,7 @@ class Documents:
             self.current = found[current]
         self.revision += 1
 
-    def _restore_tab(self, path: object, unsaved: Unsaved | None) -> Document | None:
+    def _restore_tab(self, path: object, unsaved: UnsavedWork | None) -> Document | None:
         if unsaved is not None:
             return self.recover(unsaved)
         if not isinstance(path, str) or not Path(path).is_file():
@@ -291,7 +293,7 @@ class Documents:
         return document
 
     def _open_with(self, fill: Callable[[Document], None]) -> Document:
-        if self.current.blank:
+        if self.current.is_blank:
             fill(self.current)
             return self._make_current(self.current)
         document = self._new_document()

@@ -6,29 +6,34 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from app.blocks import Problem
-from app.blocks.fixes.replace_robot import asked_of, can_do, count_of, types_of
+from app.blocks.fixes.replace_robot import (
+    block_counts_by_robot,
+    block_types_by_robot,
+    block_types_of,
+    supports_blocks,
+)
 from app.robots.description.description import Robot
 from nep.i18n import _, ngettext
 
-CONNECT = "connect:"
+CONNECT_PREFIX = "connect:"
 MAX_FIXES = 2  # more don't fit into a line
 
 
 @dataclass(frozen=True)
-class Mend:
+class Fix:
     """Fix offered for a problem: the label of the button, and the command that it runs."""
 
-    words: str
+    label: str
     action: str
 
 
 @dataclass(frozen=True)
-class Listed:
+class ProblemLine:
     """Line of the problem list: the problem, its fixes (best first), and the number of affected blocks."""
 
     problem: Problem
-    fixes: tuple[Mend, ...]
-    blocks: int = 1
+    fixes: tuple[Fix, ...]
+    block_count: int = 1
 
     @property
     def severity(self) -> str:
@@ -36,14 +41,14 @@ class Listed:
         return self.problem.severity
 
 
-def listed(
+def problem_lines(
     problems: Sequence[Problem],
     workspace: Mapping[str, object],
     missing: Sequence[Robot],
     connected: Sequence[Robot],
     virtual_models: Collection[str],
     absent: Collection[str] = (),
-) -> tuple[Listed, ...]:
+) -> tuple[ProblemLine, ...]:
     """Return the lines of the problem list.
 
     All blocks of a missing robot are one line with the number of disabled blocks. The fixes of that line are
@@ -52,27 +57,29 @@ def listed(
     Args:
         absent: Ids of the disabled blocks (`Program.absent`).
     """
-    found: list[Listed] = []
+    found: list[ProblemLine] = []
     place: dict[str, int] = {}
-    grey = count_of(workspace, absent)
+    grey = block_counts_by_robot(workspace, absent)
     known = {robot.name: robot for robot in missing}
-    asked = asked_of(workspace)
-    types = {robot.name: types_of(robot) for robot in connected} if known else {}
+    asked = block_types_by_robot(workspace)
+    types = {robot.name: block_types_of(robot) for robot in connected} if known else {}
     for problem in problems:
-        name = _missing(problem)
+        name = _missing_robot(problem)
         if name is None:
-            own = (Mend(problem.fix, problem.fix_action),) if problem.fix and problem.fix_action else ()
-            found.append(Listed(problem, own))
+            own = (Fix(problem.fix, problem.fix_action),) if problem.fix and problem.fix_action else ()
+            found.append(ProblemLine(problem, own))
         elif name not in place:
             place[name] = len(found)
             robot = known.get(name)
             able: list[Robot] = []
             if robot is not None:
                 blocks = asked.get(name, frozenset())
-                able = [each for each in connected if can_do(blocks, robot.model, each, types[each.name])]
+                able = [
+                    each for each in connected if supports_blocks(blocks, robot.model, each, types[each.name])
+                ]
             fixes = robot_fixes(name, robot, able, virtual_models)
-            found.append(Listed(problem, fixes, max(1, grey.get(name, 0))))
-    return tuple(_counted(each) for each in found)
+            found.append(ProblemLine(problem, fixes, max(1, grey.get(name, 0))))
+    return tuple(_with_block_count(each) for each in found)
 
 
 def robot_fixes(
@@ -80,38 +87,38 @@ def robot_fixes(
     robot: Robot | None,
     able: Sequence[Robot],
     virtual_models: Collection[str],
-) -> tuple[Mend, ...]:
+) -> tuple[Fix, ...]:
     """Return the fixes for a missing robot, best first.
 
     ``able`` are the robots that have the same actions.
     """
     if robot is None:
-        return (_show_robots(name),)
+        return (_show_robots_fix(name),)
     alike = [other for other in able if other.model == robot.model] or able
     fixes = [
-        Mend(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
+        Fix(_("Use {robot}").format(robot=other.name), f"robot.use:{name}:{other.name}")
         for other in alike[:MAX_FIXES]
     ]
     if robot.model in virtual_models and len(fixes) < MAX_FIXES:
-        fixes.append(Mend(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
-    return tuple(fixes) or (_show_robots(name),)
+        fixes.append(Fix(_("Start a virtual {robot}").format(robot=name), f"robot.virtual:{name}"))
+    return tuple(fixes) or (_show_robots_fix(name),)
 
 
-def _show_robots(name: str) -> Mend:
+def _show_robots_fix(name: str) -> Fix:
     # Studio can't switch a real robot on: it shows the present ones, and why others are missing.
-    return Mend(_("Show the robots"), f"{CONNECT}{name}")
+    return Fix(_("Show the robots"), f"{CONNECT_PREFIX}{name}")
 
 
-def _missing(problem: Problem) -> str | None:
+def _missing_robot(problem: Problem) -> str | None:
     action = problem.fix_action or ""
-    return action.removeprefix(CONNECT) if action.startswith(CONNECT) else None
+    return action.removeprefix(CONNECT_PREFIX) if action.startswith(CONNECT_PREFIX) else None
 
 
-def _counted(line: Listed) -> Listed:
+def _with_block_count(line: ProblemLine) -> ProblemLine:
     # A single block is named; several blocks are counted.
-    if line.blocks == 1:
+    if line.block_count == 1:
         return line
-    name = _missing(line.problem) or ""
-    subject = ngettext("{count} block", "{count} blocks", line.blocks).format(count=line.blocks)
+    name = _missing_robot(line.problem) or ""
+    subject = ngettext("{count} block", "{count} blocks", line.block_count).format(count=line.block_count)
     sentence = _("{robot} is not connected, so {block} will be skipped.").format(robot=name, block=subject)
-    return replace(line, problem=replace(line.problem, subject=subject, sentence=sentence, icon="bot"))
+    return replace(line, problem=replace(line.problem, subject=subject, message=sentence, icon="bot"))

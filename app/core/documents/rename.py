@@ -11,22 +11,22 @@ from app.errors import DocumentError
 from nep.i18n import _
 from nep.system.replace_file import replace_file
 
-NOT_IN_NAMES = '/\\:*?"<>|'
-MAX_BYTES = 200
-DEVICES = frozenset(
+INVALID_CHARACTERS = '/\\:*?"<>|'
+MAX_NAME_BYTES = 200
+RESERVED_NAMES = frozenset(
     {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in range(1, 10))}
 )
 """Names reserved by Windows, rejected everywhere so that files can be copied there."""
 
 
-def path_named(path: Path, name: str) -> Path:
+def renamed_path(path: Path, name: str) -> Path:
     """Return the path in the same folder with another name; unchanged for files in Studio's own folder."""
     if name_of(path, "") != path.stem:
         return path
     return path.with_name(f"{name}{path.suffix or SUFFIX}")
 
 
-def why_not(name: str, path: Path | None) -> str:
+def name_problem(name: str, path: Path | None) -> str:
     """Return why a behaviour can't have this name, or "". ``path`` is the file of the behaviour, if any."""
     wanted = name.strip()
     if not wanted:
@@ -34,17 +34,17 @@ def why_not(name: str, path: Path | None) -> str:
     if path is None:
         return ""
     for letter in wanted:
-        if letter in NOT_IN_NAMES or not letter.isprintable():
+        if letter in INVALID_CHARACTERS or not letter.isprintable():
             shown = letter if letter.isprintable() else " "
             return _("A file name can't contain {sign}.").format(sign=f"“{shown}”")
     if wanted.endswith(".") or wanted.startswith("."):
         return _("A file name can't begin or end with a full stop.")
-    if wanted.partition(".")[0].lower() in DEVICES:
+    if wanted.partition(".")[0].lower() in RESERVED_NAMES:
         return _("Windows reserves the name “{name}”.").format(name=wanted)
-    if len(wanted.encode("utf-8", "surrogatepass")) > MAX_BYTES:
+    if len(wanted.encode("utf-8", "surrogatepass")) > MAX_NAME_BYTES:
         return _("The name is too long for a file.")
-    new = path_named(path, wanted)
-    if new != path and os.path.lexists(new) and not _same(new, path):
+    new = renamed_path(path, wanted)
+    if new != path and os.path.lexists(new) and not _is_same_file(new, path):
         return _("A file named “{name}” already exists in {folder}.").format(
             name=wanted, folder=path.parent.name or path.parent
         )
@@ -60,7 +60,7 @@ def rename_file(old: Path, new: Path) -> None:
     try:
         if not old.is_file():
             raise FileNotFoundError(2, _("it no longer exists"), str(old))
-        taken = not _same(new, old)
+        taken = not _is_same_file(new, old)
         if taken:
             os.close(os.open(new, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
         try:
@@ -77,7 +77,7 @@ def rename_file(old: Path, new: Path) -> None:
         ) from error
 
 
-def _same(new: Path, old: Path) -> bool:
+def _is_same_file(new: Path, old: Path) -> bool:
     # The same file with other capitals, on case-insensitive file systems.
     try:
         return new.name.casefold() == old.name.casefold() and new.samefile(old)

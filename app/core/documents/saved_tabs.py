@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from app.core.documents.document import Document
-from app.core.documents.journal import Unsaved
+from app.core.documents.journal import UnsavedWork
 from app.core.documents.open_documents import Documents
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
@@ -24,7 +24,7 @@ class SavedTabs:
         self._last_session: dict[str, object] = {}
         self._kept_revision = -1
 
-    def come_back(self, left: Sequence[Unsaved]) -> list[Unsaved]:
+    def restore(self, left: Sequence[UnsavedWork]) -> list[UnsavedWork]:
         """Restore the tabs of the last session, and start saving them.
 
         Args:
@@ -36,23 +36,23 @@ class SavedTabs:
         self.active = True
         kept: dict[str, object] = self._settings.get(KEY, {})
         self._last_session = kept
-        taken = self._documents.put_back(kept, left, ended_well=kept.get("ended_well") is True)
+        taken = self._documents.restore_tabs(kept, left, ended_well=kept.get("ended_well") is True)
         self.save()
         return [each for each in left if each.journal not in taken]
 
-    def recover(self, left: Sequence[Unsaved]) -> None:
+    def recover(self, left: Sequence[UnsavedWork]) -> None:
         """Restore unsaved work into its tabs, and show the tab that was current."""
         newest_last = sorted(left, key=lambda each: each.edited_s)
         recovered = {each.journal.name: self._documents.recover(each) for each in newest_last}
         self._documents.arrange(self._last_session, recovered)
         self.save()
 
-    def edited(self, document: Document, *, was_blank: bool) -> None:
+    def on_edited(self, document: Document, *, was_blank: bool) -> None:
         """Save the tabs at the first edit of an empty behaviour."""
-        if was_blank and not document.blank:
+        if was_blank and not document.is_blank:
             self.save()
 
-    def follow(self) -> None:
+    def save_if_changed(self) -> None:
         """Save the tabs if they changed.
 
         Called once a second, so that switching tabs does not wait for the disk.
@@ -66,6 +66,6 @@ class SavedTabs:
             return
         self._kept_revision = self._documents.revision
         try:
-            self._settings.set(KEY, {**self._documents.kept(), "ended_well": ended_well})
+            self._settings.set(KEY, {**self._documents.tabs_state(), "ended_well": ended_well})
         except SettingsError as error:
             self._complain(str(error))

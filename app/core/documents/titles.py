@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from app.core.storage.settings import RecentFile, kept_folder
+from app.core.storage.settings import RecentFile, closed_tabs_folder
 from nep.i18n import _
 
 
@@ -16,10 +16,10 @@ def name_of(path: Path, inside: str) -> str:
     ``inside`` is used only in Studio's folder of work that was closed unsaved, where file names are
     generated.
     """
-    return inside if path.parent == kept_folder() else path.stem
+    return inside if path.parent == closed_tabs_folder() else path.stem
 
 
-def told_apart(named: Sequence[tuple[str, Path | None]]) -> list[str]:
+def unique_titles(named: Sequence[tuple[str, Path | None]]) -> list[str]:
     """Return a unique title for each name and file: the name, with as many parent folders as necessary."""
     alike: dict[str, set[Path]] = {}
     for name, path in named:
@@ -32,7 +32,7 @@ def told_apart(named: Sequence[tuple[str, Path | None]]) -> list[str]:
     for name, path in named:
         title = name
         if path is not None and counts[name.casefold()] > 1:
-            folder = _folder(path, alike[name.casefold()] - {path})
+            folder = _distinguishing_folder(path, alike[name.casefold()] - {path})
             title = _("{name} — {folder}").format(name=name, folder=folder) if folder else name
         titles.append(title)
     return titles
@@ -40,11 +40,11 @@ def told_apart(named: Sequence[tuple[str, Path | None]]) -> list[str]:
 
 def recent_titles(files: Sequence[RecentFile]) -> list[RecentFile]:
     """Return the files with unique titles."""
-    titles = told_apart([(file.name, file.path) for file in files])
+    titles = unique_titles([(file.name, file.path) for file in files])
     return [replace(file, name=title) for file, title in zip(files, titles, strict=True)]
 
 
-def _folder(path: Path, others: set[Path]) -> str:
+def _distinguishing_folder(path: Path, others: set[Path]) -> str:
     # As few folders as distinguish the file from the others.
     folders = path.parent.parts[1:] or path.parent.parts
     for count in range(1, len(folders)):

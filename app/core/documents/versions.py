@@ -17,17 +17,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.core.documents.file_format import SUFFIX
-from app.core.storage.atomic_file import make_private, private_folder, read_whole, write_atomically
+from app.core.storage.atomic_file import (
+    create_private_folder,
+    make_private,
+    read_regular_file,
+    write_atomically,
+)
 from app.core.storage.settings import data_home, home
 from app.errors import DocumentError
 from nep.i18n import _
 from nep.system.replace_file import replace_file
 
-NAME = "earlier"
-COPIES_KEPT = 300
-BYTES_KEPT = 500_000_000
-OF_ONE_FILE = 30
-NEWEST = 10
+FOLDER_NAME = "earlier"
+MAX_COPIES = 300
+MAX_BYTES = 500_000_000
+MAX_COPIES_PER_FILE = 30
+PROTECTED_COPIES = 10
 """Number of newest versions of a file that are never removed.
 
 Of older versions, the one that leaves the smallest gap in time is removed first.
@@ -43,16 +48,16 @@ Stamp = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Earlier:
+class SavedVersion:
     """File together with a copy of its earlier content."""
 
     path: Path
     copy: Path
 
-    def put_back(self) -> None:
+    def restore(self) -> None:
         """Restore the earlier content. If DocumentError is raised, the file is unchanged."""
         try:
-            write_atomically(self.path, read_whole(self.copy))
+            write_atomically(self.path, read_regular_file(self.copy))
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise DocumentError(
@@ -62,24 +67,28 @@ class Earlier:
             ) from error
 
 
-def keep_earlier(
+def save_version(
     path: Path, folder: Path | None = None, clock: Callable[[], float] = time.time
-) -> Earlier | None:
+) -> SavedVersion | None:
     """Copy the current content of a file; None if the file is missing or empty.
 
     The copies are in ``folder`` (default: ``earlier`` in Studio's data folder), at most 300 in total and 30
     for each file. Content that was already copied isn't copied again. Raises DocumentError if the file can't
     be copied.
     """
-    where = _folder(folder)
+    where = _versions_folder(folder)
     if not path.is_file() or not path.stat().st_size:
         return None
     try:
-        data, written = read_whole(path), path.stat()
+        data, written = read_regular_file(path), path.stat()
         newest = next(iter(versions_of(path, where)), None)
-        if newest is not None and newest.copy.stat().st_size == len(data) and read_whole(newest.copy) == data:
-            return Earlier(path, newest.copy)
-        copy = free_path(where, f"{path.stem}, before", clock(), f" {_mark(path)}")
+        if (
+            newest is not None
+            and newest.copy.stat().st_size == len(data)
+            and read_regular_file(newest.copy) == data
+        ):
+            return SavedVersion(path, newest.copy)
+        copy = free_path(where, f"{path.stem}, before", clock(), f" {_path_hash(path)}")
         write_atomically(copy, data, private=True)
         os.utime(copy, ns=(written.st_mtime_ns, written.st_mtime_ns))
     except OSError as error:
@@ -87,9 +96,9 @@ def keep_earlier(
         words = _("{file} was not saved: its previous version can't be kept ({reason})")
         raise DocumentError(path, words.format(file=path.name, reason=reason)) from error
     with contextlib.suppress(OSError):  # another instance has done this already
-        _thin_out(where, _mark(path))
+        _thin_out(where, _path_hash(path))
         _drop_oldest(where)
-    return Earlier(path, copy)
+    return SavedVersion(path, copy)
 
 
 @dataclass(frozen=True)
@@ -100,25 +109,31 @@ class Version:
     name: str
     written_s: float
     replaced_s: float
-    mark: str
+    path_hash: str
 
 
 def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
     """Return the versions of a file, newest first."""
-    mark = _mark(path)
-    return [each for each in _newest_first(_folder(folder)) if each.mark == mark]
+    mark = _path_hash(path)
+    return [each for each in _newest_first(_versions_folder(folder)) if each.path_hash == mark]
 
 
 def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
     """Return versions of other files with the same name, such as of a moved file, newest first."""
-    mark, stem = _mark(path), _plain(path.stem)
-    return [each for each in _newest_first(_folder(folder)) if each.mark != mark and each.name == stem]
+    mark, stem = _path_hash(path), _safe_stem(path.stem)
+    return [
+        each
+        for each in _newest_first(_versions_folder(folder))
+        if each.path_hash != mark and each.name == stem
+    ]
 
 
-def follow_file(old: Path, new: Path, folder: Path | None = None) -> None:
+def rename_versions(old: Path, new: Path, folder: Path | None = None) -> None:
     """Assign the versions of a renamed file to its new name. Versions that can't be renamed are skipped."""
     for each in reversed(versions_of(old, folder)):
-        copy = free_path(_folder(folder), f"{new.stem}, before", each.replaced_s, f" {_mark(new)}")
+        copy = free_path(
+            _versions_folder(folder), f"{new.stem}, before", each.replaced_s, f" {_path_hash(new)}"
+        )
         with contextlib.suppress(OSError):
             replace_file(each.copy, copy)
 
@@ -126,7 +141,7 @@ def follow_file(old: Path, new: Path, folder: Path | None = None) -> None:
 def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
     """Return an unused path in ``folder`` from a name, a time and a mark."""
     stamp = time.strftime(_STAMP, time.localtime(now_s))
-    stem = f"{_plain(name)} {stamp}{mark}"
+    stem = f"{_safe_stem(name)} {stamp}{mark}"
     path = folder / f"{stem}{SUFFIX}"
     number = 2
     while path.exists():
@@ -144,20 +159,20 @@ def stamp_of(path: Path) -> Stamp | None:
     return found.st_mtime_ns, found.st_size
 
 
-def _folder(chosen: Path | None) -> Path:
-    return chosen if chosen is not None else data_home() / NAME
+def _versions_folder(chosen: Path | None) -> Path:
+    return chosen if chosen is not None else data_home() / FOLDER_NAME
 
 
-def bring_here(old: Path | None = None, new: Path | None = None) -> None:
+def move_old_versions(old: Path | None = None, new: Path | None = None) -> None:
     """Move the versions that an earlier Studio stored in the configuration folder to the data folder.
 
     Versions that can't be moved are retried at the next start. Only their owner can read them.
     """
-    old = old if old is not None else home() / NAME
-    new = new if new is not None else data_home() / NAME
+    old = old if old is not None else home() / FOLDER_NAME
+    new = new if new is not None else data_home() / FOLDER_NAME
     if old != new and old.is_dir():
         with contextlib.suppress(OSError):
-            private_folder(new)
+            create_private_folder(new)
             for copy in old.glob(f"*{SUFFIX}"):
                 if not (new / copy.name).exists():
                     shutil.move(copy, new / copy.name)
@@ -165,23 +180,23 @@ def bring_here(old: Path | None = None, new: Path | None = None) -> None:
     make_private(new, f"*{SUFFIX}")
 
 
-def _plain(name: str) -> str:
+def _safe_stem(name: str) -> str:
     return "".join(c if c.isalnum() or c in " -_," else "_" for c in name).strip() or "behaviour"
 
 
-def _mark(path: Path) -> str:
+def _path_hash(path: Path) -> str:
     # Differs between files in different folders.
     where = os.path.normcase(path.resolve())
     return hashlib.sha256(where.encode("utf-8", "surrogateescape")).hexdigest()[:8]
 
 
 def _newest_first(folder: Path) -> list[Version]:
-    found = [_version(copy) for copy in folder.glob(f"*{SUFFIX}")] if folder.is_dir() else []
+    found = [_parse_version(copy) for copy in folder.glob(f"*{SUFFIX}")] if folder.is_dir() else []
     known = [each for each in found if each is not None]
     return sorted(known, key=lambda each: (each.replaced_s, each.written_s), reverse=True)
 
 
-def _version(copy: Path) -> Version | None:
+def _parse_version(copy: Path) -> Version | None:
     match = _NAME.fullmatch(copy.name)
     if match is None:
         return None
@@ -195,18 +210,18 @@ def _version(copy: Path) -> Version | None:
 
 def _thin_out(folder: Path, mark: str) -> None:
     # Removes the version that leaves the smallest gap.
-    found = [each for each in _newest_first(folder) if each.mark == mark]
-    while len(found) > OF_ONE_FILE:
+    found = [each for each in _newest_first(folder) if each.path_hash == mark]
+    while len(found) > MAX_COPIES_PER_FILE:
         gaps = {
             place: found[place - 1].replaced_s - found[place + 1].replaced_s
-            for place in range(NEWEST, len(found) - 1)
+            for place in range(PROTECTED_COPIES, len(found) - 1)
         }
         found.pop(min(gaps, key=lambda place: gaps[place])).copy.unlink(missing_ok=True)
 
 
 def _drop_oldest(folder: Path) -> None:
-    left = BYTES_KEPT
+    left = MAX_BYTES
     for number, each in enumerate(_newest_first(folder)):
         left -= each.copy.stat().st_size
-        if number and (number >= COPIES_KEPT or left < 0):
+        if number and (number >= MAX_COPIES or left < 0):
             each.copy.unlink(missing_ok=True)

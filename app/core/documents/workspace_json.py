@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from app.core.storage import deep_json
 
-LONG_CHARACTERS = 20_000
+LONG_TEXT_LENGTH = 20_000
 """Text length above which parsing or compiling is too slow for the window's thread."""
 EMPTY: Mapping[str, object] = {"blocks": {"languageVersion": 0, "blocks": []}}
 
@@ -27,11 +27,15 @@ class WorkspaceJson:
         # Raises ValueError or RecursionError if `text` can't be parsed. It is parsed immediately only where
         # the nesting could be too deep, which requires many brackets.
         self._text, self._blocks, self._was_told = text, blocks, text is not None
-        if text is not None and blocks is None and text.count("{") + text.count("[") > deep_json.SHALLOW:
+        if (
+            text is not None
+            and blocks is None
+            and text.count("{") + text.count("[") > deep_json.MAX_SHALLOW_LEVELS
+        ):
             _ = self.blocks
 
     @classmethod
-    def of(cls, blocks: Mapping[str, object]) -> WorkspaceJson:
+    def from_blocks(cls, blocks: Mapping[str, object]) -> WorkspaceJson:
         """Wrap parsed blocks, which must not be changed afterwards."""
         return cls(None, blocks)
 
@@ -53,12 +57,12 @@ class WorkspaceJson:
     @property
     def has_blocks(self) -> bool:
         """True if the workspace contains a block. For a long text that isn't parsed yet, True is assumed."""
-        if self._blocks is None and self.is_longer_than(LONG_CHARACTERS):
+        if self._blocks is None and self.is_longer_than(LONG_TEXT_LENGTH):
             return True
         inner = self.blocks.get("blocks")
         return isinstance(inner, Mapping) and bool(inner.get("blocks"))
 
-    def same_as(self, other: WorkspaceJson) -> bool:
+    def is_equal_to(self, other: WorkspaceJson) -> bool:
         """Return True if both are equal. Texts from the page are compared as text.
 
         Too deeply nested ones differ.
@@ -66,7 +70,7 @@ class WorkspaceJson:
         if self._was_told and other._was_told:
             return self._text == other._text
         try:
-            return deep_json.same(self.blocks, other.blocks)
+            return deep_json.are_equal(self.blocks, other.blocks)
         except RecursionError:
             return False
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 
-from app.core.graph.node_graph import OWN, GraphFacts
+from app.core.graph.node_graph import INTERNAL_PREFIX, GraphFacts
 from app.core.network.topics import key_of
-from app.core.networks.kinds import kind_named
+from app.core.networks.kinds import find_kind
 
 QUIET_S = 60.0
-CALLS_OVER_S = 60.0
-LOOKS = 61
+CALL_WINDOW_S = 60.0
+MAX_SAMPLES = 61
 """Number of stored samples of the call counts, taken once a second."""
 
 
@@ -31,7 +31,7 @@ class QuietNodes:
         unknown = {
             entry.key
             for entry in facts.nodes
-            if (kind := kind_named(entry.network)) is not None and not kind.tells_figures
+            if (kind := find_kind(entry.network)) is not None and not kind.reports_stats
         }
         originals = {entry.key for entry in facts.nodes if entry.is_original}
         for entry, count in _counts(facts):
@@ -47,7 +47,7 @@ class QuietNodes:
                 moved = had is None or had[0] != total
                 self._counted[entry] = total, now if moved or had is None else had[1]
 
-    def quiet(self, now: float) -> frozenset[str]:
+    def quiet_keys(self, now: float) -> frozenset[str]:
         """Return the keys of nodes without a message or call for `QUIET_S`."""
         return frozenset(entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_S)
 
@@ -56,7 +56,7 @@ class CallRates:
     """Call rates of services over a minute. Not thread-safe: use it from the window's thread."""
 
     def __init__(self) -> None:
-        self._samples: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=LOOKS)
+        self._samples: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=MAX_SAMPLES)
 
     def update(self, facts: GraphFacts, now: float) -> None:
         """Apply call counts; ignored within a second of the last ones."""
@@ -70,7 +70,7 @@ class CallRates:
         last_at, last = self._samples[-1]
         first: dict[str, tuple[float, int]] = {}
         for at, counts in self._samples:
-            if last_at - at <= CALLS_OVER_S:
+            if last_at - at <= CALL_WINDOW_S:
                 for name in counts.keys() - first.keys():
                     first[name] = at, counts[name]
         return {
@@ -83,14 +83,14 @@ class CallRates:
 def _counts(facts: GraphFacts) -> Iterator[tuple[str, int | None]]:
     # (key of a node, number of messages or calls); None if not counted. Internal topics are skipped.
     for topic in facts.topics:
-        if topic.info is None or topic.name.startswith(OWN):
+        if topic.info is None or topic.name.startswith(INTERNAL_PREFIX):
             continue
         for publisher in topic.info.publishers:
             yield key_of(topic.network, publisher.node_id), publisher.count
         for subscriber in topic.info.subscribers:
             yield key_of(topic.network, subscriber.node_id), subscriber.received
     for name, service in facts.services.items():
-        if name.startswith(OWN):
+        if name.startswith(INTERNAL_PREFIX):
             continue
         for server in service.servers:
             yield server.node_id, server.calls

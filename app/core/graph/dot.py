@@ -21,7 +21,7 @@ def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[Gr
         style = ', style="rounded,dashed"' if node.is_gone or node.is_quiet else ""
         name = group_names.get(node.key, node.name) if node.kind == "group" else node.name
         inside.setdefault(node.group, []).append(f"{names[node.key]} [label={quoted(name)}{style}];")
-    clusters = [group for group in graph.groups if not group.is_closed and group.key in inside]
+    clusters = [group for group in graph.groups if not group.is_collapsed and group.key in inside]
     for number, group in enumerate(clusters):
         lines += [
             f"  subgraph cluster_{number} {{",

@@ -19,7 +19,7 @@ from app.core.graph.node_graph import GraphLine, NodeGraph
 
 _log = logging.getLogger(__name__)
 
-Place = tuple[float, float]
+Position = tuple[float, float]
 Box = tuple[float, float, float, float]
 """Rectangle: left, top, width, height."""
 RouteKey = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], str, str]
@@ -28,14 +28,14 @@ RouteKey = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], str, str]
 MAX_ROUTES = 6000
 """Maximum number of routes drawn. Beyond it, routes of the lines with the most ends are omitted and counted.
 """
-MAX_PLACES = 4000
+MAX_SAVED_POSITIONS = 4000
 """Maximum number of positions stored for nodes that left and may return."""
 LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
-ALONE_COLUMNS = 4
+ISOLATED_COLUMNS = 4
 """Number of columns for nodes without lines within their group."""
-MANY = 60
+FAST_LAYOUT_NODES = 60
 """Number of boxes from which the library runs in its fast mode."""
-MAX_LED = 400
+MAX_AVOIDING_ROUTES = 400
 """Maximum number of routes led around nodes.
 
 With more routes, all are straight, because routing would take many seconds.
@@ -48,21 +48,21 @@ WIDEST, ASPECT = 3.0, 1.6
 class LayoutSizes:
     """Sizes of a node, of a group's header and margins, and of the line about quiet nodes."""
 
-    node: Place = (152.0, 48.0)
-    head: float = 36.0
-    side: float = 18.0
-    foot: float = 30.0
-    letter: float = 8.0
+    node: Position = (152.0, 48.0)
+    header: float = 36.0
+    side_margin: float = 18.0
+    footer: float = 30.0
+    letter_width: float = 8.0
 
     def scaled(self, share: float) -> LayoutSizes:
         """Return the sizes for another text size."""
         wide, high = self.node
         return LayoutSizes(
             (wide * share, high * share),
-            self.head * share,
-            self.side * share,
-            self.foot * share,
-            self.letter * share,
+            self.header * share,
+            self.side_margin * share,
+            self.footer * share,
+            self.letter_width * share,
         )
 
 
@@ -77,18 +77,18 @@ class GraphLayout:
         is_plain: True if the library failed and the boxes are arranged in rows.
     """
 
-    places: Mapping[str, Place] = field(default_factory=dict)
+    positions: Mapping[str, Position] = field(default_factory=dict)
     groups: Mapping[str, Box] = field(default_factory=dict)
-    routes: Mapping[RouteKey, tuple[Place, ...]] = field(default_factory=dict)
-    kept: Mapping[str, Place] = field(default_factory=dict)
-    left_out: int = 0
+    routes: Mapping[RouteKey, tuple[Position, ...]] = field(default_factory=dict)
+    saved_positions: Mapping[str, Position] = field(default_factory=dict)
+    omitted_routes: int = 0
     is_plain: bool = False
 
     def bounds(self, sizes: LayoutSizes) -> Box:
         """Return the rectangle around everything; of size 0 if the layout is empty."""
-        boxes = [*self.groups.values(), *(_box_at(place, sizes.node) for place in self.places.values())]
+        boxes = [*self.groups.values(), *(_box_at(place, sizes.node) for place in self.positions.values())]
         boxes += [(x, y, 0.0, 0.0) for way in self.routes.values() for x, y in way]
-        return _around(boxes)
+        return _bounding_box(boxes)
 
 
 def arrange(
@@ -101,7 +101,7 @@ def arrange(
     """
     sizes = sizes if sizes is not None else LayoutSizes()
     ways, left_out = _routes_to_draw(graph)
-    known = {} if before is None else {**before.kept, **before.places}
+    known = {} if before is None else {**before.saved_positions, **before.positions}
     here = {node.key for node in graph.nodes}
     stay = len(here & known.keys())
     is_plain = False
@@ -112,16 +112,16 @@ def arrange(
         places = _place_new(graph, {key: known[key] for key in here & known.keys()}, sizes)
     routes = {} if is_plain else _route_lines(places, ways, sizes)
     kept = {key: place for key, place in known.items() if key not in here}
-    for key in [*kept][: max(0, len(kept) - MAX_PLACES)]:
+    for key in [*kept][: max(0, len(kept) - MAX_SAVED_POSITIONS)]:
         del kept[key]
     straight = {way: _straight(places[way[1]], places[way[2]], sizes) for way in ways}
     groups = _group_boxes(graph, places, sizes)
     return GraphLayout(places, groups, {**straight, **routes}, kept, left_out, is_plain)
 
 
-def arrange_plainly(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
+def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
     """Arrange all boxes in rows without the library, if the library failed or took too long."""
-    places = _in_rows(graph, sizes)
+    places = _row_positions(graph, sizes)
     ways, left_out = _routes_to_draw(graph)
     return GraphLayout(
         places,
@@ -137,7 +137,7 @@ def _routes_to_draw(graph: NodeGraph) -> tuple[list[RouteKey], int]:
     # Routes of lines with few ends first; and the number of omitted ones.
     found: list[RouteKey] = []
     left_out = 0
-    for line in sorted(graph.lines, key=_ends_of):
+    for line in sorted(graph.lines, key=_drawing_order):
         ways = [(line.key, source, target) for source, target in line.pairs()]
         if len(found) + len(ways) <= MAX_ROUTES:
             found += ways
@@ -146,7 +146,7 @@ def _routes_to_draw(graph: NodeGraph) -> tuple[list[RouteKey], int]:
     return found, left_out
 
 
-def _ends_of(line: GraphLine) -> tuple[int, tuple[str, ...]]:
+def _drawing_order(line: GraphLine) -> tuple[int, tuple[str, ...]]:
     return len(line.sources) * len(line.targets), line.topics
 
 
@@ -161,7 +161,7 @@ def _library_options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
             "node_gap": gap,
             "dummy_gap": DUMMY_GAP,
             "isolated_gap": gap,
-            "isolated_max_columns": ALONE_COLUMNS,
+            "isolated_max_columns": ISOLATED_COLUMNS,
         },
         "routing": {"style": "orthogonal"},
         "cycles": {"strategy": "follow_flow"},
@@ -171,7 +171,7 @@ def _library_options(effort: str, gap: float = NODE_GAP) -> dict[str, Any]:
 
 def _place_all(
     graph: NodeGraph, ways: Sequence[RouteKey], sizes: LayoutSizes
-) -> tuple[dict[str, Place], bool]:
+) -> tuple[dict[str, Position], bool]:
     # First the nodes within each group, then the groups. Also returns whether the library failed.
     inside: dict[str, list[str]] = {}
     for node in graph.nodes:
@@ -179,7 +179,7 @@ def _place_all(
     home = {key: block for block, keys in inside.items() for key in keys}
     within: dict[str, list[RouteKey]] = {}
     between: dict[tuple[str, str], int] = {}
-    effort = "balanced" if len(home) < MANY else "fast"
+    effort = "balanced" if len(home) < FAST_LAYOUT_NODES else "fast"
     for way in ways:
         begin, end = home[way[1]], home[way[2]]
         if begin == end:
@@ -196,7 +196,7 @@ def _place_all(
         if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
         _log.exception("layout library failed; nodes are placed in rows")
-        return _in_rows(graph, sizes), True
+        return _row_positions(graph, sizes), True
     places = {}
     for block, (left, top, wide, high) in boxes.items():
         across, down = middles[block][0] - left - wide / 2, middles[block][1] - top - high / 2
@@ -207,7 +207,7 @@ def _place_all(
 
 def _place_block(
     keys: Sequence[str], ways: Sequence[RouteKey], sizes: LayoutSizes, effort: str
-) -> dict[str, Place]:
+) -> dict[str, Position]:
     if len(keys) == 1:
         return {keys[0]: (0.0, 0.0)}
     index = {key: number for number, key in enumerate(keys)}
@@ -218,17 +218,17 @@ def _place_block(
     return {key: _point(node["center"]) for key, node in zip(keys, layout.nodes, strict=True)}
 
 
-def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Place], sizes: LayoutSizes) -> Box:
+def _block_box(graph: NodeGraph, block: str, places: Mapping[str, Position], sizes: LayoutSizes) -> Box:
     # Bounding box of a group; of a node without a group the node itself.
-    group = next((each for each in graph.groups if each.key == block and not each.is_closed), None)
-    box = _around(_box_at(place, sizes.node) for place in places.values())
+    group = next((each for each in graph.groups if each.key == block and not each.is_collapsed), None)
+    box = _bounding_box(_box_at(place, sizes.node) for place in places.values())
     if group is None:
         return box
     left, top, wide, high = _with_margins(box, block, sizes)
-    return left, top, wide, high + (sizes.foot if group.quiet else 0.0)
+    return left, top, wide, high + (sizes.footer if group.quiet_count else 0.0)
 
 
-def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int]) -> dict[str, Place]:
+def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int]) -> dict[str, Position]:
     # Returns centres; boxes may have different sizes.
     if len(boxes) == 1:
         return dict.fromkeys(boxes, (0.0, 0.0))
@@ -244,14 +244,14 @@ def _place_boxes(boxes: Mapping[str, Box], between: Mapping[tuple[str, str], int
     middles = {block: _point(node["center"]) for block, node in zip(boxes, layout.nodes, strict=True)}
     wide = layout.bounds["max"]["x"] - layout.bounds["min"]["x"]
     high = layout.bounds["max"]["y"] - layout.bounds["min"]["y"]
-    return middles if wide <= WIDEST * high or len(boxes) < 4 else _in_shelves(boxes, middles)
+    return middles if wide <= WIDEST * high or len(boxes) < 4 else _shelf_positions(boxes, middles)
 
 
-def _in_shelves(boxes: Mapping[str, Box], middles: Mapping[str, Place]) -> dict[str, Place]:
+def _shelf_positions(boxes: Mapping[str, Box], middles: Mapping[str, Position]) -> dict[str, Position]:
     # Breaks one long row of groups into several, in the same order.
     area = sum((box[2] + LAYER_GAP) * (box[3] + GROUP_GAP) for box in boxes.values())
     room = max(math.sqrt(area * ASPECT), *(box[2] for box in boxes.values()))
-    found: dict[str, Place] = {}
+    found: dict[str, Position] = {}
     left = top = high = 0.0
     for block in sorted(boxes, key=lambda each: (middles[each], each)):
         _left, _top, wide, tall = boxes[block]
@@ -263,10 +263,10 @@ def _in_shelves(boxes: Mapping[str, Box], middles: Mapping[str, Place]) -> dict[
 
 
 def _route_lines(
-    places: Mapping[str, Place], ways: Sequence[RouteKey], sizes: LayoutSizes
-) -> dict[RouteKey, tuple[Place, ...]]:
+    places: Mapping[str, Position], ways: Sequence[RouteKey], sizes: LayoutSizes
+) -> dict[RouteKey, tuple[Position, ...]]:
     # Routes around the boxes; {} when the library fails: then they are straight.
-    if not ways or len(ways) > MAX_LED:
+    if not ways or len(ways) > MAX_AVOIDING_ROUTES:
         return {}
     index = {key: number for number, key in enumerate(places)}
     request = [
@@ -288,7 +288,7 @@ def _route_lines(
         return {}
 
 
-def _request_box(key: str, size: Place) -> dict[str, Any]:
+def _request_box(key: str, size: Position) -> dict[str, Any]:
     wide, high = size
     return {"size": {"width": wide, "height": high}, "shape": "box", "key": key}
 
@@ -299,20 +299,20 @@ def _request_edges(ways: Sequence[RouteKey], index: Mapping[str, int]) -> list[d
     ]
 
 
-def _point(told: Mapping[str, float]) -> Place:
+def _point(told: Mapping[str, float]) -> Position:
     return float(told["x"]), float(told["y"])
 
 
 # -- without the library ---------------------------------------------------------------------------------
 
 
-def _in_rows(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Place]:
+def _row_positions(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Position]:
     # Each group is a column.
     wide, high = sizes.node
     columns: dict[str, list[str]] = {}
     for node in graph.nodes:
         columns.setdefault(node.group, []).append(node.key)
-    step = wide + 2 * sizes.side + LAYER_GAP
+    step = wide + 2 * sizes.side_margin + LAYER_GAP
     return {
         key: (column * step, row * (high + NODE_GAP))
         for column, keys in enumerate(columns.values())
@@ -320,7 +320,7 @@ def _in_rows(graph: NodeGraph, sizes: LayoutSizes) -> dict[str, Place]:
     }
 
 
-def _place_new(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -> dict[str, Place]:
+def _place_new(graph: NodeGraph, places: dict[str, Position], sizes: LayoutSizes) -> dict[str, Position]:
     # Existing nodes keep their positions; new ones are placed next to them.
     neighbours = _neighbours(graph)
     for node in graph.nodes:
@@ -329,18 +329,18 @@ def _place_new(graph: NodeGraph, places: dict[str, Place], sizes: LayoutSizes) -
         mates = [each.key for each in graph.nodes if each.group == node.group and each.key in places]
         near = [places[key] for key in neighbours.get(node.key, ()) if key in places]
         if mates:
-            places[node.key] = _free_place([places[key] for key in mates], near, places.values(), sizes)
+            places[node.key] = _free_position([places[key] for key in mates], near, places.values(), sizes)
         else:
-            left, top, wide, _high = _around(_box_at(place, sizes.node) for place in places.values())
-            step = sizes.node[0] + 2 * sizes.side + LAYER_GAP
+            left, top, wide, _high = _bounding_box(_box_at(place, sizes.node) for place in places.values())
+            step = sizes.node[0] + 2 * sizes.side_margin + LAYER_GAP
             places[node.key] = (left + wide + step - sizes.node[0] / 2, top + sizes.node[1] / 2)
         _push_apart(graph, places, node.group, sizes)
     return places
 
 
-def _free_place(
-    mates: Sequence[Place], near: Sequence[Place], taken: Iterable[Place], sizes: LayoutSizes
-) -> Place:
+def _free_position(
+    mates: Sequence[Position], near: Sequence[Position], taken: Iterable[Position], sizes: LayoutSizes
+) -> Position:
     # In the columns of the group, nearest to the connected nodes.
     high = sizes.node[1] + NODE_GAP
     wide = sizes.node[0]
@@ -361,14 +361,14 @@ def _free_place(
     return min(free, key=lambda at: (abs(at[0] - x_near) + abs(at[1] - y_near), at))
 
 
-def _push_apart(graph: NodeGraph, places: dict[str, Place], grown: str, sizes: LayoutSizes) -> None:
+def _push_apart(graph: NodeGraph, places: dict[str, Position], grown: str, sizes: LayoutSizes) -> None:
     # Moves whole groups down until none overlaps one that has grown.
     members: dict[str, list[str]] = {}
     for node in graph.nodes:
         if node.key in places:
             members.setdefault(node.group or node.key, []).append(node.key)
     boxes = {
-        key: _around(_with_margins(_box_at(places[each], sizes.node), key, sizes) for each in keys)
+        key: _bounding_box(_with_margins(_box_at(places[each], sizes.node), key, sizes) for each in keys)
         for key, keys in members.items()
     }
     moving = [grown] if grown in boxes else []
@@ -377,7 +377,7 @@ def _push_apart(graph: NodeGraph, places: dict[str, Place], grown: str, sizes: L
             return
         upper = moving.pop()
         for key, box in boxes.items():
-            if key == upper or not _overlap(boxes[upper], box):
+            if key == upper or not _overlaps(boxes[upper], box):
                 continue
             down = boxes[upper][1] + boxes[upper][3] + GROUP_GAP - box[1]
             boxes[key] = (box[0], box[1] + down, box[2], box[3])
@@ -397,18 +397,20 @@ def _neighbours(graph: NodeGraph) -> dict[str, set[str]]:
     return found
 
 
-def _group_boxes(graph: NodeGraph, places: Mapping[str, Place], sizes: LayoutSizes) -> dict[str, Box]:
+def _group_boxes(graph: NodeGraph, places: Mapping[str, Position], sizes: LayoutSizes) -> dict[str, Box]:
     # Around the nodes of each expanded group, at least as wide as its name.
     inside: dict[str, list[Box]] = {}
     for node in graph.nodes:
         inside.setdefault(node.group, []).append(_box_at(places[node.key], sizes.node))
     rectangles = {}
     for group in graph.groups:
-        if group.is_closed or group.key not in inside:
+        if group.is_collapsed or group.key not in inside:
             continue
-        left, top, wide, high = _around(_with_margins(box, group.key, sizes) for box in inside[group.key])
-        if group.quiet:
-            high += sizes.foot
+        left, top, wide, high = _bounding_box(
+            _with_margins(box, group.key, sizes) for box in inside[group.key]
+        )
+        if group.quiet_count:
+            high += sizes.footer
         rectangles[group.key] = (left, top, wide, high)
     return rectangles
 
@@ -418,14 +420,19 @@ def _with_margins(box: Box, group: str, sizes: LayoutSizes) -> Box:
     if not group:
         return box
     left, top, wide, high = box
-    return (left - sizes.side, top - sizes.head, wide + 2 * sizes.side, high + sizes.head + sizes.side)
+    return (
+        left - sizes.side_margin,
+        top - sizes.header,
+        wide + 2 * sizes.side_margin,
+        high + sizes.header + sizes.side_margin,
+    )
 
 
-def _box_at(place: Place, size: Place) -> Box:
+def _box_at(place: Position, size: Position) -> Box:
     return place[0] - size[0] / 2, place[1] - size[1] / 2, size[0], size[1]
 
 
-def _around(boxes: Iterable[Box]) -> Box:
+def _bounding_box(boxes: Iterable[Box]) -> Box:
     rectangles = list(boxes)
     if not rectangles:
         return 0.0, 0.0, 0.0, 0.0
@@ -434,7 +441,7 @@ def _around(boxes: Iterable[Box]) -> Box:
     return left, top, right - left, bottom - top
 
 
-def _overlap(one: Box, other: Box) -> bool:
+def _overlaps(one: Box, other: Box) -> bool:
     return (
         one[0] < other[0] + other[2]
         and other[0] < one[0] + one[2]
@@ -443,7 +450,7 @@ def _overlap(one: Box, other: Box) -> bool:
     )
 
 
-def _straight(source: Place, target: Place, sizes: LayoutSizes) -> tuple[Place, ...]:
+def _straight(source: Position, target: Position, sizes: LayoutSizes) -> tuple[Position, ...]:
     # From the right edge to the left edge; reversed when the target is to the left.
     half = sizes.node[0] / 2
     way = half if source[0] <= target[0] else -half

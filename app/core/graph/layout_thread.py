@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 
 from app.core.faults import log_errors
-from app.core.graph.layout import GraphLayout, LayoutSizes, arrange, arrange_plainly
+from app.core.graph.layout import GraphLayout, LayoutSizes, arrange, arrange_in_rows
 from app.core.graph.layout_process import LayoutProcess, is_large
 from app.core.graph.node_graph import NodeGraph
 
@@ -37,7 +37,7 @@ class LayoutThread:
         with self._changed:
             return self._is_busy or self._waiting is not None
 
-    def ask(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> None:
+    def submit(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> None:
         """Lay out this graph, replacing a pending one. No effect after `close`."""
         with self._changed:
             if self._is_closing:
@@ -91,10 +91,10 @@ class LayoutThread:
             try:
                 self._process = process = LayoutProcess()
             except OSError:  # no more processes can be started
-                return arrange_plainly(graph, sizes)
+                return arrange_in_rows(graph, sizes)
         try:
             layout = process.arrange(graph, before, sizes)
         finally:
             with self._changed:
                 self._process = None
-        return layout if layout is not None else arrange_plainly(graph, sizes)
+        return layout if layout is not None else arrange_in_rows(graph, sizes)

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from typing import Literal
 from urllib.parse import urlsplit
 
-from app.core.network.graph_changes import PROGRAM
+from app.core.network.graph_changes import UNNAMED_PREFIX
 from app.core.network.nodes import NodeEntry
 from app.core.network.source import NODE_NAME
 from app.core.network.topics import Topic, key_of
 from app.core.network.web_words import PageNode
-from app.core.networks.kinds import kind_named
+from app.core.networks.kinds import find_kind
 from nep.protocol.graph_view import ServiceInfo
 from nep.protocol.topic_pattern import is_pattern, matches
 
@@ -22,11 +22,11 @@ GroupBy = Literal["computer", "robot", "nothing"]
 NodeKind = Literal["program", "studio", "behaviour", "robot", "bridge", "original", "page", "group"]
 LineKind = Literal["topic", "service"]
 
-OWN = "/nep/"
+INTERNAL_PREFIX = "/nep/"
 """Prefix of nep's internal topics and services, such as logging, which every node has."""
 MAX_EXPANDED_NODES = 200
 """Number of nodes above which all groups are collapsed initially."""
-BRIDGE_TO = "-to-"
+BRIDGE_SEPARATOR = "-to-"
 """Infix of bridge node names: "bridge-NAME-to-BACKEND"."""
 
 
@@ -54,7 +54,7 @@ class GraphFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class GraphChoices:
+class GraphOptions:
     """Options of the drawing.
 
     Attributes:
@@ -65,16 +65,16 @@ class GraphChoices:
 
     group_by: GroupBy = "computer"
     shows_services: bool = True
-    shows_own: bool = False
+    shows_internal: bool = False
     hides_quiet: bool = True
     quiet: frozenset[str] = frozenset()
-    quiet_shown: frozenset[str] = frozenset()
-    starts_closed: bool = False
+    quiet_visible_groups: frozenset[str] = frozenset()
+    starts_collapsed: bool = False
     toggled: frozenset[str] = frozenset()
 
-    def is_closed(self, group: str) -> bool:
+    def is_collapsed(self, group: str) -> bool:
         """Return True if a group is collapsed and drawn as one box."""
-        return bool(group) and self.starts_closed is not (group in self.toggled)
+        return bool(group) and self.starts_collapsed is not (group in self.toggled)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +95,12 @@ class DrawnNode:
     kind: NodeKind
     entry: NodeEntry | None = field(default=None, compare=False)
     entry_key: str = ""
-    joins: str = ""
+    bridged_network: str = ""
     has_pictures: bool = False
     is_gone: bool = False
     is_quiet: bool = False
-    members: int = 1
-    quiet: int = 0
+    member_count: int = 1
+    quiet_count: int = 0
     page: PageNode | None = None
 
 
@@ -136,9 +136,9 @@ class GraphGroup:
     name: str
     address: str
     icon: str
-    members: int
-    quiet: int
-    is_closed: bool
+    member_count: int
+    quiet_count: int
+    is_collapsed: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,11 +148,11 @@ class NodeGraph:
     nodes: tuple[DrawnNode, ...] = ()
     lines: tuple[GraphLine, ...] = ()
     groups: tuple[GraphGroup, ...] = ()
-    nodes_there: int = 0
-    topics_there: int = 0
-    services_there: int = 0
-    quiet_hidden: int = 0
-    pages_there: int = 0
+    node_count: int = 0
+    topic_count: int = 0
+    service_count: int = 0
+    hidden_quiet_count: int = 0
+    page_count: int = 0
 
     def node(self, key: str) -> DrawnNode | None:
         """Return the box with this key, or None."""
@@ -163,16 +163,16 @@ class NodeGraph:
         return next((line for line in self.lines if topic in line.topics), None)
 
 
-def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
+def node_graph(facts: GraphFacts, choices: GraphOptions) -> NodeGraph:
     """Return the drawing for these facts and options.
 
     Takes time proportional to the number of nodes and topics.
     """
     boxes = _boxes(facts, choices)
     groups = _groups(facts, choices, boxes)
-    closed = {group.key for group in groups if group.is_closed}
+    closed = {group.key for group in groups if group.is_collapsed}
     drawn = [node for node in boxes.values() if node.group not in closed and not _is_hidden(node, choices)]
-    drawn += [_collapsed_box(group) for group in groups if group.is_closed]
+    drawn += [_collapsed_box(group) for group in groups if group.is_collapsed]
     shown = {node.key for node in drawn}
     box_by_entry = {
         entry: (node.group if node.group in closed else node.key)
@@ -195,14 +195,14 @@ def node_graph(facts: GraphFacts, choices: GraphChoices) -> NodeGraph:
     )
 
 
-def _is_hidden(node: DrawnNode, choices: GraphChoices) -> bool:
-    return node.is_quiet and choices.hides_quiet and node.group not in choices.quiet_shown
+def _is_hidden(node: DrawnNode, choices: GraphOptions) -> bool:
+    return node.is_quiet and choices.hides_quiet and node.group not in choices.quiet_visible_groups
 
 
 # -- nodes and their groups ----------------------------------------------------------------------------------
 
 
-def _boxes(facts: GraphFacts, choices: GraphChoices) -> dict[str, DrawnNode]:
+def _boxes(facts: GraphFacts, choices: GraphOptions) -> dict[str, DrawnNode]:
     # By the entry's key; groups are not collapsed yet.
     pictures = {topic.key for topic in facts.topics if topic.codec == "image"}
     drawn: dict[str, DrawnNode] = {}
@@ -238,7 +238,7 @@ def _kind_of(entry: NodeEntry, facts: GraphFacts) -> NodeKind:
         return "program"
     if entry.name == NODE_NAME:
         return "studio"
-    if entry.name.startswith(PROGRAM):
+    if entry.name.startswith(UNNAMED_PREFIX):
         return "behaviour"
     return "robot" if entry.name in facts.robots else "program"
 
@@ -250,16 +250,16 @@ def _is_page(entry: NodeEntry) -> bool:
 def _name_of(entry: NodeEntry) -> str:
     if _is_page(entry):
         return entry.name.removeprefix("web_")
-    return entry.name.removeprefix(PROGRAM) or entry.name
+    return entry.name.removeprefix(UNNAMED_PREFIX) or entry.name
 
 
 def _bridged_network(entry: NodeEntry) -> str:
     # "" when its name does not contain it.
-    _before, found, back_end = entry.name.rpartition(BRIDGE_TO)
+    _before, found, back_end = entry.name.rpartition(BRIDGE_SEPARATOR)
     if not entry.is_bridge or not found:
         return ""
-    kind = kind_named(back_end)
-    return kind.words if kind is not None else back_end
+    kind = find_kind(back_end)
+    return kind.product_name if kind is not None else back_end
 
 
 def _group_of(entry: NodeEntry, facts: GraphFacts, group_by: GroupBy) -> str:
@@ -269,17 +269,17 @@ def _group_of(entry: NodeEntry, facts: GraphFacts, group_by: GroupBy) -> str:
     if _is_page(entry):
         return WEB_GROUP
     if group_by == "robot":
-        mine = [name for name in facts.robots if _belongs(entry, name)]
+        mine = [name for name in facts.robots if _belongs_to(entry, name)]
         return f"robot:{max(mine, key=len)}" if mine else "robot:"
     return f"host:{entry.host}" if entry.host or not entry.network else f"network:{entry.network}"
 
 
-def _belongs(entry: NodeEntry, robot: str) -> bool:
+def _belongs_to(entry: NodeEntry, robot: str) -> bool:
     return entry.name == robot or any(topic.startswith(f"/{robot}/") for topic in entry.publishes)
 
 
 def _groups(
-    facts: GraphFacts, choices: GraphChoices, boxes: Mapping[str, DrawnNode]
+    facts: GraphFacts, choices: GraphOptions, boxes: Mapping[str, DrawnNode]
 ) -> tuple[GraphGroup, ...]:
     # Sorted by key. A group whose nodes are all hidden is collapsed, so that it stays visible.
     members: dict[str, list[DrawnNode]] = {}
@@ -294,7 +294,7 @@ def _groups(
         hidden = sum(_is_hidden(node, choices) for node in nodes)
         counts = Counter(addresses[node.entry_key] for node in nodes if node.entry_key in addresses)
         address = min(counts, key=lambda each: (-counts[each], each)) if counts and key != WEB_GROUP else ""
-        closed = choices.is_closed(key) or hidden == len(nodes)
+        closed = choices.is_collapsed(key) or hidden == len(nodes)
         groups.append(
             GraphGroup(key, _host_of(key), address, _icon_of(key, nodes, facts), len(nodes), hidden, closed)
         )
@@ -343,7 +343,14 @@ def _address_in(endpoint: str) -> str:
 
 
 def _collapsed_box(group: GraphGroup) -> DrawnNode:
-    return DrawnNode(group.key, group.name, group.key, "group", members=group.members, quiet=group.quiet)
+    return DrawnNode(
+        group.key,
+        group.name,
+        group.key,
+        "group",
+        member_count=group.member_count,
+        quiet_count=group.quiet_count,
+    )
 
 
 # -- lines ---------------------------------------------------------------------------------------------------
@@ -351,17 +358,17 @@ def _collapsed_box(group: GraphGroup) -> DrawnNode:
 _Ends = tuple[tuple[str, ...], tuple[str, ...]]
 
 
-def is_shown(topic: str, choices: GraphChoices) -> bool:
+def is_drawn(topic: str, choices: GraphOptions) -> bool:
     """Return True if topics with this name are drawn; internal topics only on request."""
-    return choices.shows_own or not topic.startswith(OWN)
+    return choices.shows_internal or not topic.startswith(INTERNAL_PREFIX)
 
 
-def _topic_lines(facts: GraphFacts, choices: GraphChoices, place: Mapping[str, str]) -> Iterator[GraphLine]:
+def _topic_lines(facts: GraphFacts, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
     patterns = _patterns(facts)
     bundles: dict[_Ends, list[str]] = {}
     for topic in facts.topics:
         info = topic.info
-        if info is None or topic.gone_s is not None or not is_shown(topic.name, choices):
+        if info is None or topic.gone_s is not None or not is_drawn(topic.name, choices):
             continue
         hearers = [key_of(topic.network, each.node_id) for each in info.subscribers]
         hearers += [
@@ -370,18 +377,18 @@ def _topic_lines(facts: GraphFacts, choices: GraphChoices, place: Mapping[str, s
             if network == topic.network and matches(pattern, topic.name)
         ]
         speakers = (key_of(topic.network, each.node_id) for each in info.publishers)
-        _bundle(bundles, _ends(speakers, hearers, place), topic.key)
-    yield from _as_lines("topic", bundles)
+        _add_to_bundle(bundles, _ends(speakers, hearers, place), topic.key)
+    yield from _lines_of("topic", bundles)
 
 
-def _service_lines(facts: GraphFacts, choices: GraphChoices, place: Mapping[str, str]) -> Iterator[GraphLine]:
+def _service_lines(facts: GraphFacts, choices: GraphOptions, place: Mapping[str, str]) -> Iterator[GraphLine]:
     bundles: dict[_Ends, list[str]] = {}
     for name, info in facts.services.items():
-        if is_shown(name, choices):
+        if is_drawn(name, choices):
             clients = (each.node_id for each in info.clients)
             servers = (each.node_id for each in info.servers)
-            _bundle(bundles, _ends(clients, servers, place), name)
-    yield from _as_lines("service", bundles)
+            _add_to_bundle(bundles, _ends(clients, servers, place), name)
+    yield from _lines_of("service", bundles)
 
 
 def _patterns(facts: GraphFacts) -> list[tuple[str, str, str]]:
@@ -397,20 +404,20 @@ def _patterns(facts: GraphFacts) -> list[tuple[str, str, str]]:
 
 def _ends(sources: Iterable[str], targets: Iterable[str], place: Mapping[str, str]) -> _Ends:
     # Boxes that are drawn, each once.
-    return _places(sources, place), _places(targets, place)
+    return _boxes_of(sources, place), _boxes_of(targets, place)
 
 
-def _places(entries: Iterable[str], place: Mapping[str, str]) -> tuple[str, ...]:
+def _boxes_of(entries: Iterable[str], place: Mapping[str, str]) -> tuple[str, ...]:
     found = {place[each] for each in entries if each in place}
     return tuple(found) if len(found) < 2 else tuple(sorted(found))
 
 
-def _bundle(bundles: dict[_Ends, list[str]], ends: _Ends, name: str) -> None:
+def _add_to_bundle(bundles: dict[_Ends, list[str]], ends: _Ends, name: str) -> None:
     sources, targets = ends
     if sources and targets and not (len(sources) == 1 and sources == targets):
         bundles.setdefault(ends, []).append(name)
 
 
-def _as_lines(kind: LineKind, bundles: Mapping[_Ends, Collection[str]]) -> Iterator[GraphLine]:
+def _lines_of(kind: LineKind, bundles: Mapping[_Ends, Collection[str]]) -> Iterator[GraphLine]:
     for (sources, targets), names in bundles.items():
         yield GraphLine(kind, sources, targets, tuple(sorted(names)))

@@ -29,7 +29,7 @@ YELLOW: Colour = (1.0, 0.77, 0.24, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class Shape:
     """One shape to draw; its points are fractions of the image.
 
     Attributes:
@@ -48,7 +48,7 @@ class Drawn:
     fill: Colour | None = None
     thickness: float = 1.0
     size: Point = (0.0, 0.0)
-    words: str = ""
+    text: str = ""
 
 
 def is_annotation(payload: object) -> bool:
@@ -59,12 +59,12 @@ def is_annotation(payload: object) -> bool:
     return any(_is_list(each) for each in lists) or _face_of(payload) is not None or "positions" in payload
 
 
-def drawn_by(payload: object, width: int, height: int) -> tuple[Drawn, ...]:
+def shapes_in(payload: object, width: int, height: int) -> tuple[Shape, ...]:
     """Return the shapes in a decoded message for an image of this size; invalid shapes are skipped."""
     if not isinstance(payload, Mapping) or width <= 0 or height <= 0:
         return ()
     frame = _Frame(width, height)
-    return tuple(islice(_all(payload, frame), MAX_SHAPES))
+    return tuple(islice(_all_shapes(payload, frame), MAX_SHAPES))
 
 
 class _Frame:
@@ -84,7 +84,7 @@ class _Frame:
         return x / self.width, y / self.height
 
 
-def _all(payload: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+def _all_shapes(payload: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
     makers = (("circles", _circle), ("points", _points), ("texts", _text))
     for name, maker in makers:
         for item in _items(payload.get(name)):
@@ -95,16 +95,16 @@ def _all(payload: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
         yield from face
 
 
-def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
     centre, diameter = frame.point(item.get("position")), _number(item.get("diameter"))
     if centre is None or diameter is None or diameter <= 0:
         return
     size = diameter / 2 / frame.width, diameter / 2 / frame.height
     outline, fill = _colour(item.get("outline_color")), _colour(item.get("fill_color"))
-    yield Drawn("circle", (centre,), outline, fill, _thickness(item), size)
+    yield Shape("circle", (centre,), outline, fill, _thickness(item), size)
 
 
-def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
     kind = _number(item.get("type")) or 0
     found = (frame.point(value) for value in islice(_items(item.get("points")), frame.left))
     points, thickness = tuple(point for point in found if point is not None), _thickness(item)
@@ -112,29 +112,29 @@ def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
     each = [_colour(colour) for colour in islice(_items(item.get("outline_colors")), len(points))]
     if kind == POINTS and len(each) == len(points):
         for at, own in zip(points, each, strict=True):
-            yield Drawn("points", (at,), own, None, thickness)
+            yield Shape("points", (at,), own, None, thickness)
     elif kind == POINTS:
-        yield Drawn("points", points, outline, fill, thickness)
+        yield Shape("points", points, outline, fill, thickness)
     elif kind == LINE_LOOP and len(points) > 1:
-        yield Drawn("area", points, outline, fill, thickness)
+        yield Shape("area", points, outline, fill, thickness)
     elif kind == LINE_STRIP and len(points) > 1:
-        yield Drawn("line", points, outline, None, thickness)
+        yield Shape("line", points, outline, None, thickness)
     elif kind == LINE_LIST:
         for place in range(0, len(points) - 1, 2):
             own = each[place // 2] if place // 2 < len(each) else outline
-            yield Drawn("line", points[place : place + 2], own, None, thickness)
+            yield Shape("line", points[place : place + 2], own, None, thickness)
 
 
-def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[Drawn]:
+def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
     at, words, height = frame.point(item.get("position")), item.get("text"), _number(item.get("font_size"))
     if at is None or not isinstance(words, str) or not words.strip():
         return
     size = (0.0, (height if height is not None and height > 0 else 12.0) / frame.height)
     ink, ground = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
-    yield Drawn("text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), MAX_TEXT_LENGTH))
+    yield Shape("text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), MAX_TEXT_LENGTH))
 
 
-def _face_of(payload: Mapping[str, object]) -> tuple[Drawn, ...] | None:
+def _face_of(payload: Mapping[str, object]) -> tuple[Shape, ...] | None:
     # The field `center` of `face_positions` is in fact the upper left corner.
     face = payload.get("face")
     if not isinstance(face, Mapping):
@@ -149,7 +149,7 @@ def _face_of(payload: Mapping[str, object]) -> tuple[Drawn, ...] | None:
     x, y = corner
     right, low = x + wide / frame.width, y + high / frame.height
     corners = ((x, y), (right, y), (right, low), (x, low))
-    return (Drawn("area", corners, YELLOW, None, 2.0, words=_("face")),)
+    return (Shape("area", corners, YELLOW, None, 2.0, text=_("face")),)
 
 
 def _thickness(item: Mapping[str, object]) -> float:
@@ -164,10 +164,10 @@ def _colour(value: object) -> Colour | None:
     red, green, blue, covers = (_number(value.get(name)) for name in "rgba")
     if red is None or green is None or blue is None or not covers or covers <= 0:
         return None
-    return _share(red), _share(green), _share(blue), _share(covers)
+    return _clamp(red), _clamp(green), _clamp(blue), _clamp(covers)
 
 
-def _share(value: float) -> float:
+def _clamp(value: float) -> float:
     return min(max(value, 0.0), 1.0)
 
 

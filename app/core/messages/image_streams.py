@@ -12,9 +12,9 @@ from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
-from app.core.messages.picture import Picture, Size, decode, once_more
+from app.core.messages.picture import Picture, Size, decode, reuse_picture
 from app.core.messages.picture_look import PLAIN, PictureLook
-from app.core.network.watches import Watching
+from app.core.network.watches import WatchHandle
 from nep.i18n import _
 from nep.messages.message import Message
 
@@ -58,40 +58,40 @@ class ImageStream:
 
     topic: str
     _images: Images
-    _watch: Watching
+    _watch: WatchHandle
     picture: Picture | None = None
     error: str | None = None
-    held: bool = False
-    awaits_picture: bool = True
-    wish: Size | None = None
+    is_frozen: bool = False
+    is_awaiting_picture: bool = True
+    requested_size: Size | None = None
     """Requested size. This and the next three attributes are used by `Images` under its lock."""
     look: PictureLook = PLAIN
     """Requested display style."""
-    waiting: tuple[Message, float] | None = None
+    pending: tuple[Message, float] | None = None
     """Newest message that is not decoded yet, and its arrival time."""
-    arriving: Rate = field(default_factory=Rate)
+    arrival_rate: Rate = field(default_factory=Rate)
     """Rate of arriving images."""
-    _shown: Rate = field(default_factory=Rate)
-    looked_s: float = 0.0
+    _display_rate: Rate = field(default_factory=Rate)
+    silence_start_s: float = 0.0
     """Time from which the silence of the topic is measured. Used by `Images`."""
-    _resting: bool = False
-    closed: bool = False
+    _is_suspended: bool = False
+    is_closed: bool = False
 
     @property
-    def resting(self) -> bool:
+    def is_suspended(self) -> bool:
         """True if the stream is suspended because it can't be seen."""
-        return self._resting
+        return self._is_suspended
 
     @property
     def arriving_hz(self) -> float | None:
         """Rate of arriving images per second."""
         with self._images.lock:
-            return self.arriving.per_second(self._images.clock())
+            return self.arrival_rate.per_second(self._images.clock())
 
     @property
-    def shown_hz(self) -> float | None:
+    def displayed_hz(self) -> float | None:
         """Rate of painted images per second."""
-        return self._shown.per_second(self._images.clock())
+        return self._display_rate.per_second(self._images.clock())
 
     @property
     def silent_s(self) -> float | None:
@@ -99,7 +99,7 @@ class ImageStream:
         picture = self.picture
         if picture is None:
             return None
-        return self._images.clock() - max(picture.received_s, self.looked_s)
+        return self._images.clock() - max(picture.received_s, self.silence_start_s)
 
     @property
     def age_s(self) -> float | None:
@@ -107,57 +107,59 @@ class ImageStream:
         return self._images.clock() - self.picture.received_s if self.picture is not None else None
 
     @property
-    def stamped_s(self) -> float | None:
+    def stamp_age_s(self) -> float | None:
         """Seconds since the image's own time stamp; None without one."""
         stamp_ns = self.picture.stamp_ns if self.picture is not None else None
         return None if stamp_ns is None else (self._images.now_ns() - stamp_ns) / 1e9
 
-    def want(self, size: Size | None) -> None:
+    def set_size(self, size: Size | None) -> None:
         """Set the displayed size in screen pixels; None for full resolution.
 
         The current image is decoded again if it was decoded at a smaller size.
         """
-        self._images.want(self, size)
+        self._images.set_size(self, size)
 
-    def show_as(self, look: PictureLook) -> None:
+    def set_look(self, look: PictureLook) -> None:
         """Set the display style; the current image is decoded again, even while it is frozen."""
-        self._images.show_as(self, look)
+        self._images.set_look(self, look)
 
-    def hold(self, held: bool) -> None:
+    def set_frozen(self, held: bool) -> None:
         """Freeze the current image, or resume showing the newest one."""
-        self._images.hold(self, held)
+        self._images.set_frozen(self, held)
 
     def count_painted(self) -> None:
         """Count that the panel painted `picture`; call it once for each image."""
         if self.picture is not None:
-            self._shown.add(self.picture.received_s)
+            self._display_rate.add(self.picture.received_s)
 
     def suspend(self) -> None:
         """Suspend the stream: nothing is received or decoded until `wake`; the last image remains."""
-        if not self._resting:
-            self._resting = self.awaits_picture = True
-            self._images.forget(self)
+        if not self._is_suspended:
+            self._is_suspended = self.is_awaiting_picture = True
+            self._images.unregister(self)
             self._watch.suspend()
 
     def resume(self) -> None:
         """Resume after a `rest`."""
-        if self._resting and not self.closed:
-            self._resting = False
-            self.looked_s = self._images.clock()
+        if self._is_suspended and not self.is_closed:
+            self._is_suspended = False
+            self.silence_start_s = self._images.clock()
             self._watch.resume()
             self._images.add(self)
 
     def close(self) -> None:
         """Close the stream. Idempotent."""
-        self._resting = self.closed = True
-        self._images.forget(self)
+        self._is_suspended = self.is_closed = True
+        self._images.unregister(self)
         self._watch.close()
 
 
 class Images:
     """All open streams, and the thread that decodes their images."""
 
-    def __init__(self, watch: Callable[[str], Watching], clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, watch: Callable[[str], WatchHandle], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._watch = watch
         self.clock = clock
         self.now_ns: Callable[[], int] = time.time_ns
@@ -179,18 +181,18 @@ class Images:
         """Register an opened or resumed stream."""
         with self.lock:
             self._streams.setdefault(stream.topic, []).append(stream)
-            stream.arriving = Rate()
+            stream.arrival_rate = Rate()
             self._arrived.notify()  # a held one may be requested larger
             if self._thread is None and not self._closing:
-                self._thread = self._begin_decoding()
+                self._thread = self._start_decoding()
 
-    def stand_still(self) -> None:
+    def restart_silence(self) -> None:
         """Restart the measurement of silence, because no images can arrive (the replay is paused)."""
         now = self.clock()
         with self.lock:
             for streams in self._streams.values():
                 for stream in streams:
-                    stream.looked_s = now
+                    stream.silence_start_s = now
 
     def offer(self, messages: Sequence[Message], key: str = "") -> None:
         """Store the newest message of each visible topic. Called in nep's thread.
@@ -203,9 +205,9 @@ class Images:
             now = self.clock()
             for message in messages:
                 for stream in self._streams.get(key or message.topic, ()):
-                    if not stream.held:
-                        stream.waiting = (message, now)
-                    stream.arriving.add(now)
+                    if not stream.is_frozen:
+                        stream.pending = (message, now)
+                    stream.arrival_rate.add(now)
             self._arrived.notify()
 
     def rewind(self, topics: Collection[str] = ()) -> None:
@@ -214,55 +216,60 @@ class Images:
             self._times += 1
             for topic, streams in self._streams.items():
                 for stream in streams:
-                    if stream.held:
+                    if stream.is_frozen:
                         continue
-                    stream.waiting = None
-                    stream.arriving = Rate()
+                    stream.pending = None
+                    stream.arrival_rate = Rate()
                     if topic not in topics:
                         stream.picture = stream.error = None
-                        stream.awaits_picture = True
+                        stream.is_awaiting_picture = True
 
-    def forget(self, stream: ImageStream) -> None:
+    def unregister(self, stream: ImageStream) -> None:
         """Unregister a closed or suspended stream."""
         with self.lock:
-            if not stream.held:
-                stream.waiting = None
+            if not stream.is_frozen:
+                stream.pending = None
             left = [other for other in self._streams.get(stream.topic, []) if other is not stream]
             if left:
                 self._streams[stream.topic] = left
             else:
                 self._streams.pop(stream.topic, None)
 
-    def want(self, stream: ImageStream, size: Size | None) -> None:
+    def set_size(self, stream: ImageStream, size: Size | None) -> None:
         """Set a stream's displayed size; see `ImageStream.want`."""
         with self.lock:
-            if stream.wish == size:
+            if stream.requested_size == size:
                 return
-            stream.wish = size
+            stream.requested_size = size
             picture = stream.picture
-            if picture is None or picture.whole or picture.message is None or stream.waiting is not None:
+            if (
+                picture is None
+                or picture.is_full_resolution
+                or picture.message is None
+                or stream.pending is not None
+            ):
                 return
             if _is_too_small(picture, size):
-                stream.waiting = (picture.message, picture.received_s)
+                stream.pending = (picture.message, picture.received_s)
                 self._arrived.notify()
 
-    def show_as(self, stream: ImageStream, look: PictureLook) -> None:
+    def set_look(self, stream: ImageStream, look: PictureLook) -> None:
         """Set a stream's style; see `ImageStream.show_as`."""
         with self.lock:
             if stream.look == look:
                 return
             stream.look = look
             picture = stream.picture
-            if picture is not None and picture.message is not None and stream.waiting is None:
-                stream.waiting = (picture.message, picture.received_s)
+            if picture is not None and picture.message is not None and stream.pending is None:
+                stream.pending = (picture.message, picture.received_s)
                 self._arrived.notify()
 
-    def hold(self, stream: ImageStream, held: bool) -> None:
+    def set_frozen(self, stream: ImageStream, held: bool) -> None:
         """Hold or release a stream; see `ImageStream.hold`."""
         with self.lock:
-            stream.held = held
+            stream.is_frozen = held
             if held:
-                stream.waiting = None
+                stream.pending = None
 
     def close(self) -> None:
         """Stop the thread."""
@@ -272,7 +279,7 @@ class Images:
         if self._thread is not None:
             self._thread.join(timeout=2)
 
-    def _begin_decoding(self) -> threading.Thread | None:
+    def _start_decoding(self) -> threading.Thread | None:
         # Overridden in tests to return None: they call `decode_waiting`.
         thread = threading.Thread(target=self._decode_all, name="studio-images", daemon=True)
         thread.start()
@@ -281,19 +288,19 @@ class Images:
     def _decode_all(self) -> None:
         while True:
             with self.lock:
-                while not self._closing and not self._any_waiting():
+                while not self._closing and not self._has_pending():
                     self._arrived.wait()
                 if self._closing:
                     return
-            self.decode_waiting()
+            self.decode_pending()
 
-    def decode_waiting(self) -> None:
+    def decode_pending(self) -> None:
         """Decode the newest pending image of each stream. Called by the decoding thread."""
         with self.lock:
-            work, times = self._take_waiting(), self._times
+            work, times = self._take_pending(), self._times
         for streams, message, arrived_s, size, look in work:
             try:
-                picture, error = once_more(streams[0].picture, message, arrived_s, size, look), None
+                picture, error = reuse_picture(streams[0].picture, message, arrived_s, size, look), None
                 if picture is None:
                     picture, error = decode(message, arrived_s, size, look)
             except Exception as problem:  # noqa: BLE001  one message must not end the decoding thread
@@ -307,45 +314,47 @@ class Images:
                 for stream in streams if times == self._times else ():
                     _deliver(stream, message, picture, error)
 
-    def _any_waiting(self) -> bool:
+    def _has_pending(self) -> bool:
         every = (stream for streams in self._streams.values() for stream in streams)
-        return any(stream.waiting is not None for stream in every)
+        return any(stream.pending is not None for stream in every)
 
-    def _take_waiting(self) -> list[tuple[list[ImageStream], Message, float, Size | None, PictureLook]]:
+    def _take_pending(self) -> list[tuple[list[ImageStream], Message, float, Size | None, PictureLook]]:
         work = []
         for streams in self._streams.values():
-            waiting = [stream for stream in streams if stream.waiting is not None]
+            waiting = [stream for stream in streams if stream.pending is not None]
             if not waiting:
                 continue
             of_message: dict[tuple[int, PictureLook], list[ImageStream]] = {}
             for stream in waiting:  # a held stream decodes its own image again
-                asked = (id(stream.waiting[0]), stream.look)  # type: ignore[index]
+                asked = (id(stream.pending[0]), stream.look)  # type: ignore[index]
                 of_message.setdefault(asked, []).append(stream)
             for together in of_message.values():
-                message, arrived_s = together[0].waiting  # type: ignore[misc]
+                message, arrived_s = together[0].pending  # type: ignore[misc]
                 work.append((together, message, arrived_s, _largest(together), together[0].look))
             for stream in waiting:
-                stream.waiting = None
+                stream.pending = None
         return work
 
 
 def _deliver(stream: ImageStream, message: Message, picture: Picture | None, error: str | None) -> None:
     before = stream.picture
-    if stream.resting:
+    if stream.is_suspended:
         return  # the stream isn't visible; the next image after `wake` is shown
-    if stream.held and before is not None and before.message is not message:
+    if stream.is_frozen and before is not None and before.message is not message:
         return  # decoded while the user held the previous image
     stream.error = error
     if picture is not None:
-        if picture.look != stream.look and stream.waiting is None:  # changed while it was decoded
-            stream.waiting = (message, picture.received_s)
+        if picture.look != stream.look and stream.pending is None:  # changed while it was decoded
+            stream.pending = (message, picture.received_s)
         stream.picture = picture
-        stream.awaits_picture = stream.awaits_picture and before is not None and before.message is message
+        stream.is_awaiting_picture = (
+            stream.is_awaiting_picture and before is not None and before.message is message
+        )
 
 
 def _largest(streams: Sequence[ImageStream]) -> Size | None:
     # None means full resolution.
-    wishes = [stream.wish for stream in streams]
+    wishes = [stream.requested_size for stream in streams]
     known = [wish for wish in wishes if wish is not None]
     if len(known) < len(wishes):
         return None

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    Places = NDArray[np.int64]
+    Positions = NDArray[np.int64]
 
 CHUNK = 1 << 20
 MAX_DEPTH = 1000
-MANY = 256  # separators
-KEPT = 1000  # containers
+MIN_CACHED_SEPARATORS = 256  # separators
+MAX_CACHED_CONTAINERS = 1000  # containers
 OPEN, CLOSE = b"{[", b"}]"
 QUOTE, BACKSLASH, COMMA, COLON = b'"\\,:'
-SPACE = b" \t\r\n"
+WHITESPACE = b" \t\r\n"
 
 
 class Unreadable:
@@ -58,7 +58,7 @@ class JsonIndex:
         import numpy as np  # noqa: PLC0415  slow import, needed only by large messages
 
         self.data = data
-        self._places, kinds = _structure(data)
+        self._places, kinds = _find_structure(data)
         opens, closes = np.isin(kinds, list(OPEN)), np.isin(kinds, list(CLOSE))
         after = np.cumsum(opens.astype(np.int32) - closes)
         if not len(after) or after[-1] != 0 or after.min() < 0:
@@ -72,7 +72,7 @@ class JsonIndex:
             (np.take(self._places, order[a:b]), np.take(kinds, order[a:b])) for a, b in pairwise(bounds)
         ]
         self._kept: dict[int, _Lazy] = {}
-        self._many: dict[int, tuple[int, Places, Places]] = {}
+        self._many: dict[int, tuple[int, Positions, Positions]] = {}
         self._ends = [places[np.isin(kinds, list(CLOSE))] for places, kinds in self._levels]
 
     @cached_property
@@ -82,7 +82,7 @@ class JsonIndex:
 
     def value(self, start: int, end: int, level: int) -> object:
         """Return the value between two positions, decoded; a lazy one for an object or array."""
-        while start < end and self.data[start] in SPACE:
+        while start < end and self.data[start] in WHITESPACE:
             start += 1
         first = self.data[start] if start < end else 0
         if first in OPEN:
@@ -99,11 +99,11 @@ class JsonIndex:
         found = self._kept.get(start)
         if found is None:
             found = (LazyObject if first == OPEN[0] else LazyList)(self, start, level)
-            if len(self._kept) < KEPT:
+            if len(self._kept) < MAX_CACHED_CONTAINERS:
                 self._kept[start] = found
         return found
 
-    def inside(self, start: int, level: int) -> tuple[int, Places, Places]:
+    def separators(self, start: int, level: int) -> tuple[int, Positions, Positions]:
         """Return end, comma positions and colon positions of the container that starts at ``start``."""
         import numpy as np  # noqa: PLC0415
 
@@ -115,7 +115,7 @@ class JsonIndex:
         first, last = np.searchsorted(places, start) + 1, np.searchsorted(places, end)
         own, kind = places[first:last], kinds[first:last]
         found = end, own[kind == COMMA], own[kind == COLON]
-        if len(own) > MANY:  # requested repeatedly, and slow to find
+        if len(own) > MIN_CACHED_SEPARATORS:  # requested repeatedly, and slow to find
             self._many[start] = found
         return found
 
@@ -139,13 +139,13 @@ class _Lazy:
         self._index, self._start, self._level = index, start, level
 
     @cached_property
-    def _parts(self) -> tuple[int, Places, Places]:
-        return self._index.inside(self._start, self._level)
+    def _parts(self) -> tuple[int, Positions, Positions]:
+        return self._index.separators(self._start, self._level)
 
     @cached_property
     def _count(self) -> int:
         end, commas, _colons = self._parts
-        if len(commas) or bytes(self._index.data[self._start + 1 : end]).strip(SPACE):
+        if len(commas) or bytes(self._index.data[self._start + 1 : end]).strip(WHITESPACE):
             return len(commas) + 1
         return 0
 
@@ -256,7 +256,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
         return _Lazy.__hash__(self)
 
 
-def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
+def _find_structure(data: memoryview) -> tuple[Positions, NDArray[np.uint8]]:
     # Positions and kinds of all brackets, commas and colons outside of strings.
     import numpy as np  # noqa: PLC0415
 
@@ -269,7 +269,7 @@ def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
         quotes = part == QUOTE
         slashes = np.flatnonzero(part == BACKSLASH)
         if escaped or len(slashes):
-            skipped, escaped = _escaped(slashes, len(part), escaped)
+            skipped, escaped = _find_escaped(slashes, len(part), escaped)
             quotes[skipped] = False
         inside = (np.cumsum(quotes, dtype=np.int32) + in_text) & 1
         found = np.flatnonzero(np.take(wanted, part) & (inside == 0))
@@ -281,7 +281,7 @@ def _structure(data: memoryview) -> tuple[Places, NDArray[np.uint8]]:
     return np.concatenate(places), np.concatenate(kinds)
 
 
-def _escaped(slashes: Places, length: int, first: bool) -> tuple[list[int] | Places, bool]:
+def _find_escaped(slashes: Positions, length: int, first: bool) -> tuple[list[int] | Positions, bool]:
     # Positions after an effective backslash, and whether the next chunk starts with such a position.
     import numpy as np  # noqa: PLC0415
 

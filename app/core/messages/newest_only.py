@@ -6,30 +6,30 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-Asked = TypeVar("Asked")
-Done = TypeVar("Done")
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 
-class NewestOnly(Generic[Asked, Done]):
+class NewestOnly(Generic[Job, Result]):
     """Thread that is started by the first job; a newer job replaces a pending one. Thread-safe."""
 
-    def __init__(self, work: Callable[[Asked], Done], name: str) -> None:
+    def __init__(self, work: Callable[[Job], Result], name: str) -> None:
         # `work` is called in the thread and must not raise.
         self._work, self._name = work, name
         self._wake = threading.Condition()
-        self._waiting: list[Asked] = []  # at most one
-        self._working: list[Asked] = []
-        self._done: list[Done] = []
+        self._waiting: list[Job] = []  # at most one
+        self._working: list[Job] = []
+        self._done: list[Result] = []
         self._closing = False
         self._thread: threading.Thread | None = None
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """True if a job is running or pending."""
         with self._wake:
             return bool(self._waiting or self._working)
 
-    def ask(self, job: Asked) -> None:
+    def submit(self, job: Job) -> None:
         """Set the next job, replacing a pending one."""
         with self._wake:
             self._waiting = [job]
@@ -38,13 +38,13 @@ class NewestOnly(Generic[Asked, Done]):
                 self._thread.start()
             self._wake.notify()
 
-    def pop_result(self) -> Done | None:
+    def pop_result(self) -> Result | None:
         """Return and clear the last result; None if there is none."""
         with self._wake:
             done, self._done = self._done, []
         return done[0] if done else None
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Discard pending and finished jobs, and the result of a running one."""
         with self._wake:
             self._waiting, self._working, self._done = [], [], []

@@ -13,13 +13,13 @@ from itertools import islice
 from typing import TypeAlias
 
 from app.core.messages.lazy_json import LazyList, LazyObject
-from app.core.storage.csv_text import csv_text, harmless
+from app.core.storage.csv_text import csv_text, escape_formula
 from nep.messages.fields import path_text
 
 Steps: TypeAlias = tuple[str | int, ...]
 MAX_ROWS = 2000
 MAX_COLUMNS = 40
-LOOKED_AT = 50
+MAX_ROWS_CHECKED = 50
 """Number of rows in which columns are searched."""
 MAX_LISTS = 20
 _MAX_SEARCHED_VALUES = 2000
@@ -38,7 +38,7 @@ class ObjectRow:
         name: Index as text, or the path of the object in the message.
     """
 
-    place: int
+    index: int
     name: str
     value: Mapping[object, object]
 
@@ -131,7 +131,7 @@ def columns_of(rows: Sequence[ObjectRow], most: int = MAX_COLUMNS) -> tuple[Step
     The keys of small nested objects become separate columns.
     """
     columns: dict[Steps, None] = {}
-    for row in rows[:LOOKED_AT]:
+    for row in rows[:MAX_ROWS_CHECKED]:
         for key, value in row.value.items():
             if isinstance(value, Mapping) and 0 < len(value) <= _MAX_FLATTENED_KEYS:
                 columns.update(dict.fromkeys((key, below) for below in value))  # type: ignore[misc]
@@ -171,7 +171,7 @@ def cell_text(value: object) -> str:
     if value is MISSING or value is None:
         return ""
     if isinstance(value, str):
-        return harmless(value)
+        return escape_formula(value)
     if isinstance(value, (bytes, bytearray, memoryview)):
         return bytes(value).hex()
     if isinstance(value, (LazyList, LazyObject)):
@@ -181,6 +181,6 @@ def cell_text(value: object) -> str:
 
 def table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
     """Return the table as CSV; ``first`` is the title of the column with the row names."""
-    head = [first, *(harmless(column_name(column)) for column in columns)]
-    lines = ([harmless(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
+    head = [first, *(escape_formula(column_name(column)) for column in columns)]
+    lines = ([escape_formula(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
     return csv_text([head, *lines])

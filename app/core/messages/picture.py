@@ -5,11 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from app.core.messages.picture_look import PLAIN, ColourScale, PictureLook, in_colours, scaled, toned
+from app.core.messages.picture_look import (
+    PLAIN,
+    ColourScale,
+    PictureLook,
+    apply_colour_map,
+    apply_tones,
+    scaled,
+)
 from nep.errors import EncodeError, NepError
 from nep.i18n import _
 from nep.messages import image_codec
-from nep.messages.image_files import examine
+from nep.messages.image_files import parse_header
 from nep.messages.message import Message
 
 if TYPE_CHECKING:
@@ -18,10 +25,10 @@ if TYPE_CHECKING:
 
 Size = tuple[int, int]
 Pixel = int | float | tuple[int, int, int]
-REDUCED = (8, 4, 2)
-PNG_NUMBERS = ("uint8", "uint16")
-COMPARED_FIRST = 4096
-AVERAGED = ("uint8", "uint16")
+REDUCTION_FACTORS = (8, 4, 2)
+PNG_DTYPES = ("uint8", "uint16")
+COMPARED_SAMPLES = 4096
+AVERAGED_DTYPES = ("uint8", "uint16")
 """Types that are reduced in size by averaging. Other types may contain NaN and are reduced by taking every
 nth pixel.
 """
@@ -50,17 +57,17 @@ class Picture:
     """Display style with which the image was decoded."""
     scale: ColourScale | None = None
     """Colour scale, if the colours represent numbers."""
-    one_channel: bool = False
+    has_one_channel: bool = False
     """True if the image has one channel, even if `numbers` is None."""
 
     @property
-    def whole(self) -> bool:
+    def is_full_resolution(self) -> bool:
         """True if the image was decoded in full resolution."""
         return self.bgra.shape[:2] == (self.height, self.width)
 
     def pixel(self, x: int, y: int) -> Pixel | None:
         """Return red, green and blue, or the number of an image with one channel; None if it is unknown."""
-        if not (self.whole and 0 <= x < self.width and 0 <= y < self.height):
+        if not (self.is_full_resolution and 0 <= x < self.width and 0 <= y < self.height):
             return None
         if self.numbers is not None:
             number: int | float = self.numbers[y, x].item()
@@ -105,7 +112,7 @@ def decode(
     return image, None
 
 
-def once_more(
+def reuse_picture(
     shown: Picture | None, message: Message, received_s: float, fit: Size | None, look: PictureLook = PLAIN
 ) -> Picture | None:
     """Return the shown image with the data of a new message, if both messages have equal bytes.
@@ -118,16 +125,16 @@ def once_more(
     of, factor = shown.message, _factor((shown.width, shown.height), fit)
     if abs(shown.bgra.shape[0] * factor - shown.height) >= factor:  # rounded up or down
         return None
-    if of.extension != message.extension or not _same_bytes(of.data, message.data):
+    if of.extension != message.extension or not _are_bytes_equal(of.data, message.data):
         return None
     return replace(shown, seq=message.seq, stamp_ns=message.stamp_ns, received_s=received_s, message=message)
 
 
-def _same_bytes(one: memoryview, other: memoryview) -> bool:
+def _are_bytes_equal(one: memoryview, other: memoryview) -> bool:
     # Changing camera images are detected by a sample of bytes.
     if one.nbytes != other.nbytes:
         return False
-    step = max(1, one.nbytes // COMPARED_FIRST)
+    step = max(1, one.nbytes // COMPARED_SAMPLES)
     return bytes(one[::step]) == bytes(other[::step]) and bytes(one) == bytes(other)
 
 
@@ -148,11 +155,11 @@ def png_of(message: Message) -> bytes:
     import cv2  # noqa: PLC0415  slow import
 
     if image_codec.raw_layout(message.extension.get("encoding")) is None:
-        file = examine(message.data)
+        file = parse_header(message.data)
         if file.kind == "png":
             return bytes(file.data)
     frame, _size = _frame(message, None)
-    if frame.dtype not in PNG_NUMBERS:
+    if frame.dtype not in PNG_DTYPES:
         raise EncodeError(
             "png",
             _("image of {dtype}").format(dtype=frame.dtype),
@@ -170,25 +177,25 @@ def _frame(message: Message, fit: Size | None) -> tuple[NDArray[Any], Size]:
     if layout is not None:
         frame = image_codec.raw_array(message.data, layout, message.extension.get("shape"))
         size = (frame.shape[1], frame.shape[0])
-        frame = _reduced(frame, _factor(size, fit))
+        frame = _reduce(frame, _factor(size, fit))
         if layout.is_red_first:
             frame = frame[:, :, [2, 1, 0, 3][: layout.channels]]
         return frame, size
-    file = examine(message.data)
+    file = parse_header(message.data)
     size = (file.width, file.height)
     factor = _factor(size, fit)
     if file.kind == "jpeg":
         return image_codec.read_file(file, factor), size
-    return _reduced(image_codec.read_file(file), factor), size
+    return _reduce(image_codec.read_file(file), factor), size
 
 
-def _reduced(frame: NDArray[Any], factor: int) -> NDArray[Any]:
+def _reduce(frame: NDArray[Any], factor: int) -> NDArray[Any]:
     import cv2  # noqa: PLC0415
 
     if factor == 1:
         return frame
     small = (max(1, frame.shape[1] // factor), max(1, frame.shape[0] // factor))
-    if frame.dtype not in AVERAGED:
+    if frame.dtype not in AVERAGED_DTYPES:
         return frame[::factor, ::factor][: small[1], : small[0]]
     smaller: NDArray[Any] = cv2.resize(frame, small, interpolation=cv2.INTER_AREA)
     return smaller
@@ -199,7 +206,7 @@ def _factor(size: Size, fit: Size | None) -> int:
     if fit is None:
         return 1
     shrink = min(size[0] / max(1, fit[0]), size[1] / max(1, fit[1]))
-    return next((factor for factor in REDUCED if shrink >= factor), 1)
+    return next((factor for factor in REDUCTION_FACTORS if shrink >= factor), 1)
 
 
 def _bgra(
@@ -215,20 +222,20 @@ def _bgra(
     if channels == 1:
         grey = frame.reshape(frame.shape[:2])
         if frame.dtype == np.uint8 and (look.colours, look.low, look.high) == ("", None, None):
-            return cv2.cvtColor(toned(look, grey), cv2.COLOR_GRAY2BGRA), grey, None
-        bgra, scale = in_colours(look, grey)
+            return cv2.cvtColor(apply_tones(look, grey), cv2.COLOR_GRAY2BGRA), grey, None
+        bgra, scale = apply_colour_map(look, grey)
         return bgra, grey, scale
     if frame.dtype != np.uint8:
-        frame = _eight_bits(frame)
+        frame = _to_eight_bits(frame)
     if channels == 2:  # such as a vector field: shown as blue and green
         frame = np.dstack([frame, np.zeros(frame.shape[:2], np.uint8)])
-    frame = toned(look, frame)
+    frame = apply_tones(look, frame)
     if channels == 4:
         return np.ascontiguousarray(frame), None, None
     return cv2.cvtColor(np.ascontiguousarray(frame), cv2.COLOR_BGR2BGRA), None, None
 
 
-def _eight_bits(frame: NDArray[Any]) -> NDArray[np.uint8]:
+def _to_eight_bits(frame: NDArray[Any]) -> NDArray[np.uint8]:
     # 16 bits by their range, floats from 0 to 1, others by their minimum and maximum.
     import numpy as np  # noqa: PLC0415
 

@@ -16,7 +16,7 @@ COLOUR_MAPS = ("grey", "viridis", "turbo", "inferno", "jet")
 """Names of the colour maps; "" is the default: grey for bytes, viridis for other types."""
 MIN_CONTRAST, MAX_CONTRAST = 0.1, 10.0
 STRIP_ROWS = 64
-SPREAD = "viridis"
+DEFAULT_COLOUR_MAP = "viridis"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class PictureLook:
     low: float | None = None
     high: float | None = None
 
-    def saved(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """Return the style as JSON data for a layout; `restored` parses it."""
         return {
             "brightness": self.brightness,
@@ -51,7 +51,7 @@ class PictureLook:
 PLAIN = PictureLook()
 
 
-def restored(saved: object) -> PictureLook:
+def parse_look(saved: object) -> PictureLook:
     """Parse the result of `PictureLook.saved`; invalid values become defaults."""
     if not isinstance(saved, Mapping):
         return PLAIN
@@ -91,7 +91,7 @@ class ColourScale:
     colours: NDArray[np.uint8]
 
 
-def toned(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def apply_tones(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Apply brightness and contrast to 8-bit values."""
     if (look.brightness, look.contrast) == (0.0, 1.0):
         return picture
@@ -101,7 +101,7 @@ def toned(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.LUT(picture, _tones(look)), np.uint8)
 
 
-def in_colours(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
+def apply_colour_map(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
     """Apply the colour map to an image with one channel (rows, columns).
 
     Returns an array of blue, green, red and 255 for each pixel, black for NaN, and the colour scale.
@@ -110,8 +110,10 @@ def in_colours(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uin
     import numpy as np  # noqa: PLC0415
 
     known = np.isfinite(numbers)
-    low, high = _ends(look, numbers[known], is_bytes=numbers.dtype == np.uint8)
-    colours = _colours(look.colours or ("grey" if numbers.dtype == np.uint8 else SPREAD))[_tones(look)]
+    low, high = _value_range(look, numbers[known], is_bytes=numbers.dtype == np.uint8)
+    colours = _colours(look.colours or ("grey" if numbers.dtype == np.uint8 else DEFAULT_COLOUR_MAP))[
+        _tones(look)
+    ]
     shown = cv2.cvtColor(scaled(numbers, known, low, high), cv2.COLOR_GRAY2BGR)
     bgra = cv2.cvtColor(cv2.LUT(shown, colours[:, ::-1].reshape(256, 1, 3)), cv2.COLOR_BGR2BGRA)
     if not known.all():
@@ -119,7 +121,7 @@ def in_colours(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uin
     return np.asarray(bgra, np.uint8), ColourScale(low, high, colours)
 
 
-def _ends(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
+def _value_range(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> tuple[float, float]:
     # In ascending order.
     own = (
         (0.0, 255.0)

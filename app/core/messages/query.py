@@ -37,7 +37,7 @@ class FoundPath(str):
     steps: Steps
 
     @classmethod
-    def of(cls, steps: Steps) -> FoundPath:
+    def from_steps(cls, steps: Steps) -> FoundPath:
         """Return the path with these steps; ``$`` for the whole message."""
         found = cls(path_text(steps) if steps else "$")
         found.steps = steps
@@ -45,7 +45,7 @@ class FoundPath(str):
 
 
 @dataclass(frozen=True, slots=True)
-class QueryAnswer:
+class QueryResult:
     """Result of a query: values by path. ``cut`` is the reason why the result is incomplete, or ""."""
 
     found: Mapping[FoundPath, object]
@@ -63,40 +63,40 @@ class JsonQuery:
         try:
             self._path = _environment().compile(self.text)
         except jsonpath.JSONPathError as error:
-            raise QueryError(_sentence(error, self.text)) from error
+            raise QueryError(_error_message(error, self.text)) from error
         except OverflowError as error:
             raise QueryError(_("a number in the query is too large")) from error
         except (RecursionError, ValueError) as error:  # brackets nested a thousand deep; numbers out of range
             raise QueryError(_("the query is not valid")) from error
 
-    def answer(
+    def evaluate(
         self, value: object, most_steps: int = MAX_STEPS, most_found: int = MAX_RESULTS
-    ) -> QueryAnswer:
+    ) -> QueryResult:
         """Return the values found in a decoded message.
 
         Args:
             most_steps: Maximum number of visited values.
             most_found: Maximum number of returned values.
         """
-        count = _Steps(most_steps)
-        looked_through = _counted(value, count)
+        count = _StepCounter(most_steps)
+        looked_through = _wrap_counted(value, count)
         found: dict[FoundPath, object] = {}
         if not isinstance(looked_through, (_CountedObject, _CountedList)):
-            return QueryAnswer({FoundPath.of(()): value} if self.text == "$" else {})
+            return QueryResult({FoundPath.from_steps(()): value} if self.text == "$" else {})
         cut = ""
         try:
             for match in self._path.finditer(looked_through):
                 if len(found) >= most_found:
                     cut = _("Only the first {count} are shown.").format(count=most_found)
                     break
-                found[FoundPath.of(tuple(match.parts))] = _plain(match.obj)
+                found[FoundPath.from_steps(tuple(match.parts))] = _unwrap(match.obj)
         except _LimitReached:
             cut = _("Search stopped after {count} values; these were found so far.").format(count=most_steps)
         except RecursionError:
             cut = _("The message is nested too deeply for a query.")
         except jsonpath.JSONPathError as error:
-            cut = _sentence(error, self.text)
-        return QueryAnswer(found, cut)
+            cut = _error_message(error, self.text)
+        return QueryResult(found, cut)
 
 
 @cache
@@ -107,7 +107,7 @@ def _environment() -> jsonpath.JSONPathEnvironment:
     return environment
 
 
-def _sentence(error: jsonpath.JSONPathError, text: str) -> str:
+def _error_message(error: jsonpath.JSONPathError, text: str) -> str:
     reason, token = escaped(str(error.message or "")), error.token
     rest = text[token.index :] if token is not None and 0 <= token.index < len(text) else ""
     if not rest:
@@ -120,7 +120,7 @@ class _LimitReached(Exception):  # noqa: N818  not an error: it ends the search
     """Raised when the maximum number of visited values is reached."""
 
 
-class _Steps:
+class _StepCounter:
     """Counter of visited values."""
 
     def __init__(self, most: int) -> None:
@@ -132,7 +132,7 @@ class _Steps:
             raise _LimitReached
 
 
-def _counted(value: object, count: _Steps) -> object:
+def _wrap_counted(value: object, count: _StepCounter) -> object:
     if isinstance(value, Mapping):
         return _CountedObject(value, count)
     if isinstance(value, (bytes, bytearray, memoryview)):
@@ -142,12 +142,12 @@ def _counted(value: object, count: _Steps) -> object:
     return value
 
 
-def _plain(value: object) -> object:
+def _unwrap(value: object) -> object:
     # Unwraps a counted value.
     return value.raw if isinstance(value, (_CountedObject, _CountedList, _Bytes)) else value
 
 
-def _same(one: object, other: object) -> bool:
+def _are_equal(one: object, other: object) -> bool:
     # JSON equality: true is not 1.
     return isinstance(one, bool) is isinstance(other, bool) and one == other
 
@@ -162,12 +162,12 @@ class _Bytes:
 class _CountedObject(Mapping[str, object]):
     __slots__ = ("_count", "raw")
 
-    def __init__(self, raw: Mapping[object, object], count: _Steps) -> None:
+    def __init__(self, raw: Mapping[object, object], count: _StepCounter) -> None:
         self.raw, self._count = raw, count
 
     def __getitem__(self, key: str) -> object:
         self._count.add()
-        return _counted(self.raw[key], self._count)
+        return _wrap_counted(self.raw[key], self._count)
 
     def __iter__(self) -> Iterator[str]:
         for key in self.raw:
@@ -178,7 +178,7 @@ class _CountedObject(Mapping[str, object]):
         # Avoids looking up each key again, and supports numeric keys of msgpack.
         for key, value in self.raw.items():
             self._count.add()
-            yield str(key), _counted(value, self._count)
+            yield str(key), _wrap_counted(value, self._count)
 
     def __len__(self) -> int:
         return len(self.raw)
@@ -188,7 +188,7 @@ class _CountedObject(Mapping[str, object]):
         if not isinstance(other, _CountedObject) or len(self) != len(other):
             return False
         return self.raw is other.raw or all(
-            key in other.raw and _same(value, other[key]) for key, value in self.items()
+            key in other.raw and _are_equal(value, other[key]) for key, value in self.items()
         )
 
     __hash__ = None  # type: ignore[assignment]
@@ -197,7 +197,7 @@ class _CountedObject(Mapping[str, object]):
 class _CountedList(Sequence[object]):
     __slots__ = ("_count", "raw")
 
-    def __init__(self, raw: Sequence[object], count: _Steps) -> None:
+    def __init__(self, raw: Sequence[object], count: _StepCounter) -> None:
         self.raw, self._count = raw, count
 
     @overload
@@ -209,14 +209,14 @@ class _CountedList(Sequence[object]):
     def __getitem__(self, row: int | slice) -> object:
         if isinstance(row, slice):
             self._count.add(len(range(*row.indices(len(self.raw)))))
-            return [_counted(value, self._count) for value in self.raw[row]]
+            return [_wrap_counted(value, self._count) for value in self.raw[row]]
         self._count.add()
-        return _counted(self.raw[row], self._count)
+        return _wrap_counted(self.raw[row], self._count)
 
     def __iter__(self) -> Iterator[object]:
         for value in self.raw:
             self._count.add()
-            yield _counted(value, self._count)
+            yield _wrap_counted(value, self._count)
 
     def __len__(self) -> int:
         return len(self.raw)
@@ -225,6 +225,6 @@ class _CountedList(Sequence[object]):
         self._count.add()
         if not isinstance(other, _CountedList) or len(self) != len(other):
             return False
-        return self.raw is other.raw or all(map(_same, self, other))
+        return self.raw is other.raw or all(map(_are_equal, self, other))
 
     __hash__ = None  # type: ignore[assignment]

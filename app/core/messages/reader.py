@@ -55,19 +55,19 @@ class Reader(NewestOnly[Message, Reading]):
     def _read(message: Message) -> Reading:
         return read(message)
 
-    def ask_at_leisure(self, message: Message, now: float) -> bool:
+    def submit_throttled(self, message: Message, now: float) -> bool:
         """Read a message unless another one is being read or a read started less than a second ago.
 
         Limits the load by large messages. ``now`` is monotonic seconds. Returns True if the message will be
         read.
         """
-        if self.busy or (self._asked_at is not None and now - self._asked_at < READ_INTERVAL_S):
+        if self.is_busy or (self._asked_at is not None and now - self._asked_at < READ_INTERVAL_S):
             return False
         self._asked_at = now
-        self.ask(message)
+        self.submit(message)
         return True
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Discard pending and running reads, so that the next one may start immediately."""
         self._asked_at = None
-        super().forget()
+        super().clear()

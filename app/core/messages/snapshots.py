@@ -14,10 +14,10 @@ from app.core.storage.settings import Settings, home
 from nep.i18n import _
 from nep.messages.message import Message
 
-NAME = "NEP Studio"
+FOLDER_NAME = "NEP Studio"
 
 
-CHOSEN = "pictures_folder"
+FOLDER_SETTING = "pictures_folder"
 
 
 def folder(settings: Settings | None = None) -> Path:
@@ -25,12 +25,12 @@ def folder(settings: Settings | None = None) -> Path:
 
     If ``$NEP_STUDIO_HOME`` is set, the default is ``Pictures`` in that folder.
     """
-    chosen = settings.get(CHOSEN, "") if settings is not None else ""
+    chosen = settings.get(FOLDER_SETTING, "") if settings is not None else ""
     if chosen:
         return Path(chosen)
     if os.environ.get("NEP_STUDIO_HOME"):
         return home() / "Pictures"
-    return platformdirs.user_pictures_path() / NAME
+    return platformdirs.user_pictures_path() / FOLDER_NAME
 
 
 def save(message: Message, into: Path | None = None) -> Path:

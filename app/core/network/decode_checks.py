@@ -17,8 +17,8 @@ from nep.messages.message import Message
 
 READABLE = frozenset({"json", "string", "msgpack"})
 LARGE_BYTES = 300_000
-SHARE = 0.07
-ADVANCE_S = 1.0
+MAX_CPU_SHARE = 0.07
+MAX_BUDGET_S = 1.0
 RESERVE_S = 0.5
 SUSPECT_S = 30.0
 CLOCK_READ_INTERVAL_S = 0.0002
@@ -27,7 +27,7 @@ SOME, SOME_BYTES = 256, 64_000
 
 
 @dataclass(slots=True)
-class Checked:
+class CheckResult:
     """Result of one topic since the last `Checks.pop_results`.
 
     Attributes:
@@ -41,8 +41,8 @@ class Checked:
     checked: int = 0
     bad: int = 0
     unchecked: int = 0
-    sentence: str = ""
-    last_good: bool = True
+    error: str = ""
+    is_last_good: bool = True
 
 
 class Checks:
@@ -56,17 +56,17 @@ class Checks:
         # `clock` is monotonic seconds; `work` is the CPU time of the calling thread in seconds.
         self._clock, self._work = clock, work
         self._lock = threading.Lock()
-        self._found: dict[str, Checked] = {}
+        self._found: dict[str, CheckResult] = {}
         self._suspects: dict[str, float] = {}
-        self._advance_s = ADVANCE_S
+        self._advance_s = MAX_BUDGET_S
         self._refilled = clock()
 
     def check(self, topic: str, messages: Sequence[Message]) -> None:
         """Check messages of one topic, oldest first. Images and bytes are skipped."""
         if not messages or messages[-1].codec not in READABLE:
             return
-        found = Checked()
-        self._refill()
+        found = CheckResult()
+        self._refill_budget()
         self._check(topic, messages, found)
         with self._lock:
             old = self._found.get(topic)
@@ -74,33 +74,33 @@ class Checks:
                 found.checked += old.checked
                 found.bad += old.bad
                 found.unchecked += old.unchecked
-                found.sentence = found.sentence or old.sentence
+                found.error = found.error or old.error
             self._found[topic] = found
 
-    def pop_results(self) -> dict[str, Checked]:
+    def pop_results(self) -> dict[str, CheckResult]:
         """Return the results by topic, and clear them."""
         with self._lock:
             found, self._found = self._found, {}
         return found
 
-    def _refill(self) -> None:
+    def _refill_budget(self) -> None:
         now = self._clock()
-        self._advance_s = min(ADVANCE_S, self._advance_s + max(0.0, now - self._refilled) * SHARE)
+        self._advance_s = min(MAX_BUDGET_S, self._advance_s + max(0.0, now - self._refilled) * MAX_CPU_SHARE)
         self._refilled = now
 
-    def _check(self, topic: str, messages: Sequence[Message], found: Checked) -> None:
+    def _check(self, topic: str, messages: Sequence[Message], found: CheckResult) -> None:
         newest = messages[-1]
         # the newest is always decoded and stays decoded: panels show it
-        found.sentence = _problem(newest, keep=True)
-        found.last_good = not found.sentence
-        found.checked, found.bad = 1, int(not found.last_good)
+        found.error = _decode_error(newest, keep=True)
+        found.is_last_good = not found.error
+        found.checked, found.bad = 1, int(not found.is_last_good)
         now = self._refilled
         if found.bad:
             self._suspects[topic] = now
         if len(messages) > 1:  # reading the clock takes longer than a single message
             self._check_older(topic, messages, found, now)
 
-    def _check_older(self, topic: str, messages: Sequence[Message], found: Checked, now: float) -> None:
+    def _check_older(self, topic: str, messages: Sequence[Message], found: CheckResult, now: float) -> None:
         began = self._work()
         left = self._advance_s - (0.0 if self._is_suspect(topic, now) else RESERVE_S)
         place, some, worked, older = 0, 1, 0.0, len(messages) - 1
@@ -124,22 +124,22 @@ class Checks:
         return seen is not None
 
 
-def _check_batch(messages: Sequence[Message], place: int, end: int, found: Checked) -> int:
+def _check_batch(messages: Sequence[Message], place: int, end: int, found: CheckResult) -> int:
     # Returns the index of the first message that was not decoded (fewer are decoded when they are large).
     size_bytes = 0
     while place < end and size_bytes < SOME_BYTES:
         message = messages[place]
-        problem = _problem(message, keep=False)
+        problem = _decode_error(message, keep=False)
         found.checked += 1
         if problem:
             found.bad += 1
-            found.sentence = found.sentence or problem
+            found.error = found.error or problem
         size_bytes += message.size_bytes
         place += 1
     return place
 
 
-def _problem(message: Message, *, keep: bool) -> str:
+def _decode_error(message: Message, *, keep: bool) -> str:
     # "" also for large messages: the panel that shows one decodes it.
     if message.size_bytes > LARGE_BYTES:
         return ""

@@ -25,7 +25,7 @@ class Doctor:
 
     def __init__(
         self,
-        look: Callable[[str, doctor.Tell], Sequence[doctor.Finding]],
+        look: Callable[[str, doctor.ProgressCallback], Sequence[doctor.Finding]],
         clock: Callable[[], float] = time.time,
     ) -> None:
         # `look` gets the missed topic and a progress callback (findings so far, checks done, checks in all).
@@ -40,7 +40,7 @@ class Doctor:
         self.revision = 0
 
     @property
-    def looking(self) -> bool:
+    def is_running(self) -> bool:
         """True if the checks are running."""
         return self._thread is not None and self._thread.is_alive()
 
@@ -50,33 +50,33 @@ class Doctor:
         return self._found
 
     @property
-    def so_far(self) -> Sequence[doctor.Finding] | None:
+    def partial_findings(self) -> Sequence[doctor.Finding] | None:
         """Findings of the current run so far, worst first; None when it isn't running."""
         return self._so_far
 
     @property
-    def looked_s(self) -> float | None:
+    def finished_s(self) -> float | None:
         """Time of the last completed run in seconds since 1970; None before the first."""
         return self._looked_s
 
     @property
-    def missed(self) -> str:
+    def expected_topic(self) -> str:
         """Topic that the user expects messages from; "" if none was selected."""
         return self._missed
 
     @property
-    def told_of(self) -> str:
+    def checked_topic(self) -> str:
         """Value of `missed` in the run that produced `findings`."""
         return self._told_of
 
-    def miss(self, topic: str) -> None:
+    def expect_topic(self, topic: str) -> None:
         """Set the topic that the user expects messages from ("" for none) and run the checks."""
         self._missed = topic
         self.start()
 
     def start(self) -> None:
         """Start the checks, unless they are running."""
-        if self.looking:
+        if self.is_running:
             return
         self._thread = threading.Thread(target=self._run, name="studio-doctor", daemon=True)
         self._thread.start()
@@ -87,7 +87,7 @@ class Doctor:
         thread = self._thread
         if thread is not None:
             thread.join(within_s)
-        return doctor.report(self._found)
+        return doctor.report_text(self._found)
 
     def close(self) -> None:
         """Wait for a run in progress."""

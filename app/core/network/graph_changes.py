@@ -10,15 +10,15 @@ from nep.protocol.graph_view import GraphView, NodeInfo
 NATIVE = "native"
 GATEWAY = "gateway"
 MASTER = "master"
-PROGRAM = "program "
-NEP = "/nep/"
-FEW = 2
+UNNAMED_PREFIX = "program "
+INTERNAL_PREFIX = "/nep/"
+MAX_LISTED_TOPICS = 2
 MAX_LINES = 8
 """Number of changes above which one line with their count is written; a bridge can add a thousand topics."""
 NAMED = 3
 
 
-def arrivals(before: GraphView, after: GraphView) -> list[str]:
+def change_messages(before: GraphView, after: GraphView) -> list[str]:
     """Return sentences about new nodes with their topics, new topics of known nodes, and nodes that left."""
     here: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []
@@ -26,38 +26,38 @@ def arrivals(before: GraphView, after: GraphView) -> list[str]:
     reported: set[str] = set()
     topics_of = _topics_by_node(after)
     for node in came:
-        new = [name for name in topics_of.get(node, ()) if not _published(before, name)]
+        new = [name for name in topics_of.get(node, ()) if not _is_published(before, name)]
         name, original = after.nodes[node].name, after.nodes[node].generation != NATIVE
-        if len(new) > FEW:
-            here.append((name, _here_with(name, len(new), original=original)))
+        if len(new) > MAX_LISTED_TOPICS:
+            here.append((name, _joined_message(name, len(new), original=original)))
             reported.update(new)
         elif not new:
             words = _("{node} joined (original NEP)") if original else _("{node} joined")
             here.append((name, words.format(node=name)))
     for name, info in after.topics.items():
         count = len(info.publishers)
-        if count and name not in reported and not _is_internal(name) and not _published(before, name):
+        if count and name not in reported and not _is_internal(name) and not _is_published(before, name):
             words = ngettext("{topic} is new, {count} publisher", "{topic} is new, {count} publishers", count)
             more.append((name, words.format(topic=name, count=count)))
     left = [node.name for id, node in before.nodes.items() if id not in after.nodes and _is_reported(node)]
     return [
-        *_summarized(here, _("{count} nodes joined: {names} and {more} more")),
-        *_summarized(more, _("{count} new topics: {names} and {more} more")),
-        *_summarized(
+        *_summarize(here, _("{count} nodes joined: {names} and {more} more")),
+        *_summarize(more, _("{count} new topics: {names} and {more} more")),
+        *_summarize(
             [(name, _("{node} left").format(node=name)) for name in left],
             _("{count} nodes left: {names} and {more} more"),
         ),
     ]
 
 
-def _summarized(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
+def _summarize(lines: Sequence[tuple[str, str]], many: str) -> list[str]:
     if len(lines) <= MAX_LINES:
         return [line for _name, line in lines]
     named = ", ".join(name for name, _line in lines[:NAMED])
     return [many.format(count=len(lines), names=named, more=len(lines) - NAMED)]
 
 
-def _here_with(node: str, count: int, *, original: bool) -> str:
+def _joined_message(node: str, count: int, *, original: bool) -> str:
     words = (
         ngettext(
             "{node} joined with {count} topic (original NEP)",
@@ -72,14 +72,14 @@ def _here_with(node: str, count: int, *, original: bool) -> str:
 
 def _is_reported(node: NodeInfo) -> bool:
     # a behaviour's program is reported by its run; the gateway and the master's log node belong to the master
-    return node.generation != GATEWAY and node.name != MASTER and not node.name.startswith(PROGRAM)
+    return node.generation != GATEWAY and node.name != MASTER and not node.name.startswith(UNNAMED_PREFIX)
 
 
 def _is_internal(topic: str) -> bool:
-    return topic.startswith(NEP)
+    return topic.startswith(INTERNAL_PREFIX)
 
 
-def _published(view: GraphView, topic: str) -> bool:
+def _is_published(view: GraphView, topic: str) -> bool:
     return topic in view.topics and bool(view.topics[topic].publishers)
 
 

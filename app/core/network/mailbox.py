@@ -16,7 +16,7 @@ from nep.messages.message import Message
 
 MESSAGES_PER_TOPIC = 256
 BYTES_PER_TOPIC = 64 * 1024 * 1024
-EVENTS = 20_000
+MAX_EVENTS = 20_000
 
 
 @dataclass(slots=True)
@@ -27,7 +27,7 @@ class Batch:
     dropped: int = 0
 
     @property
-    def arrived(self) -> int:
+    def arrived_count(self) -> int:
         """Number of messages that arrived, including dropped ones."""
         return len(self.messages) + self.dropped
 
@@ -57,7 +57,7 @@ class Mailbox:
         self,
         messages_per_topic: int = MESSAGES_PER_TOPIC,
         bytes_per_topic: int = BYTES_PER_TOPIC,
-        events: int = EVENTS,
+        events: int = MAX_EVENTS,
     ) -> None:
         self._messages_per_topic = messages_per_topic
         self._bytes_per_topic = bytes_per_topic
@@ -68,7 +68,7 @@ class Mailbox:
         self._lost_events = 0
         self._ring_sizes: dict[str, int] = {}
 
-    def set_room(self, topic: str, messages: int | None) -> None:
+    def set_capacity(self, topic: str, messages: int | None) -> None:
         """Set the ring size of a topic in messages (at least 1). The byte limit still applies.
 
         None restores the default.
@@ -102,7 +102,7 @@ class Mailbox:
                 ring.size_bytes -= ring.messages.popleft().size_bytes
                 ring.dropped += 1
 
-    def forget(self, topic: str) -> None:
+    def discard(self, topic: str) -> None:
         """Discard the pending messages of a topic without counting them as dropped."""
         with self._lock:
             self._rings.pop(topic, None)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from app.core.own_process import module_command
-from app.core.reports.crash import crash_extra, end_words, is_crash
+from app.core.reports.crash import crash_extra, exit_text, is_crash
 from nep.errors import NepError
 from nep.masters.master import is_running, start_process
 from nep.protocol.graph_view import GraphView
@@ -49,7 +49,7 @@ class MasterState:
 
     kind: str
     address: str
-    sentence: str = ""
+    message: str = ""
 
 
 class MasterChange:
@@ -61,7 +61,7 @@ class MasterChange:
     def __init__(self) -> None:
         self._new_epoch = (0, 0.0)
 
-    def still(self, known: GraphView | None, view: GraphView, now: float) -> bool:
+    def is_incomplete(self, known: GraphView | None, view: GraphView, now: float) -> bool:
         """Return True if ``view`` is of another master than ``known`` and may not contain all nodes yet."""
         if known is None or view.epoch == known.epoch:
             return False
@@ -90,7 +90,7 @@ class MasterStart:
         """
 
     @property
-    def runs(self) -> bool:
+    def has_started(self) -> bool:
         """True if the running master was started by this object."""
         return self._process is not None and self._process.poll() is None
 
@@ -112,7 +112,7 @@ class MasterStart:
             self._thread.join(timeout=END_TIMEOUT_S)
 
     def _start(self) -> None:
-        why = self._start_or_reason()
+        why = self._try_start()
         if not why:
             self._wait_s, self._retry_at, self._last_reason = AGAIN_S, 0.0, ""
             return
@@ -122,10 +122,10 @@ class MasterStart:
             self._last_reason = why
             self._failed(why)
 
-    def _start_or_reason(self) -> str:
+    def _try_start(self) -> str:
         if is_running(self._address, timeout_s=0.5):
             return ""
-        hindered = doctor.start_obstacle(self._address)
+        hindered = doctor.start_blocker(self._address)
         if hindered is not None:
             return f"{hindered.sentence} {hindered.fix}"
         self.first = True
@@ -144,5 +144,5 @@ class MasterStart:
             return
         self._process = None
         if is_crash(code):
-            how = f"the master's process {end_words(code)}"
+            how = f"the master's process {exit_text(code)}"
             _log.error("%s", how, extra=crash_extra("master", how))

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from app.core.network.topics import key_of
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView, NodeInfo
 
-GONE_SHOWN_S = 10.0
+GONE_DISPLAY_S = 10.0
 GATEWAY = "gateway"
 NATIVE = frozenset({"native", GATEWAY})
 
@@ -40,13 +40,13 @@ class NodeEntry:
     cpu_ratio: float | None = None
     publishes: tuple[str, ...] = ()
     subscribes: tuple[str, ...] = ()
-    new: bool = False
+    is_new: bool = False
     gone_s: float | None = None
     gone_since: float | None = None
     network: str = ""
-    stale: bool = False
+    is_stale: bool = False
     has_parameters: bool = False
-    may_set: bool = False
+    can_set_parameters: bool = False
 
     @property
     def key(self) -> str:
@@ -91,15 +91,15 @@ class Nodes:
     def set_stale(self, stale: bool) -> None:
         """Set ``stale`` of all nodes: True while the network can't be queried."""
         for node in self._nodes.values():
-            if node.stale is not stale:
-                node.stale, node.cpu_ratio = stale, None
+            if node.is_stale is not stale:
+                node.is_stale, node.cpu_ratio = stale, None
                 self.revision += 1
 
     def mark_seen(self, id: str) -> None:
         """Stop highlighting a node as new."""
         node = self._nodes.get(id)
-        if node is not None and node.new:
-            node.new = False
+        if node is not None and node.is_new:
+            node.is_new = False
             self.revision += 1
 
     def update(self, view: GraphView, now: float) -> None:
@@ -113,13 +113,13 @@ class Nodes:
         self._first_graph = False
         self.values_revision += 1
 
-    def age(self, now: float) -> None:
+    def update_ages(self, now: float) -> None:
         """Update the ages, and remove nodes that left more than `GONE_SHOWN_S` ago."""
         for node in list(self._nodes.values()):
             if node.gone_since is None:
                 continue
             node.gone_s = now - node.gone_since
-            if node.gone_s >= GONE_SHOWN_S:
+            if node.gone_s >= GONE_DISPLAY_S:
                 del self._nodes[node.id]
                 self.revision += 1
 
@@ -132,13 +132,13 @@ class Nodes:
             if node is None:
                 self._replace_gone(info)
                 new = not self._first_graph
-                node = self._nodes[id] = NodeEntry(id, info.name, new=new, network=self._network)
+                node = self._nodes[id] = NodeEntry(id, info.name, is_new=new, network=self._network)
             _update_entry(node, info)
-            place = place_of(id)
-            node.may_set = place in view.services
+            place = parameters_topic(id)
+            node.can_set_parameters = place in view.services
             topic = view.topics.get(place)
             topic = view.topics.get(place)
-            node.has_parameters = node.may_set or (topic is not None and bool(topic.publishers))
+            node.has_parameters = node.can_set_parameters or (topic is not None and bool(topic.publishers))
             node.publishes, node.subscribes = publishes.get(id, ()), subscribes.get(id, ())
         for id, node in self._nodes.items():
             if id not in view.nodes and node.gone_since is None:
@@ -156,7 +156,7 @@ def _update_entry(node: NodeEntry, info: NodeInfo) -> None:
     node.name, node.host, node.pid = info.name, info.host, info.pid
     node.language, node.generation, node.since_ns = info.language, info.generation, info.since_ns
     node.gone_since = node.gone_s = None
-    node.stale = False
+    node.is_stale = False
 
 
 def _topics_by_node(view: GraphView) -> tuple[Mapping[str, tuple[str, ...]], Mapping[str, tuple[str, ...]]]:

@@ -15,7 +15,7 @@ from nep.masters.master import listen
 from nep.protocol.graph_view import GraphView
 from nep.system.addresses import OwnAddress, host_of, is_loopback, own_addresses
 
-KEPT = "listen_at"
+SETTING_KEY = "listen_at"
 ALERT, NOT_KEPT = "reach", "reach:kept"
 
 
@@ -27,7 +27,7 @@ class RemoteAccessChanged:
     """
 
     hosts: tuple[str, ...]
-    sentence: str = ""
+    message: str = ""
 
 
 class RemoteAccess:
@@ -55,7 +55,7 @@ class RemoteAccess:
         """Addresses on which the master listens for other computers."""
 
     @property
-    def is_near(self) -> bool:
+    def is_local(self) -> bool:
         """True if the master is on this computer. Only then can the addresses be changed."""
         return is_loopback(self._address)
 
@@ -68,22 +68,22 @@ class RemoteAccess:
         """Return the addresses of this computer that others can reach."""
         return self._here()
 
-    def typed_by_others(self, host: str) -> str:
+    def environment_variable(self, host: str) -> str:
         """Return the environment variable that programs on other computers have to set."""
         return f"NEP_MASTER={host}:{self._address.rpartition(':')[2]}"
 
-    def listen_at(self, hosts: Sequence[str]) -> None:
+    def listen_on(self, hosts: Sequence[str]) -> None:
         """Make the master listen on these addresses, or on none; saved for the next start."""
         self._request(tuple(hosts))  # first, because shutting others out must not wait for a disk
         try:
-            self._settings.set(KEPT, list(hosts))
+            self._settings.set(SETTING_KEY, list(hosts))
         except SettingsError as error:
             words = (
                 _("Can't save this change: other computers can't connect after the next start ({error}).")
                 if hosts
                 else _("Can't save this change: other computers can connect after the next start ({error}).")
             )
-            self._alerts.put(
+            self._alerts.raise_alert(
                 NOT_KEPT,
                 "warn",
                 _("The list of allowed connections can't be saved."),
@@ -95,27 +95,27 @@ class RemoteAccess:
         else:
             self._alerts.resolve(NOT_KEPT)
 
-    def follow(self, view: GraphView) -> None:
+    def update_graph(self, view: GraphView) -> None:
         """Apply a new graph. If the master is new, send the saved addresses to it."""
         self.hosts = view.listens
         if view.epoch != self._epoch:
             self._epoch = view.epoch
-            hosts: list[object] = self._settings.get(KEPT, [])
+            hosts: list[object] = self._settings.get(SETTING_KEY, [])
             kept = tuple(map(str, hosts))
-            if kept and self.is_near and set(kept) - set(self.hosts):
+            if kept and self.is_local and set(kept) - set(self.hosts):
                 self._request(kept)
 
     def changed(self, event: RemoteAccessChanged) -> None:
         """Apply the master's reply."""
-        if not event.sentence:
+        if not event.message:
             self.hosts = event.hosts
             self._alerts.resolve(ALERT)
             return
-        self._alerts.put(
+        self._alerts.raise_alert(
             ALERT,
             "warn",
             _("Other computers can't connect."),
-            f"{event.sentence[:1].upper()}{event.sentence[1:]}.",
+            f"{event.message[:1].upper()}{event.message[1:]}.",
             button=_("Choose an address"),
             action="network.others",
         )
@@ -142,7 +142,7 @@ class RemoteAccess:
         self._asking.start()
 
 
-def access_words(reach: RemoteAccess) -> tuple[str, str, str | None]:
+def access_status(reach: RemoteAccess) -> tuple[str, str, str | None]:
     """Return icon, text and status that the status bar shows for remote access."""
     if reach.hosts:
         return (
@@ -150,6 +150,6 @@ def access_words(reach: RemoteAccess) -> tuple[str, str, str | None]:
             _("Other computers connect at {addresses}").format(addresses=", ".join(reach.hosts)),
             "warn",
         )
-    if not reach.is_near:
+    if not reach.is_local:
         return "network", _("Master on {master_host}").format(master_host=reach.master_host), None
     return "lock", _("This computer only"), None

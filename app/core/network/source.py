@@ -14,7 +14,7 @@ from itertools import count
 from typing import Protocol
 
 import nep
-from app.core.faults import error_words, log_errors
+from app.core.faults import error_text, log_errors
 from nep.errors import NepError
 from nep.i18n import _
 from nep.masters.process import view_or_none
@@ -24,9 +24,9 @@ from nep.nodes.subscriber import Subscriber
 from nep.protocol.graph_view import GraphView
 
 POLL_S = 0.4
-POLL_PAUSE = 5.0
+POLL_PAUSE_FACTOR = 5.0
 """Minimum pause between queries of the graph, as a multiple of their duration (10 000 topics: 0.4 s)."""
-POLL_SLOWEST_S = 3.0
+MAX_POLL_INTERVAL_S = 3.0
 NODE_NAME = "studio"
 
 _log = logging.getLogger("studio")
@@ -39,11 +39,11 @@ Job = Callable[[Node], None]
 
 
 @dataclass(frozen=True, slots=True)
-class GraphSeen:
+class GraphReceived:
     """Event: a new graph was received; ``asked_s`` is the duration of the query."""
 
     view: GraphView
-    asked_s: float
+    query_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class MasterLost:
     """Event: no master replies at ``address``; ``sentence`` explains this."""
 
     address: str
-    sentence: str
+    message: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class WatchFailed:
     """Event: subscribing to a topic failed; ``sentence`` is the reason."""
 
     topic: str
-    sentence: str
+    message: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ class JobFailed:
     """Event: a job on the network failed; ``what`` is as in `Source.submit`, ``sentence`` the reason."""
 
     what: str
-    sentence: str
+    message: str
 
 
 class Source(Protocol):
@@ -97,7 +97,7 @@ class Source(Protocol):
         ``what`` is the `lazy` sentence for the report, with the placeholder ``error``; "" reports nothing.
         """
 
-    def missed(self) -> Mapping[str, int]:
+    def lost_counts(self) -> Mapping[str, int]:
         """Return the number of lost messages of each topic since it is watched."""
 
     def close(self) -> None:
@@ -162,14 +162,14 @@ class LiveSource:
         """Queue a job. Jobs run in order, and wait until a master replies."""
         self._jobs.put((what, job))
 
-    def missed(self) -> Mapping[str, int]:
+    def lost_counts(self) -> Mapping[str, int]:
         """Return the number of lost messages by topic."""
         with self._lock:
             held = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
             before = dict(self._missed_before)
         return {topic: before.get(topic, 0) + (each.lost or 0) for topic, each in held.items()}
 
-    def end(self) -> None:
+    def request_stop(self) -> None:
         """Signal the thread to stop, without waiting for it; `close` waits."""
         self._closing.set()
         self._jobs.put(None)
@@ -181,7 +181,7 @@ class LiveSource:
 
     def close(self) -> None:
         """Stop the thread and wait for it (at most 5 s)."""
-        self.end()
+        self.request_stop()
         if self._thread.is_alive():
             self._thread.join(timeout=5)
 
@@ -227,8 +227,8 @@ class LiveSource:
         if self._node is None and not self._join():
             return False
         asked_s = self._query_graph()
-        pause_s = max(self.poll_s, min(POLL_SLOWEST_S, POLL_PAUSE * asked_s))
-        self._do_jobs(time.monotonic() + pause_s)
+        pause_s = max(self.poll_s, min(MAX_POLL_INTERVAL_S, POLL_PAUSE_FACTOR * asked_s))
+        self._run_jobs(time.monotonic() + pause_s)
         return True
 
     def _join(self) -> bool:
@@ -258,12 +258,12 @@ class LiveSource:
         if self._is_connected is not True:
             self._is_connected = True
             self._post_event(MasterFound(self.address))
-        self._post_event(GraphSeen(view, asked_s))
+        self._post_event(GraphReceived(view, asked_s))
         self._view = view
         self._reconcile()
         return asked_s
 
-    def _do_jobs(self, until: float) -> None:
+    def _run_jobs(self, until: float) -> None:
         while not self._closing.is_set() and self._node is not None:
             try:
                 item = self._jobs.get(timeout=max(0.0, until - time.monotonic()))
@@ -278,7 +278,7 @@ class LiveSource:
                 self._post_event(JobFailed(what, str(error)))
             except Exception as error:  # noqa: BLE001  a failing job must not end the thread
                 _log.exception("a network job failed")
-                self._post_event(JobFailed(what, error_words(error)))
+                self._post_event(JobFailed(what, error_text(error)))
             self._reconcile()
 
     def _reconcile(self) -> None:

@@ -33,7 +33,7 @@ def folder_key(network: str, path: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class FolderFigures:
+class FolderStats:
     """Statistics of all existing topics below a folder; None if no topic has a value.
 
     Attributes:
@@ -65,11 +65,11 @@ class TopicFolder:
     name: str
     path: str
     network: str
-    deep: int
+    depth: int
     is_open: bool = True
     topics: list[Topic] = field(default_factory=list)
-    inside: list[TopicFolder | Topic] = field(default_factory=list)
-    _figures: FolderFigures | None = None
+    children: list[TopicFolder | Topic] = field(default_factory=list)
+    _stats: FolderStats | None = None
 
     @property
     def key(self) -> str:
@@ -77,21 +77,21 @@ class TopicFolder:
         return folder_key(self.network, self.path)
 
     @property
-    def figures(self) -> FolderFigures:
+    def stats(self) -> FolderStats:
         """Statistics, computed at the first access after `renew`."""
-        if self._figures is None:
+        if self._stats is None:
             there = [topic for topic in self.topics if topic.gone_s is None]
-            self._figures = FolderFigures(
+            self._stats = FolderStats(
                 _sum(topic.rate_hz for topic in there),
                 _sum(topic.bandwidth_Bps for topic in there),
                 min((topic.age_s for topic in there if topic.age_s is not None), default=None),
                 _sum(topic.lost for topic in there),
             )
-        return self._figures
+        return self._stats
 
-    def renew(self) -> None:
+    def invalidate_stats(self) -> None:
         """Invalidate the statistics."""
-        self._figures = None
+        self._stats = None
 
 
 TreeRow = TopicFolder | Topic
@@ -130,13 +130,13 @@ class TopicTree:
             row = waiting.pop()
             rows.append(row)
             if isinstance(row, TopicFolder) and row.is_open:
-                waiting += ordered(row.inside)[::-1]
+                waiting += ordered(row.children)[::-1]
         return rows
 
-    def renew(self) -> None:
+    def invalidate_stats(self) -> None:
         """Invalidate the statistics of all folders."""
         for folder in self._folders.values():
-            folder.renew()
+            folder.invalidate_stats()
 
     def _insert(self, topic: Topic) -> None:
         inside, path = self._top, "/"
@@ -149,7 +149,7 @@ class TopicTree:
                 self._folders[folder.key] = folder
                 inside.append(folder)
             folder.topics.append(topic)
-            inside = folder.inside
+            inside = folder.children
         inside.append(topic)
 
 
@@ -159,7 +159,7 @@ def folders_above(topic: str, network: str = "") -> list[str]:
     return [folder_key(network, f"/{'/'.join(parts[: count + 1])}/") for count in range(len(parts))]
 
 
-def fits(words: Iterable[str]) -> Callable[[str, str], bool]:
+def topic_filter(words: Iterable[str]) -> Callable[[str, str], bool]:
     """Return a predicate (name, details) that is True for topics that match every word, ignoring case.
 
     A word with ``*`` or ``?`` is a pattern for the whole name (``*`` also matches slashes). A word that
@@ -173,7 +173,7 @@ def fits(words: Iterable[str]) -> Callable[[str, str], bool]:
         is_pattern = "*" in text or "?" in text
         wanted.append((leaves_out, re.compile(translate(text)) if is_pattern else text))
 
-    def fit(name: str, told: str) -> bool:
+    def matches(name: str, told: str) -> bool:
         name, told = name.casefold(), told.casefold()
         for leaves_out, what in wanted:
             found = what in told if isinstance(what, str) else what.match(name) is not None
@@ -181,4 +181,4 @@ def fits(words: Iterable[str]) -> Callable[[str, str], bool]:
                 return False
         return True
 
-    return fit
+    return matches

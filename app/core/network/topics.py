@@ -13,17 +13,17 @@ from app.core.network.mailbox import Batch
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, TopicInfo
 
-GONE_SHOWN_S = 10.0
-RATES_KEPT = 60
-AT_ONCE = 1500
-START_S = 5.0
+GONE_DISPLAY_S = 10.0
+MAX_RATES = 60
+BATCH_SIZE = 1500
+START_GRACE_S = 5.0
 """Time that a publisher has for its first message after a subscription; some cameras start only then."""
-STATISTICS_LATE_S = 6.0
+MIN_REPORTED_SILENCE_S = 6.0
 """Minimum silence of topics whose counts are only reported by nodes, which report every 5 s in large graphs.
 """
 
 
-_BLANK = " "
+_SEPARATOR = " "
 
 
 def key_of(network: str, topic: str) -> str:
@@ -33,12 +33,12 @@ def key_of(network: str, topic: str) -> str:
 
     Names of native topics contain no blank, so keys can't be ambiguous.
     """
-    return f"{network}{_BLANK}{topic}" if network else topic
+    return f"{network}{_SEPARATOR}{topic}" if network else topic
 
 
 def split_key(key: str) -> tuple[str, str]:
     """Split a key made by `key_of` into network and topic."""
-    network, blank, topic = key.partition(_BLANK)
+    network, blank, topic = key.partition(_SEPARATOR)
     return (network, topic) if blank else ("", key)
 
 
@@ -77,24 +77,24 @@ class Topic:
     silent_s: float | None = None
     lost: int | None = None
     loss_ratio: float | None = None
-    new: bool = False
+    is_new: bool = False
     gone_s: float | None = None
-    rates: deque[float] = field(default_factory=lambda: deque(maxlen=RATES_KEPT))
+    rates: deque[float] = field(default_factory=lambda: deque(maxlen=MAX_RATES))
     newest: Message | None = None
     previous: Message | None = None
     received: int = 0
     dropped: int = 0
     missed: int = 0
-    watched: bool = False
+    is_watched: bool = False
     gone_since: float | None = None
     last_stamp_ns: int | None = None
     last_received: float | None = None
-    heard_since: float | None = None
-    moved_at: float | None = None
+    subscribed_since: float | None = None
+    active_at: float | None = None
     info: TopicInfo | None = None
     network: str = ""
-    stale: bool = False
-    counted: tuple[float, float] | None = None
+    is_stale: bool = False
+    measured_rates: tuple[float, float] | None = None
     received_bytes: int = 0
 
     @property
@@ -103,14 +103,14 @@ class Topic:
         return key_of(self.network, self.name)
 
     @property
-    def shown_of(self) -> tuple[int, int]:
+    def displayed_and_sent(self) -> tuple[int, int]:
         """Number of messages shown by panels, and number of messages sent, since the topic is watched."""
         return self.received - self.dropped, self.received + self.missed
 
-    def facts(self) -> tuple[object, ...]:
+    def static_values(self) -> tuple[object, ...]:
         """Return the values that rarely change; panels rebuild their rows when one of them changes."""
         gone = self.gone_since is not None
-        return (self.msg_type, self.codec, self.publisher_nodes, self.new, gone, self.stale)
+        return (self.msg_type, self.codec, self.publisher_nodes, self.is_new, gone, self.is_stale)
 
 
 class Topics:
@@ -149,19 +149,19 @@ class Topics:
         """Return the topic with this name, or None."""
         return self._topics.get(name)
 
-    def live(self) -> list[Topic]:
+    def existing_topics(self) -> list[Topic]:
         """Return the topics that have not vanished."""
         return [topic for topic in self._topics.values() if topic.gone_since is None]
 
     def of_type(self, *msg_types: str) -> list[Topic]:
         """Return the existing topics of one of these types."""
-        return [topic for topic in self.live() if topic.msg_type in msg_types]
+        return [topic for topic in self.existing_topics() if topic.msg_type in msg_types]
 
     def mark_seen(self, name: str) -> None:
         """Stop highlighting a topic as new."""
         topic = self._topics.get(name)
-        if topic is not None and topic.new:
-            topic.new = False
+        if topic is not None and topic.is_new:
+            topic.is_new = False
             self.revision += 1
 
     def update(self, view: GraphView, now: float) -> None:
@@ -171,28 +171,28 @@ class Topics:
         parts, by `age`.
         """
         seen = (view.epoch, view.revision)
-        self._clocks = self._clocks_in(view)
+        self._clocks = self._clock_offsets(view)
         if seen != self._seen:
             self._apply_graph(view, now)
-        elif len(self._topics) <= AT_ONCE:
+        elif len(self._topics) <= BATCH_SIZE:
             _update_statistics(self._topics.values(), view, now, self._clocks)
         self._seen, self._view, self._reported_at = seen, view, now
         self.values_revision += 1
 
-    def _own_in(self, view: GraphView) -> set[str]:
+    def _own_node_ids(self, view: GraphView) -> set[str]:
         return {id for id, node in view.nodes.items() if (node.host, node.pid) == self._own}
 
-    def _clocks_in(self, view: GraphView) -> Mapping[str, int]:
+    def _clock_offsets(self, view: GraphView) -> Mapping[str, int]:
         known = {
             id: node.clock_offset_ns for id, node in view.nodes.items() if node.clock_offset_ns is not None
         }
         if not any(known.values()):
             return {}  # all nodes are on the master's computer
-        own = next((known[id] for id in self._own_in(view) if id in known), None)
+        own = next((known[id] for id in self._own_node_ids(view) if id in known), None)
         return {} if own is None else {id: offset - own for id, offset in known.items() if offset != own}
 
     def _apply_graph(self, view: GraphView, now: float) -> None:
-        own = self._own_in(view)
+        own = self._own_node_ids(view)
         shown = {
             name: info
             for name, info in view.topics.items()
@@ -201,7 +201,7 @@ class Topics:
         for name, info in shown.items():
             topic = self._topics.get(name)
             if topic is None:
-                topic = self._topics[name] = Topic(name, new=not self._first_graph, network=self._network)
+                topic = self._topics[name] = Topic(name, is_new=not self._first_graph, network=self._network)
                 self.revision += 1
             self._apply_info(topic, info, view, now)
         for name, topic in self._topics.items():
@@ -209,7 +209,7 @@ class Topics:
                 self._vanish(topic, now)
         self._first_graph = False
 
-    def forget(self, now: float) -> None:
+    def mark_all_vanished(self, now: float) -> None:
         """Mark all topics as vanished, because the connection to the master was lost."""
         for topic in self._topics.values():
             if topic.gone_since is None:
@@ -218,8 +218,8 @@ class Topics:
     def set_stale(self, stale: bool) -> None:
         """Set ``stale`` of all topics: True while the network can't be queried."""
         for topic in self._topics.values():
-            if topic.stale is not stale:
-                topic.stale = stale
+            if topic.is_stale is not stale:
+                topic.is_stale = stale
                 if stale:
                     topic.rate_hz = topic.bandwidth_Bps = None
                 self.revision += 1
@@ -232,20 +232,20 @@ class Topics:
         arrived = {
             topic.name: (topic.received, topic.received_bytes)
             for topic in self._topics.values()
-            if topic.watched and topic.gone_since is None
+            if topic.is_watched and topic.gone_since is None
         }
         for name, (received, size_bytes) in arrived.items():
             had = before.get(name)
             if had is not None and had[0] <= received and passed_s > 0:
                 topic = self._topics[name]
-                topic.counted = (received - had[0]) / passed_s, (size_bytes - had[1]) / passed_s
+                topic.measured_rates = (received - had[0]) / passed_s, (size_bytes - had[1]) / passed_s
                 if topic.info is None or topic.info.rate_hz is None:
-                    topic.rate_hz, topic.bandwidth_Bps = topic.counted
-                    topic.rates.append(topic.counted[0])
+                    topic.rate_hz, topic.bandwidth_Bps = topic.measured_rates
+                    topic.rates.append(topic.measured_rates[0])
                     self.values_revision += 1
         return arrived
 
-    def age(self, now: float, now_ns: int) -> None:
+    def update_ages(self, now: float, now_ns: int) -> None:
         """Update the ages, and remove topics that vanished more than `GONE_SHOWN_S` ago.
 
         With more than `AT_ONCE` topics, each call processes the next `AT_ONCE` topics and updates their
@@ -253,23 +253,23 @@ class Topics:
         """
         if self._next_index >= len(self._topics):
             self._next_index = 0
-        begin, self._next_index = self._next_index, self._next_index + AT_ONCE
+        begin, self._next_index = self._next_index, self._next_index + BATCH_SIZE
         some = list(islice(self._topics.values(), begin, self._next_index))
-        if self._view is not None and len(self._topics) > AT_ONCE:
+        if self._view is not None and len(self._topics) > BATCH_SIZE:
             _update_statistics(some, self._view, self._reported_at, self._clocks)
         for topic in some:
             if topic.gone_since is not None:
                 topic.gone_s = now - topic.gone_since
-                if topic.gone_s >= GONE_SHOWN_S:
+                if topic.gone_s >= GONE_DISPLAY_S:
                     self._remove_or_hide(topic)
             else:
                 topic.age_s = _age(topic, now, now_ns)
-                topic.silent_s = _silence(topic, now, self._reported_at)
+                topic.silent_s = _silence_s(topic, now, self._reported_at)
 
     def _remove_or_hide(self, topic: Topic) -> None:
         # A vanished topic that is still watched only leaves the lists.
         listed = topic.name not in self._hidden
-        if topic.watched:
+        if topic.is_watched:
             self._hidden.add(topic.name)
         else:
             self._hidden.discard(topic.name)
@@ -282,16 +282,16 @@ class Topics:
             return
         topic = self._topics.get(name)
         if topic is None:
-            topic = self._topics[name] = Topic(name, new=True, network=self._network)
+            topic = self._topics[name] = Topic(name, is_new=True, network=self._network)
             self.revision += 1
         topic.previous = batch.messages[-2] if len(batch.messages) > 1 else topic.newest
         topic.newest = batch.messages[-1]
-        topic.received += batch.arrived
+        topic.received += batch.arrived_count
         kept_bytes = sum(message.size_bytes for message in batch.messages)
         # dropped messages are assumed to be as large as the others
-        topic.received_bytes += kept_bytes * batch.arrived // len(batch.messages)
+        topic.received_bytes += kept_bytes * batch.arrived_count // len(batch.messages)
         topic.dropped += batch.dropped
-        topic.last_received = topic.moved_at = now
+        topic.last_received = topic.active_at = now
         self.values_revision += 1
 
     def unwatch(self, name: str) -> None:
@@ -300,11 +300,11 @@ class Topics:
         if topic is not None:
             topic.newest = topic.previous = None
             topic.received = topic.dropped = topic.missed = topic.received_bytes = 0
-            topic.counted = None
+            topic.measured_rates = None
             topic.last_received = None
-            topic.watched = False
+            topic.is_watched = False
 
-    def set_figures(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
+    def set_stats(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
         """Set the reported rate (messages per second) and the time of the newest message (ns) by topic."""
         for name, (rate_hz, newest_ns) in figures.items():
             topic = self._topics.get(name)
@@ -326,20 +326,20 @@ class Topics:
         topic.gone_since, topic.gone_s = now, 0.0
         topic.publishers, topic.publisher_nodes = 0, ()
         topic.rate_hz = topic.bandwidth_Bps = topic.age_s = None
-        topic.silent_s = topic.heard_since = topic.moved_at = None
+        topic.silent_s = topic.subscribed_since = topic.active_at = None
         self.revision += 1
 
     def _apply_info(self, topic: Topic, info: TopicInfo, view: GraphView, now: float) -> None:
-        before = topic.facts()
-        topic.heard_since = _heard_since(topic, info, now)
+        before = topic.static_values()
+        topic.subscribed_since = _subscribed_since(topic, info, now)
         topic.msg_type, topic.codec = info.msg_type, info.codec
         topic.publishers, topic.subscribers = len(info.publishers), len(info.subscribers)
         topic.publisher_nodes = _names(info, view)
         topic.gone_since = topic.gone_s = None
-        topic.stale = False
+        topic.is_stale = False
         self._hidden.discard(topic.name)
         _apply_statistics(topic, info, now, self._clocks)
-        if topic.facts() != before:
+        if topic.static_values() != before:
             self.revision += 1
 
 
@@ -357,23 +357,23 @@ def _apply_statistics(topic: Topic, info: TopicInfo, now: float, clocks: Mapping
     if info.last_stamp_ns is not None and (
         topic.info is None or info.last_stamp_ns != topic.info.last_stamp_ns
     ):
-        topic.moved_at = now
+        topic.active_at = now
     topic.info = info
     topic.rate_hz = rate_hz = info.rate_hz
     topic.bandwidth_Bps = info.bandwidth_Bps
-    if rate_hz is None and topic.counted is not None:
-        topic.rate_hz, topic.bandwidth_Bps = topic.counted
+    if rate_hz is None and topic.measured_rates is not None:
+        topic.rate_hz, topic.bandwidth_Bps = topic.measured_rates
     topic.lost, topic.loss_ratio = info.lost, info.loss_ratio
     stamp_ns, before = info.last_stamp_ns, topic.last_stamp_ns
     if clocks and any(each.node_id in clocks for each in info.publishers):
-        topic.last_stamp_ns = _newest_of(info, clocks)
+        topic.last_stamp_ns = _newest_stamp_ns(info, clocks)
     elif stamp_ns is not None and (before is None or stamp_ns > before):
         topic.last_stamp_ns = stamp_ns
     if rate_hz is not None:
         topic.rates.append(rate_hz)
 
 
-def _newest_of(info: TopicInfo, clocks: Mapping[str, int]) -> int | None:
+def _newest_stamp_ns(info: TopicInfo, clocks: Mapping[str, int]) -> int | None:
     # In this computer's clock.
     stamps = (
         each.last_stamp_ns + clocks.get(each.node_id, 0)
@@ -392,30 +392,34 @@ def _age(topic: Topic, now: float, now_ns: int) -> float | None:
     stamp, newest = topic.last_stamp_ns, topic.newest
     if newest is not None and newest.stamp_ns is not None:
         known = newest.kind.clock.difference
-        stamp = max(stamp or 0, newest.stamp_ns + (0 if known is None else known.add_ns))
+        stamp = max(stamp or 0, newest.stamp_ns + (0 if known is None else known.offset_ns))
     if stamp is not None:
         return (now_ns - stamp) / 1e9 if now_ns > stamp else 0.0
     return now - topic.last_received if topic.last_received is not None else None
 
 
-def _heard_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
+def _subscribed_since(topic: Topic, info: TopicInfo, now: float) -> float | None:
     # Start of the time in which the present publishers have had a subscriber.
     if not info.publishers or not info.subscribers:
         return None
     before = {each.id for each in topic.info.publishers} if topic.info is not None else set()
-    anew = topic.heard_since is None or not before & {each.id for each in info.publishers}
-    return now if anew else topic.heard_since
+    anew = topic.subscribed_since is None or not before & {each.id for each in info.publishers}
+    return now if anew else topic.subscribed_since
 
 
-def _silence(topic: Topic, now: float, told_at: float) -> float | None:
+def _silence_s(topic: Topic, now: float, told_at: float) -> float | None:
     # By this computer's clock, because the publisher's may be wrong. For topics that are not watched, the
     # last report of the master (`told_at`) counts.
-    if topic.heard_since is None or topic.moved_at is None:
+    if topic.subscribed_since is None or topic.active_at is None:
         return None
-    until = now if topic.watched else told_at
-    since = topic.moved_at if topic.moved_at >= topic.heard_since else topic.heard_since + START_S
+    until = now if topic.is_watched else told_at
+    since = (
+        topic.active_at
+        if topic.active_at >= topic.subscribed_since
+        else topic.subscribed_since + START_GRACE_S
+    )
     silent_s = max(0.0, until - since)
-    return silent_s if topic.watched or silent_s >= STATISTICS_LATE_S else 0.0
+    return silent_s if topic.is_watched or silent_s >= MIN_REPORTED_SILENCE_S else 0.0
 
 
 def total_rate_hz(topics: Iterable[TopicInfo]) -> float | None:

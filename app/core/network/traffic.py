@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Mapping
 
 from app.core.network.mailbox import Batch
-from app.core.network.topics import AT_ONCE, Topics, total_rate_hz
+from app.core.network.topics import BATCH_SIZE, Topics, total_rate_hz
 from nep.protocol.graph_view import GraphView
 
 WINDOW_S = 30.0
@@ -60,10 +60,10 @@ class Traffic:
         self.shown_30s = 0
         self.sent_30s = 0
 
-    def follow(self, view: GraphView, now: float) -> None:
+    def update_graph(self, view: GraphView, now: float) -> None:
         """Apply a new graph; ``now`` is monotonic seconds. Large graphs are evaluated less often."""
         self._pending_view = view
-        if len(view.topics) <= AT_ONCE:
+        if len(view.topics) <= BATCH_SIZE:
             self._sum(view, now)
         else:
             self._sum_if_due(now)
@@ -71,7 +71,7 @@ class Traffic:
     def add(self, batches: Mapping[str, Batch], now: float) -> None:
         """Count the messages of a tick. Called at every tick."""
         shown = sum(len(batch.messages) for batch in batches.values())
-        self._count(shown, sum(batch.arrived for batch in batches.values()), now)
+        self._count(shown, sum(batch.arrived_count for batch in batches.values()), now)
         self._sum_if_due(now)
 
     def _sum_if_due(self, now: float) -> None:
@@ -83,7 +83,7 @@ class Traffic:
         self.lost_30s = self._losses.count(sum(info.lost or 0 for info in view.topics.values()), now)
         self.messages_per_s = total_rate_hz(view.topics.values())
 
-    def miss(self, missed: Mapping[str, int], now: float) -> None:
+    def count_lost(self, missed: Mapping[str, int], now: float) -> None:
         """Count messages that were lost before they arrived.
 
         ``missed`` is the total number for each topic since it is watched.

@@ -18,7 +18,7 @@ class Suspendable(Protocol):
         """Resume after `rest`. Idempotent."""
 
 
-class Watching(Suspendable, Protocol):
+class WatchHandle(Suspendable, Protocol):
     """Interface of a `Watch` for code that only holds and releases it."""
 
     def close(self) -> None:
@@ -35,7 +35,7 @@ class Watch:
         self._resting = False
 
     @property
-    def resting(self) -> bool:
+    def is_suspended(self) -> bool:
         """True if the watch is suspended."""
         return self._resting
 
@@ -43,13 +43,13 @@ class Watch:
         """Suspend the watch until `wake`."""
         if self._watches is not None and not self._resting:
             self._resting = True
-            self._watches.leave(self.topics)
+            self._watches.deactivate(self.topics)
 
     def resume(self) -> None:
         """Resume the watch after `rest`."""
         if self._watches is not None and self._resting:
             self._resting = False
-            self._watches.enter(self.topics)
+            self._watches.activate(self.topics)
 
     def close(self) -> None:
         """Close the watch. Idempotent."""
@@ -57,7 +57,7 @@ class Watch:
         self.suspend()
         self._watches = None
         if watches is not None:
-            watches.forget(self.topics)
+            watches.release(self.topics)
 
     def __enter__(self) -> Watch:
         return self
@@ -87,21 +87,21 @@ class Watches:
         """Open a watch of these topics."""
         watch = Watch(topics, self)
         self._open_counts.update(watch.topics)
-        self.enter(watch.topics)
+        self.activate(watch.topics)
         return watch
 
-    def watched(self, topic: str) -> bool:
+    def is_watched(self, topic: str) -> bool:
         """Return True if at least one watch of the topic is active."""
         return self._active_counts[topic] > 0
 
-    def enter(self, topics: Iterable[str]) -> None:
+    def activate(self, topics: Iterable[str]) -> None:
         """Add one to the number of active watches. Called by `Watch`."""
         for topic in topics:
             self._active_counts[topic] += 1
             if self._active_counts[topic] == 1:
                 self._begin(topic)
 
-    def leave(self, topics: Iterable[str]) -> None:
+    def deactivate(self, topics: Iterable[str]) -> None:
         """Subtract one from the number of active watches. Called by `Watch`."""
         for topic in topics:
             self._active_counts[topic] -= 1
@@ -109,7 +109,7 @@ class Watches:
                 del self._active_counts[topic]
                 self._end(topic)
 
-    def forget(self, topics: Iterable[str]) -> None:
+    def release(self, topics: Iterable[str]) -> None:
         """Release a watch that is closed while suspended. Called by `Watch`."""
         for topic in topics:
             self._open_counts[topic] -= 1

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from nep.programs.web.context import ConnectedPage
 
-GONE_SHOWN_S = 10.0
-SLOW_SHOWN_S = 10.0
+GONE_DISPLAY_S = 10.0
+SLOW_DISPLAY_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class SlowTopic:
 
     page: ConnectedPage
     topic: str
-    share: float
+    dropped_share: float
 
 
 class PageList:
@@ -73,24 +73,24 @@ class PageList:
             self._pages[page.id] = page
             self._left_at.pop(page.id, None)
         for id_, left_at in tuple(self._left_at.items()):
-            if now - left_at > GONE_SHOWN_S:
+            if now - left_at > GONE_DISPLAY_S:
                 del self._left_at[id_], self._pages[id_]
         self._pages = dict(sorted(self._pages.items()))
-        self._note_drops(pages, now)
+        self._record_drops(pages, now)
 
     def clear(self, now: float) -> None:
         """Remove all pages, because the server stopped."""
         self.update((), now)
 
-    def slow(self) -> Iterator[SlowTopic]:
+    def slow_topics(self) -> Iterator[SlowTopic]:
         """Yield the topics of which a connected page dropped messages in the last `SLOW_SHOWN_S` seconds."""
         for page in self.connected:
             for topic in page.topics:
                 at = self._drops_at.get((page.id, topic.topic))
-                if at is not None and self._now - at <= SLOW_SHOWN_S:
+                if at is not None and self._now - at <= SLOW_DISPLAY_S:
                     yield SlowTopic(page, topic.topic, dropped_share(topic.sent_count, topic.dropped_count))
 
-    def _note_drops(self, pages: Sequence[ConnectedPage], now: float) -> None:
+    def _record_drops(self, pages: Sequence[ConnectedPage], now: float) -> None:
         dropped = {
             (page.id, topic.topic): topic.dropped_count
             for page in pages

@@ -27,7 +27,7 @@ else:  # loaded with the first start of a server
     channels = lazy_module("nep.recordings.formats.channels")
 
 DEFAULT_PORT = 9090
-END_WAIT_S = 12.0
+STOP_TIMEOUT_S = 12.0
 LOOPBACK = "127.0.0.1"
 _PORTS_TRIED = 20
 MAX_PORT = 65535
@@ -66,11 +66,11 @@ class RunningServer(Protocol):
         Returns the number of disconnected pages.
         """
 
-    def keep_out(self, page_id: int) -> None:
+    def block_page(self, page_id: int) -> None:
         """Disconnect a page and reject its further connections."""
 
-    def let_in(self, page_id: int) -> None:
-        """Accept connections of a page again that `keep_out` excluded."""
+    def unblock_page(self, page_id: int) -> None:
+        """Accept connections of a page again that `block_page` blocked."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait until the server has stopped; return False after ``timeout_s`` seconds."""
@@ -89,7 +89,7 @@ class WebServerStarted:
 
     number: int
     server: RunningServer | None
-    sentence: str = ""
+    message: str = ""
     free_port: int = 0
     """Free port to use instead of one that is in use; 0 if the start failed for another reason."""
 
@@ -188,9 +188,9 @@ class WebPages:
         return self._list.listed
 
     @property
-    def slow(self) -> tuple[SlowTopic, ...]:
+    def slow_topics(self) -> tuple[SlowTopic, ...]:
         """Topics that pages read too slowly."""
-        return tuple(self._list.slow())
+        return tuple(self._list.slow_topics())
 
     @property
     def bytes_per_s(self) -> float:
@@ -209,7 +209,7 @@ class WebPages:
 
     # ---- switches
 
-    def serve(self, protocol: WebProtocol, *, on: bool) -> None:
+    def set_protocol_enabled(self, protocol: WebProtocol, *, on: bool) -> None:
         """Switch a protocol on or off.
 
         The server starts in the background when the first one is switched on.
@@ -218,9 +218,9 @@ class WebPages:
         if not self.protocols:
             self.switch_off()
         elif self.state == "off":
-            self._begin()
+            self._start_server()
         else:
-            self._push()
+            self._apply_settings()
 
     def switch_off(self) -> None:
         """Disconnect all pages and stop the server in the background."""
@@ -230,17 +230,17 @@ class WebPages:
         self.kept_out.clear()
         self._list.clear(self._clock())
         ended, self._server = self._server, None
-        self._in_thread(lambda: ended.close() if ended is not None else None)
+        self._run_in_thread(lambda: ended.close() if ended is not None else None)
 
     def use_free_port(self) -> None:
         """Retry a start that failed because the port was in use, on a free port."""
         if self.free_port:
             self.port, self.protocols = self.free_port, self._failed
-            self._begin()
+            self._start_server()
 
     # ---- settings
 
-    def open_to(self, host: str) -> None:
+    def listen_on(self, host: str) -> None:
         """Accept connections of other computers on an address of this computer; "" accepts none.
 
         A running server restarts, which disconnects all pages.
@@ -253,7 +253,7 @@ class WebPages:
             protocols = self.protocols
             self.switch_off()
             self.protocols = protocols
-            self._begin()
+            self._start_server()
 
     def new_token(self) -> int:
         """Generate a new token; return the number of pages that this disconnects."""
@@ -262,7 +262,7 @@ class WebPages:
     def set_token(self, token: str) -> int:
         """Set the required token; return the number of pages that this disconnects."""
         self.token = token
-        return self._push()
+        return self._apply_settings()
 
     def add_origin(self, text: str) -> None:
         """Allow an origin. Raises `NepError` if the origin is malformed."""
@@ -271,30 +271,30 @@ class WebPages:
     def set_origins(self, origins: Sequence[str]) -> None:
         """Replace the allowed origins, which must be well-formed; duplicates are removed."""
         self.origins = tuple(dict.fromkeys(origins))
-        self._push()
+        self._apply_settings()
 
     def set_robots(self, names: Sequence[str]) -> None:
         """Replace the names of the robots that pages may move; duplicates are removed."""
         self.robots = tuple(dict.fromkeys(names))
-        self._push()
+        self._apply_settings()
 
-    def keep_out(self, page: context.ConnectedPage) -> None:
-        """Disconnect a page, and reject its connections until `let_in` is called or the server stops."""
+    def block_page(self, page: context.ConnectedPage) -> None:
+        """Disconnect a page; reject its connections until `unblock_page` or the end of the server."""
         if self._server is not None:
-            self._server.keep_out(page.id)
+            self._server.block_page(page.id)
             self.kept_out[page.id] = page
 
-    def let_in(self, page_id: int) -> None:
-        """Accept connections of a page again that `keep_out` excluded."""
+    def unblock_page(self, page_id: int) -> None:
+        """Accept connections of a page again that `block_page` blocked."""
         self.kept_out.pop(page_id, None)
         if self._server is not None:
-            self._server.let_in(page_id)
+            self._server.unblock_page(page_id)
 
-    def starter_page(self) -> str:
+    def template_page(self) -> str:
         """Return the HTML of a template page that connects to this server."""
         return served_pages.starter_page(self.full_url)
 
-    def _push(self) -> int:
+    def _apply_settings(self) -> int:
         if self._server is None:
             return 0
         wanted = channels.LiveChannels() if "foxglove" in self.protocols else None
@@ -309,14 +309,14 @@ class WebPages:
         """Apply the result of a start. Closes the server if it was switched off or restarted meanwhile."""
         if event.number != self._number:
             if event.server is not None:
-                self._in_thread(event.server.close)
+                self._run_in_thread(event.server.close)
             return
-        self._server, self.sentence, self.free_port = event.server, event.sentence, event.free_port
+        self._server, self.sentence, self.free_port = event.server, event.message, event.free_port
         if event.server is None:
             self.state, self._failed, self.protocols = "off", self.protocols, frozenset()
         else:
             self.state = "on"
-            self._push()  # apply changes made during the start
+            self._apply_settings()  # apply changes made during the start
 
     def refresh(self) -> None:
         """Update `connected` and `listed` from the server."""
@@ -334,11 +334,11 @@ class WebPages:
         """Stop the server and its threads; waits at most `END_WAIT_S` seconds."""
         self.switch_off()
         if self._thread is not None:
-            self._thread.join(END_WAIT_S)
+            self._thread.join(STOP_TIMEOUT_S)
         if self._last_started is not None:  # its event may not have been applied
             self._last_started.close()
 
-    def _begin(self) -> None:
+    def _start_server(self) -> None:
         self._number += 1
         number = self._number
         self.state, self.sentence, self.free_port = "starting", "", 0
@@ -358,7 +358,7 @@ class WebPages:
             try:
                 running = self._start(settings)
             except AddressInUseError:
-                sentence, free_port = _port_taken(port)
+                sentence, free_port = _port_conflict(port)
                 self._post_event(WebServerStarted(number, None, sentence, free_port))
             except NepError as error:
                 said = str(error)
@@ -370,9 +370,9 @@ class WebPages:
                 self._last_started = running
                 self._post_event(WebServerStarted(number, running))
 
-        self._in_thread(work)
+        self._run_in_thread(work)
 
-    def _in_thread(self, work: Callable[[], None]) -> None:
+    def _run_in_thread(self, work: Callable[[], None]) -> None:
         # Runs one job after the other: a server ends before the next one binds its port.
         before = self._thread
 
@@ -385,9 +385,9 @@ class WebPages:
         self._thread.start()
 
 
-def _port_taken(port: int) -> tuple[str, int]:
+def _port_conflict(port: int) -> tuple[str, int]:
     """Return a sentence about the program that uses the port, and the next free port."""
-    holder = processes.describe(processes.listening().get(port))
+    holder = processes.process_fact(processes.listening_ports().get(port))
     if holder is None:
         sentence = _("Port {port} is in use by another program, perhaps rosbridge.").format(port=port)
     else:

@@ -27,7 +27,7 @@ class PageNode:
     """Description of a page in the graph: its title, its address and browser, and its icon."""
 
     title: str
-    where: str
+    location: str
     icon: str
 
 
@@ -43,7 +43,7 @@ class WebNotice:
 
     key: tuple[str, ...]
     status: Literal["error", "warn"]
-    sentence: str
+    message: str
     next_step: NextStep = ""
     value: str = ""
 
@@ -53,19 +53,19 @@ def is_wireless(own: OwnAddress) -> bool:
     return own.interface.casefold().startswith(_WIRELESS)
 
 
-def address_words(own: OwnAddress) -> str:
+def address_text(own: OwnAddress) -> str:
     """Format an address of this computer: "Wi-Fi 192.168.1.20" or "192.168.1.20 (eth0)"."""
     if is_wireless(own):
         return _("Wi-Fi {address}").format(address=own.host)
     return f"{own.host} ({own.interface})" if own.interface else own.host
 
 
-def host_words(web: WebPages) -> str:
+def host_text(web: WebPages) -> str:
     """Format the address to which other computers connect; "" if only this computer can connect."""
     if not web.host:
         return ""
     own = next((each for each in web.addresses() if each.host == web.host), OwnAddress(web.host, ""))
-    return address_words(own)
+    return address_text(own)
 
 
 def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
@@ -90,7 +90,7 @@ def page_name(page: ConnectedPage) -> str:
     return page.title if is_named else page.client or page.origin or page.name
 
 
-def where_words(page: ConnectedPage) -> str:
+def location_text(page: ConnectedPage) -> str:
     """Format address and browser of a page: "192.168.1.30, Chrome"."""
     client = page.client if page.client != page_name(page) else ""
     return ", ".join(filter(None, (page.address, client)))
@@ -106,7 +106,7 @@ def page_icon(page: ConnectedPage) -> str:
 def page_nodes(web: WebPages) -> dict[str, PageNode]:
     """Return the description of each connected page in the graph, by the name of its node."""
     return {
-        page.name: PageNode(page_name(page), where_words(page), page_icon(page)) for page in web.connected
+        page.name: PageNode(page_name(page), location_text(page), page_icon(page)) for page in web.connected
     }
 
 
@@ -134,16 +134,16 @@ def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple
     The messages are about slow pages, and about rejected connections that are still not allowed.
     """
     found: dict[tuple[str, ...], WebNotice] = {}
-    for notice in (*_refused(web), *_slow(web)):
+    for notice in (*_rejection_notices(web), *_slow_notices(web)):
         if notice.key not in dismissed:
             found.setdefault(notice.key, notice)
     return tuple(found.values())
 
 
-def _refused(web: WebPages) -> Iterator[WebNotice]:
+def _rejection_notices(web: WebPages) -> Iterator[WebNotice]:
     for refusal in reversed(web.refusals):
         if refusal.kind == "kept out":
-            yield from _kept_out(web, refusal)
+            yield from _blocked_notices(web, refusal)
             continue
         if refusal.origin and refusal.origin in web.origins:
             continue
@@ -152,18 +152,18 @@ def _refused(web: WebPages) -> Iterator[WebNotice]:
         yield _notice_of(refusal)
 
 
-def _kept_out(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
+def _blocked_notices(web: WebPages, refusal: Refusal) -> Iterator[WebNotice]:
     for page in web.kept_out.values():
-        if refusal.who in {page.origin, page.address}:
+        if refusal.client in {page.origin, page.address}:
             sentence = _("{page} tried to connect again at {time} and was rejected.").format(
-                page=page_name(page), time=_clock_words(refusal.time_s)
+                page=page_name(page), time=_clock_text(refusal.time_s)
             )
             yield WebNotice(("kept out", str(page.id)), "error", sentence, "let in", str(page.id))
 
 
 def _notice_of(refusal: Refusal) -> WebNotice:
-    key = (refusal.kind, refusal.who, refusal.robot)
-    who, clock = refusal.who, _clock_words(refusal.time_s)
+    key = (refusal.kind, refusal.client, refusal.robot)
+    who, clock = refusal.client, _clock_text(refusal.time_s)
     if refusal.kind == "robot" and refusal.robot:
         sentence = _("A page tried to move {robot} and was blocked.").format(robot=refusal.robot)
         return WebNotice(("robot", refusal.robot), "error", sentence, "choose robots", refusal.robot)
@@ -178,21 +178,21 @@ def _notice_of(refusal: Refusal) -> WebNotice:
     return WebNotice(key, "error", sentence.format(address=who, time=clock, reason=refusal.reason))
 
 
-def _slow(web: WebPages) -> Iterator[WebNotice]:
-    for slow in web.slow:
+def _slow_notices(web: WebPages) -> Iterator[WebNotice]:
+    for slow in web.slow_topics:
         sentence = _("{page} can't keep up with {topic}. {share} of the messages were dropped.").format(
-            page=page_name(slow.page), topic=slow.topic, share=share_words(slow.share)
+            page=page_name(slow.page), topic=slow.topic, share=share_text(slow.dropped_share)
         )
         yield WebNotice(("slow", slow.page.name, slow.topic), "warn", sentence)
 
 
-def share_words(share: float) -> str:
+def share_text(share: float) -> str:
     """Format a share in percent: "0.3 %"; a very small one as "under 0.1 %"."""
     if 0 < share < 0.0005:
         return _("under {share}").format(share=number(0.001, ".1%").replace("%", " %"))
     return number(share, ".1%").replace("%", " %")
 
 
-def _clock_words(time_s: float) -> str:
+def _clock_text(time_s: float) -> str:
     then = dt.datetime.fromtimestamp(time_s).astimezone()
     return f"{then.hour}:{then.minute:02d}"

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from nep.backends.base import backend_named
+from nep.backends.base import find_backend
 from nep.i18n import _, lazy
 from nep.protocol.graph_view import TopicInfo
 
-_PICTURES_OF_ROS_2 = "sensor_msgs/msg/CompressedImage"
-_TEXT_OF_ROS = "std_msgs/String"
+_ROS_2_IMAGE_TYPE = "sensor_msgs/msg/CompressedImage"
+_ROS_STRING_TYPE = "std_msgs/String"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,38 +30,38 @@ class NetworkKind:
     """
 
     name: str
-    words: str
-    place: str
+    product_name: str
+    address_label: str
     example: str
     hint: str
-    tells_figures: bool
+    reports_stats: bool
     codec: Callable[[TopicInfo], str]
-    reads: Callable[[TopicInfo], str]
+    readable_type_of: Callable[[TopicInfo], str]
     qos: str = ""
 
     def checked(self, address: str) -> str:
         """Return the address in the form of the back end. Raises `NepError` if the address is invalid."""
-        return backend_named(self.name).master(address.strip() or self.example)
+        return find_backend(self.name).master(address.strip() or self.example)
 
     @property
-    def not_known(self) -> str:
+    def unknown_text(self) -> str:
         """Explanation of a missing value, such as "unknown on ROS 2"."""
-        return _("unknown on {network}").format(network=self.words)
+        return _("unknown on {network}").format(network=self.product_name)
 
 
-def _codec_of_ros_2(info: TopicInfo) -> str:
-    return "image" if info.msg_type == _PICTURES_OF_ROS_2 else info.codec
+def _ros_2_codec(info: TopicInfo) -> str:
+    return "image" if info.msg_type == _ROS_2_IMAGE_TYPE else info.codec
 
 
-def _reads_ros_2(info: TopicInfo) -> str:
-    return "image" if info.msg_type == _PICTURES_OF_ROS_2 else info.msg_type
+def _ros_2_readable_type(info: TopicInfo) -> str:
+    return "image" if info.msg_type == _ROS_2_IMAGE_TYPE else info.msg_type
 
 
-def _reads_ros(info: TopicInfo) -> str:
+def _ros_readable_type(info: TopicInfo) -> str:
     # A json subscriber reads any message as a map, also of a package that is not installed here.
     if info.codec == "image":
         return "image"
-    return _TEXT_OF_ROS if info.msg_type == _TEXT_OF_ROS else "json"
+    return _ROS_STRING_TYPE if info.msg_type == _ROS_STRING_TYPE else "json"
 
 
 KINDS = (
@@ -71,9 +71,9 @@ KINDS = (
         lazy("Address of the master"),
         "127.0.0.1:11311",
         lazy("A master on another computer. This computer then accepts connections from that network, too."),
-        tells_figures=False,
+        reports_stats=False,
         codec=lambda info: info.codec,
-        reads=_reads_ros,
+        readable_type_of=_ros_readable_type,
     ),
     NetworkKind(
         "ros2",
@@ -81,9 +81,9 @@ KINDS = (
         lazy("Domain, 0 to 232"),
         "0",
         lazy("Programs on this computer; others only if ROS_AUTOMATIC_DISCOVERY_RANGE allows it."),
-        tells_figures=False,
-        codec=_codec_of_ros_2,
-        reads=_reads_ros_2,
+        reports_stats=False,
+        codec=_ros_2_codec,
+        readable_type_of=_ros_2_readable_type,
         qos="best_effort",  # a best-effort reader is compatible with best-effort and reliable writers
     ),
     NetworkKind(
@@ -92,14 +92,14 @@ KINDS = (
         lazy("Address of a node or router"),
         "local",
         lazy("“local” is this computer; the address of a router looks like tcp/192.168.1.5:7447."),
-        tells_figures=True,
+        reports_stats=True,
         codec=lambda info: info.codec,
-        reads=lambda info: info.msg_type,
+        readable_type_of=lambda info: info.msg_type,
     ),
 )
 _BY_NAME = {kind.name: kind for kind in KINDS}
 
 
-def kind_named(name: str) -> NetworkKind | None:
+def find_kind(name: str) -> NetworkKind | None:
     """Return the kind with this name; None for "" (the native network) and unknown names."""
     return _BY_NAME.get(name)

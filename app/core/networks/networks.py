@@ -10,17 +10,17 @@ from typing import Literal, Protocol
 from app.core.alerts import Alerts
 from app.core.network.mailbox import Batch
 from app.core.network.nodes import NodeEntry, Nodes
-from app.core.network.source import GraphSeen, MasterFound, MasterLost, Sink, WatchFailed
+from app.core.network.source import GraphReceived, MasterFound, MasterLost, Sink, WatchFailed
 from app.core.network.topics import Topic, Topics, split_key
-from app.core.networks.kinds import KINDS, NetworkKind, kind_named
+from app.core.networks.kinds import KINDS, NetworkKind, find_kind
 from app.core.networks.source import OtherSource
 from app.core.storage.settings import Settings
 from nep.errors import NepError
 from nep.i18n import _
 
-KEPT = "networks"
+SETTING_KEY = "networks"
 """Setting that stores the address of each shown network."""
-LOOK_COMMAND = "network.look"
+BROWSE_COMMAND = "network.look"
 """Window command that opens the choice of networks."""
 COUNT_INTERVAL_S = 1.0
 
@@ -39,7 +39,7 @@ class NetworkSource(Protocol):
     def unwatch(self, topic: str) -> None:
         """Unsubscribe from a topic."""
 
-    def end(self) -> None:
+    def request_stop(self) -> None:
         """Signal the thread to stop, without waiting for it."""
 
     @property
@@ -80,9 +80,9 @@ class OtherNetwork:
         self.address = ""
         self.number = 0
         self.source: NetworkSource | None = None
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Reset the state to that of a network that isn't shown."""
         self.state: NetworkState = "off"
         self.sentence = ""
@@ -92,34 +92,34 @@ class OtherNetwork:
         self._counted_at: float | None = None
 
     @property
-    def is_chosen(self) -> bool:
+    def is_selected(self) -> bool:
         """True if the network is shown."""
         return self.source is not None
 
     def apply(self, event: object, now: float) -> None:
         """Apply an event of the network's source."""
         match event:
-            case GraphSeen():
+            case GraphReceived():
                 self.state, self.sentence = "there", ""
                 self.topics.set_stale(False)
                 self.nodes.set_stale(False)
                 self.topics.update(event.view, now)
                 self.nodes.update(event.view, now)
             case MasterLost():
-                self.state, self.sentence = "lost", event.sentence
+                self.state, self.sentence = "lost", event.message
                 self.topics.set_stale(True)
                 self.nodes.set_stale(True)
             case MasterFound():
                 pass  # the graph follows
             case WatchFailed():
-                self.unread[event.topic] = event.sentence
+                self.unread[event.topic] = event.message
             case _:
                 pass
 
-    def age(self, now: float, now_ns: int) -> None:
+    def update_ages(self, now: float, now_ns: int) -> None:
         """Update the ages. Once a second, also measure the rates that publishers don't report."""
-        self.topics.age(now, now_ns)
-        self.nodes.age(now)
+        self.topics.update_ages(now, now_ns)
+        self.nodes.update_ages(now)
         if self._counted_at is None or now - self._counted_at >= COUNT_INTERVAL_S:
             passed_s = 0.0 if self._counted_at is None else now - self._counted_at
             self._arrived, self._counted_at = self.topics.count(passed_s, self._arrived), now
@@ -156,9 +156,9 @@ class Networks:
         return self._networks.get(name)
 
     @property
-    def chosen(self) -> list[OtherNetwork]:
+    def selected(self) -> list[OtherNetwork]:
         """Networks that are shown."""
-        return [network for network in self if network.is_chosen]
+        return [network for network in self if network.is_selected]
 
     @property
     def revision(self) -> int:
@@ -173,12 +173,12 @@ class Networks:
     @property
     def topics(self) -> list[Topic]:
         """Topics of all shown networks."""
-        return [topic for network in self.chosen for topic in network.topics]
+        return [topic for network in self.selected for topic in network.topics]
 
     @property
     def nodes(self) -> list[NodeEntry]:
         """Nodes of all shown networks."""
-        return [node for network in self.chosen for node in network.nodes]
+        return [node for network in self.selected for node in network.nodes]
 
     def topic(self, key: str) -> Topic | None:
         """Return the topic with this key; None if it is native or unknown."""
@@ -186,7 +186,7 @@ class Networks:
         network = self._networks.get(name)
         return network.topics.get(topic) if network is not None else None
 
-    def unread(self, key: str) -> str:
+    def read_problem(self, key: str) -> str:
         """Return why a watched topic can't be read; "" if it can."""
         name, topic = split_key(key)
         network = self._networks.get(name)
@@ -200,11 +200,11 @@ class Networks:
             network = self._networks.get(name)
             if network is not None and isinstance(address, str):
                 try:
-                    self._begin(network, network.kind.checked(address))
+                    self._start(network, network.kind.checked(address))
                 except NepError:
                     continue
 
-    def choose(self, name: str, address: str) -> None:
+    def select(self, name: str, address: str) -> None:
         """Show the network of this kind at this address, also after the next start.
 
         Raises:
@@ -213,25 +213,25 @@ class Networks:
         """
         network = self._networks[name]
         checked = network.kind.checked(address)
-        if not network.is_chosen or checked != network.address:
-            self._end(network)
-            self._begin(network, checked)
+        if not network.is_selected or checked != network.address:
+            self._stop(network)
+            self._start(network, checked)
         self._save({**self._saved(), name: checked})
 
-    def leave(self, name: str) -> None:
+    def deselect(self, name: str) -> None:
         """Stop showing a network. Raises `SettingsError` if the choice can't be saved."""
-        self._end(self._networks[name])
+        self._stop(self._networks[name])
         self._save({kind: address for kind, address in self._saved().items() if kind != name})
 
     def _saved(self) -> dict[str, object]:
-        return self._settings.get(KEPT, {})
+        return self._settings.get(SETTING_KEY, {})
 
     def _save(self, chosen: dict[str, object]) -> None:
-        self._settings.set(KEPT, chosen)
+        self._settings.set(SETTING_KEY, chosen)
 
-    def _begin(self, network: OtherNetwork, address: str) -> None:
+    def _start(self, network: OtherNetwork, address: str) -> None:
         number, kind = next(self._numbers), network.kind
-        network.forget()
+        network.reset()
         network.address, network.number, network.state = address, number, "looking"
 
         def post(event: object) -> None:
@@ -243,21 +243,21 @@ class Networks:
         network.source.start()
         self._changes += 1
 
-    def _end(self, network: OtherNetwork) -> None:
+    def _stop(self, network: OtherNetwork) -> None:
         if network.source is not None:
-            network.source.end()
+            network.source.request_stop()
             self._ending = [*(each for each in self._ending if not each.has_ended), network.source]
             network.source = None
             self._alerts.resolve(f"network:{network.kind.name}")
             self._changes += network.topics.revision + network.nodes.revision + 1
-            network.forget()
+            network.reset()
 
     # -- interface of the session ----------------------------------------------------------------------------
 
     def on_event(self, told: NetworkEvent, now: float) -> None:
         """Apply an event of a network's source."""
         network = self._networks[told.kind]
-        if network.is_chosen and told.number == network.number:
+        if network.is_selected and told.number == network.number:
             before = network.state
             network.apply(told.event, now)
             if network.state != before:
@@ -269,13 +269,13 @@ class Networks:
         if network.state != "lost":
             self._alerts.resolve(id)
             return
-        self._alerts.put(
+        self._alerts.raise_alert(
             id,
             "warn",
-            _("{network} can't be shown now.").format(network=network.kind.words),
+            _("{network} can't be shown now.").format(network=network.kind.product_name),
             f"{network.sentence[:1].upper()}{network.sentence[1:]}.",
             button=_("Other networks"),
-            action=LOOK_COMMAND,
+            action=BROWSE_COMMAND,
             count=0,
         )
 
@@ -283,10 +283,10 @@ class Networks:
         """Add messages that arrived on a watched topic."""
         name, topic = split_key(key)
         network = self._networks.get(name)
-        if network is None or not network.is_chosen or topic not in self._watched[name]:
+        if network is None or not network.is_selected or topic not in self._watched[name]:
             return
         network.topics.add(topic, batch, now)
-        network.topics[topic].watched = True
+        network.topics[topic].is_watched = True
         network.unread.pop(topic, None)
 
     def watch(self, key: str) -> None:
@@ -298,7 +298,7 @@ class Networks:
         self._watched[name].add(topic)
         known = network.topics.get(topic)
         if known is not None:
-            known.watched = True
+            known.is_watched = True
         if network.source is not None:
             network.source.watch(topic)
 
@@ -314,16 +314,16 @@ class Networks:
         if network.source is not None:
             network.source.unwatch(topic)
 
-    def age(self, now: float, now_ns: int) -> None:
+    def update_ages(self, now: float, now_ns: int) -> None:
         """Update the ages of nodes and topics."""
-        for network in self.chosen:
-            network.age(now, now_ns)
+        for network in self.selected:
+            network.update_ages(now, now_ns)
 
     def close(self) -> None:
         """Stop all sources and wait for their threads."""
         for network in self:
             if network.source is not None:
-                network.source.end()
+                network.source.request_stop()
                 self._ending.append(network.source)
                 network.source = None
         for source in self._ending:
@@ -331,26 +331,26 @@ class Networks:
         self._ending.clear()
 
 
-def lost_words(network: OtherNetwork) -> str:
+def lost_message(network: OtherNetwork) -> str:
     """Return why the connection to a network was lost ("ROS 1: no ROS master answers at ..."), or ""."""
     if network.state != "lost":
         return ""
-    return _("{network}: {reason}.").format(network=network.kind.words, reason=network.sentence)
+    return _("{network}: {reason}.").format(network=network.kind.product_name, reason=network.sentence)
 
 
-def network_words(name: str) -> str:
+def network_label(name: str) -> str:
     """Return the product name of the network of this kind; "NEP" for the native one."""
-    kind = kind_named(name)
-    return kind.words if kind is not None else "NEP"
+    kind = find_kind(name)
+    return kind.product_name if kind is not None else "NEP"
 
 
-def topic_words(key: str) -> str:
+def topic_label(key: str) -> str:
     """Return the display name of a topic: "/camera", or "/camera on ROS 2"."""
     name, topic = split_key(key)
-    return _("{topic} on {network}").format(topic=topic, network=network_words(name)) if name else topic
+    return _("{topic} on {network}").format(topic=topic, network=network_label(name)) if name else topic
 
 
-def by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:
+def split_by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:
     """Split batches into those of the native network and those of all others."""
     native: dict[str, Batch] = {}
     others: dict[str, Batch] = {}

@@ -12,25 +12,25 @@ from functools import partial
 import orjson
 
 from app.core.documents.background_worker import BackgroundWorker
-from app.core.faults import error_words
+from app.core.faults import error_text
 from app.core.network.nodes import NodeEntry
 from app.core.network.source import Job
 from app.core.network.topics import Topic, key_of
-from app.core.network.watches import Watching
+from app.core.network.watches import WatchHandle
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from nep.patterns.parameters.remote import RemoteParameters
 from nep.text import bounded_str
 
-ANSWER_TIMEOUT_S = 3.0
+REPLY_TIMEOUT_S = 3.0
 """Timeout of the call that sets a parameter."""
-READ_BYTES = 4 * 2**20
+MAX_MESSAGE_BYTES = 4 * 2**20
 """Maximum size of a message that is decoded in the window's thread."""
-EDITED_LETTERS = 20_000
+MAX_TEXT_LENGTH = 20_000
 MAX_PARAMETERS = 1000
 """Maximum number of parameters of a node; further ones are not shown."""
 _MAX_DESCRIPTION_LENGTH = 2_000
@@ -72,7 +72,7 @@ class ParameterSetter:
     def set(self, node_id: str, name: str, value: object) -> None:
         """Call the node to set a parameter. `has_been_set` returns the result."""
         owner = f"{node_id} {name}"
-        self._submit("", lambda node: self._worker.ask(owner, partial(_set, node, node_id, name, value)))
+        self._submit("", lambda node: self._worker.submit(owner, partial(_set, node, node_id, name, value)))
 
     def has_been_set(self, node_id: str, name: str) -> bool:
         """Return True once after the parameter has been set; False before.
@@ -88,12 +88,14 @@ class ParameterSetter:
 
 def _set(node: Node, node_id: str, name: str, value: object) -> bool:
     try:
-        with RemoteParameters(node.new_client(place_of(node_id), timeout_s=ANSWER_TIMEOUT_S)) as theirs:
+        with RemoteParameters(
+            node.new_client(parameters_topic(node_id), timeout_s=REPLY_TIMEOUT_S)
+        ) as theirs:
             theirs.set(name, value)
     except NepError:
         raise
     except Exception as error:
-        raise NepError(error_words(error)) from error
+        raise NepError(error_text(error)) from error
     return True
 
 
@@ -107,7 +109,7 @@ class NodeParameters:
 
     def __init__(
         self,
-        watch: Callable[[str], Watching],
+        watch: Callable[[str], WatchHandle],
         topic: Callable[[str], Topic | None],
         setter: ParameterSetter,
         has_master: Callable[[], bool] = lambda: True,
@@ -115,7 +117,7 @@ class NodeParameters:
         # `watch` opens a watch by topic key, `topic` returns its state; `has_master`: whether nodes can be
         # called.
         self._watch, self._topic, self._setter, self._has_master = watch, topic, setter, has_master
-        self.watching: Watching | None = None
+        self.watching: WatchHandle | None = None
         self.node: NodeEntry | None = None
         self.all: tuple[ShownParameter, ...] = ()
         self.changed: dict[str, float] = {}
@@ -138,7 +140,7 @@ class NodeParameters:
         self.close()
         self.node = wanted
         if wanted is not None:
-            self.watching = self._watch(key_of(wanted.network, place_of(wanted.id)))
+            self.watching = self._watch(key_of(wanted.network, parameters_topic(wanted.id)))
 
     def close(self) -> None:
         """Stop showing a node."""
@@ -158,7 +160,7 @@ class NodeParameters:
         node = self.node
         if node is None:
             return
-        topic = self._topic(key_of(node.network, place_of(node.id)))
+        topic = self._topic(key_of(node.network, parameters_topic(node.id)))
         newest = topic.newest if topic is not None else None
         if newest is not None and newest is not self._applied_message:
             self._applied_message = newest
@@ -169,9 +171,9 @@ class NodeParameters:
     def _apply(self, message: Message, now: float) -> None:
         self.revision += 1
         try:
-            if message.size_bytes > READ_BYTES:
+            if message.size_bytes > MAX_MESSAGE_BYTES:
                 raise NepError(_("they are too large to show here; use nep param list"))
-            parameters = parameters_in(message.payload)
+            parameters = parse_parameters(message.payload)
         except NepError as error:  # also a `DecodeError`
             self.problem = str(error)
             return
@@ -181,7 +183,7 @@ class NodeParameters:
                 {
                     each.name: now
                     for each in parameters
-                    if each.name not in before or not _same(before[each.name], each.value)
+                    if each.name not in before or not _are_equal(before[each.name], each.value)
                 }
             )
         self.all, self.heard, self.problem = parameters, True, ""
@@ -207,7 +209,7 @@ class NodeParameters:
         self.refusal = ""
         if node is None or parameter is None:
             return
-        self.refusal = refusal_of(node, parameter)
+        self.refusal = read_only_reason(node, parameter)
         if not self.refusal and not self._has_master():
             self.refusal = _("no master responds, so the node can't be queried; try again later")
         if self.refusal:
@@ -221,18 +223,18 @@ class NodeParameters:
         self._setter.set(node.id, name, value)
 
 
-def refusal_of(node: NodeEntry, parameter: ShownParameter) -> str:
+def read_only_reason(node: NodeEntry, parameter: ShownParameter) -> str:
     """Return why a parameter can't be set from here; "" if it can."""
     if node.gone_s is not None:
         return _("its node has disappeared")
-    if len(parameter.text) > EDITED_LETTERS:
+    if len(parameter.text) > MAX_TEXT_LENGTH:
         return _("it is too long to edit here; use nep param set")
-    if not node.may_set:
+    if not node.can_set_parameters:
         return _("parameters on this network are read-only")
     return _("only its own node can set it") if parameter.read_only else ""
 
 
-def parameters_in(state: object) -> tuple[ShownParameter, ...]:
+def parse_parameters(state: object) -> tuple[ShownParameter, ...]:
     """Parse the parameter message of a node. Raises `NepError` if the message is malformed.
 
     Any node can publish on that topic.
@@ -240,11 +242,11 @@ def parameters_in(state: object) -> tuple[ShownParameter, ...]:
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
         raise NepError(_("this is not a list of parameters"))
-    parameters = [_parameter(each) for each in listed[:MAX_PARAMETERS] if isinstance(each, Mapping)]
+    parameters = [_parse_parameter(each) for each in listed[:MAX_PARAMETERS] if isinstance(each, Mapping)]
     return tuple({each.name: each for each in parameters}.values())
 
 
-def _parameter(told: Mapping[str, object]) -> ShownParameter:
+def _parse_parameter(told: Mapping[str, object]) -> ShownParameter:
     choices = told.get("choices")
     return ShownParameter(
         bounded_str(told.get("name")),
@@ -263,7 +265,7 @@ def _number(told: object) -> float | None:
     return told if isinstance(told, int | float) and not isinstance(told, bool) else None
 
 
-def _same(one: object, other: object) -> bool:
+def _are_equal(one: object, other: object) -> bool:
     # 1, 1.0 and True are different values.
     return type(one) is type(other) and one == other
 
@@ -284,9 +286,9 @@ def value_of(text: str, kind: str) -> object:
         return text
     stripped = text.strip()
     if kind == "int":
-        return _whole(stripped)
+        return _parse_int(stripped)
     if kind == "float":
-        return _decimal(stripped)
+        return _parse_float(stripped)
     try:
         value: object = orjson.loads(stripped)
     except orjson.JSONDecodeError:
@@ -300,14 +302,14 @@ def value_of(text: str, kind: str) -> object:
     return value
 
 
-def _whole(said: str) -> int:
+def _parse_int(said: str) -> int:
     try:
         return int(said)
     except ValueError:
         raise ValueError(_("enter a whole number")) from None
 
 
-def _decimal(said: str) -> float:
+def _parse_float(said: str) -> float:
     try:
         return parse_number(said)
     except TypedNumberError as error:

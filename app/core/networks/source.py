@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import nep
-from app.core.faults import error_words
+from app.core.faults import error_text
 from app.core.network.source import NODE_NAME, LiveSource, NodeSink, Sink
 from app.core.network.topics import key_of
 from app.core.networks.kinds import NetworkKind
@@ -34,7 +34,10 @@ class OtherSource(LiveSource):
         post_event: Callable[[object], None],
     ) -> None:
         super().__init__(
-            address, [_keyed(kind.name, sink) for sink in sinks], post_event, thread=f"studio-{kind.name}"
+            address,
+            [_keyed_sink(kind.name, sink) for sink in sinks],
+            post_event,
+            thread=f"studio-{kind.name}",
         )
         self._kind = kind
         self._members: object = None
@@ -42,7 +45,7 @@ class OtherSource(LiveSource):
 
     def join(self) -> Node:
         """Join the network. Raises `NepError` while the network does not respond."""
-        with _converted_errors():
+        with _convert_errors():
             return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_S)
 
     def query_graph(self, node: Node) -> GraphView:
@@ -51,7 +54,7 @@ class OtherSource(LiveSource):
         The revision increases with every change of nodes or topics. Back ends that build a new graph for each
         query don't count revisions themselves.
         """
-        with _converted_errors():
+        with _convert_errors():
             view = node.graph(timeout_s=POLL_S)
         topics = {
             name: info if (codec := self._kind.codec(info)) == info.codec else replace(info, codec=codec)
@@ -66,8 +69,8 @@ class OtherSource(LiveSource):
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
         """Subscribe to a topic with the message type that can be read (`NetworkKind.reads`)."""
         info = self._view.topics.get(topic) if self._view is not None else None
-        wanted = self._kind.reads(info) if info is not None else msg_type
-        with _converted_errors():
+        wanted = self._kind.readable_type_of(info) if info is not None else msg_type
+        with _convert_errors():
             return node.new_sub(topic, wanted, sink=sink, wildcards=False, qos=self._kind.qos)
 
 
@@ -90,17 +93,17 @@ def _members(view: GraphView) -> object:
 
 
 @contextmanager
-def _converted_errors() -> Iterator[None]:
+def _convert_errors() -> Iterator[None]:
     # Converts exceptions of a back end's library to `NepError`.
     try:
         yield
     except NepError:
         raise
     except Exception as error:
-        raise NepError(error_words(error)) from error
+        raise NepError(error_text(error)) from error
 
 
-def _keyed(network: str, sink: Sink) -> Sink:
+def _keyed_sink(network: str, sink: Sink) -> Sink:
     def take(topic: str, messages: Sequence[Message]) -> None:
         sink(key_of(network, topic), messages)
 

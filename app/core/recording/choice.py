@@ -25,7 +25,7 @@ MIN_MINUTES, MAX_MINUTES = 0.1, 10_080.0
 MAX_NAMES = 1_000
 MAX_NAME_LENGTH = 80
 """Maximum length of a file name, which all file systems accept with an extension added."""
-NOT = lazy("not")
+EXCLUDE_KEYWORD = lazy("not")
 _INVALID_CHARACTERS = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
 
@@ -44,18 +44,20 @@ class RecordingChoice:
     mode: str = "all"
     topics: tuple[str, ...] = ()
     patterns: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
-    ends_min: float | None = None
-    ends_gb: float | None = None
+    excluded: tuple[str, ...] = ()
+    max_minutes: float | None = None
+    max_gb: float | None = None
 
-    def end(self, elapsed_s: float, size_bytes: float, speed: float | None) -> tuple[float, float] | None:
+    def expected_end(
+        self, elapsed_s: float, size_bytes: float, speed: float | None
+    ) -> tuple[float, float] | None:
         """Return the expected duration (s) and size (bytes) at the end; None if unknown.
 
         ``speed`` is the current data rate in bytes per second.
         """
-        ends = [] if self.ends_min is None else [60.0 * self.ends_min]
-        if self.ends_gb is not None and speed:
-            ends.append(elapsed_s + (1e9 * self.ends_gb - size_bytes) / speed)
+        ends = [] if self.max_minutes is None else [60.0 * self.max_minutes]
+        if self.max_gb is not None and speed:
+            ends.append(elapsed_s + (1e9 * self.max_gb - size_bytes) / speed)
         if speed is None or not ends:
             return None
         at_s = max(elapsed_s, min(ends))
@@ -67,7 +69,7 @@ class RecordingChoice:
         if self.mode == "chosen":
             return recorder.TopicSelection(self.topics)
         if self.mode == "pattern":
-            return recorder.TopicSelection(self.patterns, self.left_out)
+            return recorder.TopicSelection(self.patterns, self.excluded)
         return recorder.TopicSelection()
 
     @property
@@ -82,7 +84,7 @@ class RecordingChoice:
         return ""
 
 
-def read_choice(told: object) -> RecordingChoice:
+def parse_choice(told: object) -> RecordingChoice:
     """Parse a selection from the settings; invalid parts become defaults."""
     if not isinstance(told, Mapping):
         return RecordingChoice()
@@ -97,15 +99,15 @@ def read_choice(told: object) -> RecordingChoice:
     )
 
 
-def plain_choice(choice: RecordingChoice) -> dict[str, object]:
+def choice_to_json(choice: RecordingChoice) -> dict[str, object]:
     """Return the selection as JSON data for the settings."""
     return {
         "mode": choice.mode,
         "topics": list(choice.topics),
         "patterns": list(choice.patterns),
-        "left_out": list(choice.left_out),
-        "ends_min": choice.ends_min,
-        "ends_gb": choice.ends_gb,
+        "left_out": list(choice.excluded),
+        "ends_min": choice.max_minutes,
+        "ends_gb": choice.max_gb,
     }
 
 
@@ -114,7 +116,7 @@ def _names(told: object) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class RingWish:
+class RingSettings:
     """Settings of the flight recorder.
 
     Attributes:
@@ -129,49 +131,49 @@ class RingWish:
     seconds: int = USUAL_S
     size_gb: float = USUAL_GB
     patterns: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
+    excluded: tuple[str, ...] = ()
 
     @property
     def problem(self) -> str:
         """Reason why these topics can't be recorded, or ""."""
-        return RecordingChoice("pattern", (), self.patterns, self.left_out).problem
+        return RecordingChoice("pattern", (), self.patterns, self.excluded).problem
 
 
-def read_wish(told: object) -> RingWish:
+def parse_ring_settings(told: object) -> RingSettings:
     """Parse settings of the flight recorder; invalid parts become defaults."""
     if not isinstance(told, Mapping):
-        return RingWish()
+        return RingSettings()
     seconds, size_gb = told.get("seconds"), told.get("size_gb")
-    return RingWish(
+    return RingSettings(
         told.get("is_on") is True,
-        int(seconds) if _within(seconds, MIN_S, MAX_S) else USUAL_S,  # type: ignore[arg-type]
-        float(size_gb) if _within(size_gb, MIN_GB, MAX_GB) else USUAL_GB,  # type: ignore[arg-type]
+        int(seconds) if _is_within(seconds, MIN_S, MAX_S) else USUAL_S,  # type: ignore[arg-type]
+        float(size_gb) if _is_within(size_gb, MIN_GB, MAX_GB) else USUAL_GB,  # type: ignore[arg-type]
         _names(told.get("patterns")),
         _names(told.get("left_out")),
     )
 
 
-def plain_wish(wish: RingWish) -> dict[str, object]:
+def ring_settings_to_json(wish: RingSettings) -> dict[str, object]:
     """Return settings of the flight recorder as JSON data."""
     return {
         "is_on": wish.is_on,
         "seconds": wish.seconds,
         "size_gb": wish.size_gb,
         "patterns": list(wish.patterns),
-        "left_out": list(wish.left_out),
+        "left_out": list(wish.excluded),
     }
 
 
 def _number(value: object, least: float, most: float) -> float | None:
-    return float(value) if _within(value, least, most) else None  # type: ignore[arg-type]
+    return float(value) if _is_within(value, least, most) else None  # type: ignore[arg-type]
 
 
-def _within(value: object, least: float, most: float) -> bool:
+def _is_within(value: object, least: float, most: float) -> bool:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return is_number and least <= value <= most  # type: ignore[operator]
 
 
-def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def parse_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Parse "/arm/* *action* not /arm/raw" into wanted and unwanted patterns.
 
     The patterns after "not" are unwanted.
@@ -180,7 +182,7 @@ def read_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     unwanted: list[str] = []
     is_not = False
     for word in text.replace(",", " ").split():
-        if word.casefold() in {NOT, _(NOT).casefold()}:
+        if word.casefold() in {EXCLUDE_KEYWORD, _(EXCLUDE_KEYWORD).casefold()}:
             is_not = True
             continue
         into = unwanted if is_not else wanted

@@ -23,7 +23,7 @@ from app.core.alerts import Alerts
 from app.core.own_process import module_command
 from nep.i18n import _, ngettext
 from nep.masters.process import NO_CONSOLE
-from nep.recordings.formats.figures import TopicFigures, read_figures
+from nep.recordings.formats.figures import TopicStats, parse_stats
 
 LOW_DISK_BYTES = 1_000_000_000
 """Free disk space below which the user is warned. At 200 MB the recorder stops."""
@@ -36,7 +36,7 @@ _TAIL_BYTES = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class RecorderSaid:
+class RecorderEvent:
     """Event sent by a recorder process, as described in `nep.recordings.child`."""
 
     process: int
@@ -44,7 +44,7 @@ class RecorderSaid:
 
 
 @dataclass(frozen=True, slots=True)
-class RecorderGone:
+class RecorderExited:
     """Event: a recorder process has ended or could not be started; ``detail`` is its last output."""
 
     process: int
@@ -59,7 +59,7 @@ class RingChoice:
     seconds: float = 60.0
     size_bytes: int = 2_000_000_000
     topics: tuple[str, ...] = ()
-    left_out: tuple[str, ...] = ()
+    excluded: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,20 +84,20 @@ class RecorderState:
     size_bytes: int = 0
     duration_s: float = 0.0
     lost: int = 0
-    unkept: int = 0
+    unwritten: int = 0
     free_bytes: int | None = None
-    topics: Mapping[str, TopicFigures] = field(default_factory=dict)
+    topics: Mapping[str, TopicStats] = field(default_factory=dict)
     ring_s: float | None = None
     ring_bytes: int = 0
-    keeping: tuple[Path, ...] = ()
+    saving: tuple[Path, ...] = ()
     last: Path | None = None
     limit: str = ""
 
 
-class OrderLine(Protocol):
+class CommandChannel(Protocol):
     """Running recorder process, as used by `RecorderClient`."""
 
-    def order(self, content: Mapping[str, object]) -> bool:
+    def send_command(self, content: Mapping[str, object]) -> bool:
         """Send a command; return False when the queue is full. Never blocks."""
 
     def close(self, wait_s: float) -> None:
@@ -107,7 +107,7 @@ class OrderLine(Protocol):
         """
 
 
-StartRecorder = Callable[[int, str, Callable[[object], object]], OrderLine]
+StartRecorder = Callable[[int, str, Callable[[object], object]], CommandChannel]
 """Starts a recorder process from its number, the address of the master, and an event callback.
 
 The callback is called from any thread.
@@ -124,7 +124,7 @@ class RecorderProcess:
         self._has_ended = threading.Event()
         threading.Thread(target=self._run, name="recorder-process", daemon=True).start()
 
-    def order(self, content: Mapping[str, object]) -> bool:
+    def send_command(self, content: Mapping[str, object]) -> bool:
         """Queue a command; return False when the queue is full."""
         try:
             self._orders.put_nowait(orjson.dumps(content) + b"\n")
@@ -143,16 +143,16 @@ class RecorderProcess:
         try:
             with tempfile.TemporaryFile() as log:
                 try:
-                    detail = self._talk(log)
+                    detail = self._run_process(log)
                 finally:
                     detail = detail or _tail(log)
         except OSError as error:
             detail = str(error)
         finally:
             self._has_ended.set()
-            self._post_event(RecorderGone(self._number, detail))
+            self._post_event(RecorderExited(self._number, detail))
 
-    def _talk(self, log: IO[bytes]) -> str:
+    def _run_process(self, log: IO[bytes]) -> str:
         process = subprocess.Popen(
             [*module_command("nep.recordings.child"), "--master", self._address],
             stdin=subprocess.PIPE,
@@ -168,7 +168,7 @@ class RecorderProcess:
                 with suppress(orjson.JSONDecodeError):
                     content = orjson.loads(line)
                     if isinstance(content, dict):
-                        self._post_event(RecorderSaid(self._number, content))
+                        self._post_event(RecorderEvent(self._number, content))
             code = process.wait()
             with suppress(queue.Full):
                 self._orders.put_nowait(None)  # ends the thread that waits for commands
@@ -212,17 +212,17 @@ class RecorderClient:
         # `post_event` passes events of the process's threads to `on_event`.
         self._address, self._alerts, self._post_event = address, alerts, post_event
         self._start, self._clock = start, clock
-        self._process: OrderLine | None = None
+        self._process: CommandChannel | None = None
         self._number = 0
         self._ring: RingChoice | None = None
         self._retry_at, self._backoff_s = 0.0, AGAIN_S
         self._handlers: Mapping[str, Callable[[Mapping[str, object]], None]] = {
             "recording": self._on_recording,
-            "figures": self._on_figures,
+            "figures": self._on_stats,
             "ended": self._on_ended,
             "ring": self._on_ring,
             "ring_ended": self._on_ring_ended,
-            "kept": self._on_kept,
+            "kept": self._on_saved,
             "problem": self._on_problem,
         }
         self.state = RecorderState()
@@ -255,7 +255,7 @@ class RecorderClient:
                 path,
                 ring_s=old.ring_s,
                 ring_bytes=old.ring_bytes,
-                keeping=old.keeping,
+                saving=old.saving,
                 last=old.last,
             )
         )
@@ -272,7 +272,7 @@ class RecorderClient:
             self._set(replace(self.state, phase="ending"))
             self._send(op="stop")
 
-    def note(self, text: str) -> None:
+    def add_bookmark(self, text: str) -> None:
         """Add a bookmark with this text to the recording."""
         if self.state.phase == "recording":
             self._send(op="note", text=text)
@@ -284,9 +284,9 @@ class RecorderClient:
         """
         is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
         if self._process is not None and is_heard:
-            self._process.order({"op": "say", "role": role, "value": dict(value), "to": to})
+            self._process.send_command({"op": "say", "role": role, "value": dict(value), "to": to})
 
-    def follow_ring(self, choice: RingChoice | None) -> None:
+    def set_ring(self, choice: RingChoice | None) -> None:
         """Switch the flight recorder on with this selection, or off with None.
 
         The flight recorder is restarted after a failure.
@@ -299,23 +299,23 @@ class RecorderClient:
         if was_on and self._process is not None:
             self._send(op="end_ring")
         if choice is not None:
-            self._begin_ring(choice)
+            self._start_ring(choice)
 
     def save_last(self, path: Path, seconds: float, note: str = "") -> bool:
         """Save the last seconds to a file.
 
         Return False if the flight recorder is off or saves too many files.
         """
-        if self._ring is None or self._process is None or len(self.state.keeping) >= MAX_PENDING_SAVES:
+        if self._ring is None or self._process is None or len(self.state.saving) >= MAX_PENDING_SAVES:
             return False
-        self._set(replace(self.state, keeping=(*self.state.keeping, path)))
+        self._set(replace(self.state, saving=(*self.state.saving, path)))
         self._send(op="keep", path=str(path), seconds=seconds, note=note)
         return True
 
     def check(self) -> None:
         """Restart a flight recorder whose process ended unexpectedly. Called once a second."""
         if self._ring is not None and self._process is None and self._clock() >= self._retry_at:
-            self._begin_ring(self._ring)
+            self._start_ring(self._ring)
 
     def close(self, wait_s: float = END_TIMEOUT_S) -> None:
         """Close the input of the process, and wait at most ``wait_s`` seconds while it finishes its work."""
@@ -325,11 +325,11 @@ class RecorderClient:
 
     # ---- events of the process
 
-    def on_event(self, event: RecorderSaid | RecorderGone) -> None:
+    def on_event(self, event: RecorderEvent | RecorderExited) -> None:
         """Apply an event of the process; events of earlier processes are ignored."""
         if event.process != self._number or self._process is None:
             return
-        if isinstance(event, RecorderGone):
+        if isinstance(event, RecorderExited):
             self._on_gone(event.detail)
             return
         handler = self._handlers.get(str(event.content.get("event")))
@@ -340,7 +340,7 @@ class RecorderClient:
         if self.state.phase == "starting":
             self._set(replace(self.state, phase="recording"))
 
-    def _on_figures(self, content: Mapping[str, object]) -> None:
+    def _on_stats(self, content: Mapping[str, object]) -> None:
         state = self.state
         recording, ring = content.get("recording"), content.get("ring")
         if isinstance(recording, Mapping) and state.phase:
@@ -366,11 +366,11 @@ class RecorderClient:
         self._alerts.resolve("recorder:low")
         problem = status.get("problem")
         if isinstance(problem, str) and problem:
-            self._alerts.put(
+            self._alerts.raise_alert(
                 "recorder:ended",
                 "error",
                 _("The recording stopped: {reason}.").format(reason=problem),
-                _path_words(path),
+                _path_text(path),
             )
 
     def _on_ring(self, _content: Mapping[str, object]) -> None:
@@ -388,37 +388,41 @@ class RecorderClient:
         if self._ring is None:
             self._set(replace(self.state, ring_s=None, ring_bytes=0))
 
-    def _on_kept(self, content: Mapping[str, object]) -> None:
+    def _on_saved(self, content: Mapping[str, object]) -> None:
         path = _path(content)
-        self._set(replace(self._without_keeping(path), last=path or self.state.last))
+        self._set(replace(self._without_saving(path), last=path or self.state.last))
 
     def _on_problem(self, content: Mapping[str, object]) -> None:
         op, sentence = content.get("op"), str(content.get("sentence", ""))
         if op == "record":
             self._set(replace(self.state, phase="", path=None))
-            self._alerts.put("recorder:ended", "error", _("Nothing is being recorded."), sentence)
+            self._alerts.raise_alert("recorder:ended", "error", _("Nothing is being recorded."), sentence)
         elif op == "keep":
-            self._set(self._without_keeping(_path(content)))
-            self._alerts.put("recorder:keep", "error", _("The last seconds could not be saved."), sentence)
+            self._set(self._without_saving(_path(content)))
+            self._alerts.raise_alert(
+                "recorder:keep", "error", _("The last seconds could not be saved."), sentence
+            )
         elif op == "ring":
             self._ring = None
             self._set(replace(self.state, ring_s=None, ring_bytes=0))
             self._alert_ring_off(sentence)
         elif op == "stop":
             self._set(replace(self.state, phase=""))
-            self._alerts.put("recorder:ended", "error", _("The recording could not be closed."), sentence)
+            self._alerts.raise_alert(
+                "recorder:ended", "error", _("The recording could not be closed."), sentence
+            )
 
     def _on_gone(self, detail: str) -> None:
         before, self._process = self.state, None
         self._retry_at = self._clock() + self._backoff_s
         self._backoff_s = min(2 * self._backoff_s, AGAIN_AT_MOST_S)
-        self._set(replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, keeping=()))
+        self._set(replace(before, phase="", free_bytes=None, ring_s=None, ring_bytes=0, saving=()))
         if before.phase:
             title = _("The recorder stopped. Everything up to a second before that is saved.")
-            self._alerts.put("recorder:ended", "error", title, detail or _path_words(before.path))
-        if before.keeping:
+            self._alerts.raise_alert("recorder:ended", "error", title, detail or _path_text(before.path))
+        if before.saving:
             title = _("The last seconds could not be saved.")
-            self._alerts.put("recorder:keep", "error", title, detail)
+            self._alerts.raise_alert("recorder:keep", "error", title, detail)
         if self._ring is not None:
             self._alert_ring_off(detail)
 
@@ -426,12 +430,12 @@ class RecorderClient:
 
     def _alert_ring_off(self, reason: str) -> None:
         title = _("The flight recorder is off: the last seconds can't be saved.")
-        self._alerts.put("recorder:ring", "warn", title, reason)
+        self._alerts.raise_alert("recorder:ring", "warn", title, reason)
 
     def _warn(self) -> None:
         state = self.state
         if state.phase and state.free_bytes is not None and state.free_bytes < LOW_DISK_BYTES:
-            self._alerts.put(
+            self._alerts.raise_alert(
                 "recorder:low",
                 "warn",
                 _("The disk is nearly full."),
@@ -440,33 +444,33 @@ class RecorderClient:
             )
         else:
             self._alerts.resolve("recorder:low")
-        if state.phase and state.unkept:
+        if state.phase and state.unwritten:
             title = ngettext(
                 "{count} message was not recorded: the disk is too slow.",
                 "{count} messages were not recorded: the disk is too slow.",
-                state.unkept,
+                state.unwritten,
             )
-            self._alerts.put("recorder:unkept", "warn", title.format(count=state.unkept), count=0)
+            self._alerts.raise_alert("recorder:unkept", "warn", title.format(count=state.unwritten), count=0)
 
-    def _begin_ring(self, choice: RingChoice) -> None:
+    def _start_ring(self, choice: RingChoice) -> None:
         self._send(
             op="ring",
             folder=str(choice.folder),
             seconds=choice.seconds,
             size_bytes=choice.size_bytes,
             topics=list(choice.topics),
-            left_out=list(choice.left_out),
+            left_out=list(choice.excluded),
         )
 
     def _send(self, **content: object) -> None:
         if self._process is None:
             self._number += 1
             self._process = self._start(self._number, self._address, self._post_event)
-        if not self._process.order(content):
+        if not self._process.send_command(content):
             self._on_problem({**content, "sentence": _("the recorder does not respond")})
 
-    def _without_keeping(self, path: Path | None) -> RecorderState:
-        return replace(self.state, keeping=tuple(each for each in self.state.keeping if each != path))
+    def _without_saving(self, path: Path | None) -> RecorderState:
+        return replace(self.state, saving=tuple(each for each in self.state.saving if each != path))
 
     def _set(self, state: RecorderState) -> None:
         if state != self.state:
@@ -477,7 +481,7 @@ class RecorderClient:
 def _with_status(state: RecorderState, status: Mapping[str, object]) -> RecorderState:
     plain = status.get("topics")
     named = plain.items() if isinstance(plain, Mapping) else ()
-    topics = {str(topic): each for topic, told in named if (each := read_figures(told)) is not None}
+    topics = {str(topic): each for topic, told in named if (each := parse_stats(told)) is not None}
     duration = status.get("duration_s")
     return replace(
         state,
@@ -485,7 +489,7 @@ def _with_status(state: RecorderState, status: Mapping[str, object]) -> Recorder
         size_bytes=_non_negative_int(status.get("size_bytes")) or 0,
         duration_s=float(duration) if isinstance(duration, int | float) else 0.0,
         lost=sum(each.lost or 0 for each in topics.values()),
-        unkept=_non_negative_int(status.get("unkept")) or 0,
+        unwritten=_non_negative_int(status.get("unkept")) or 0,
         topics=topics,
     )
 
@@ -499,5 +503,5 @@ def _path(content: Mapping[str, object]) -> Path | None:
     return Path(path) if isinstance(path, str) and path else None
 
 
-def _path_words(path: Path | None) -> str:
+def _path_text(path: Path | None) -> str:
     return "" if path is None else str(path)

@@ -11,15 +11,15 @@ from app.core.alarms import severity_of
 from app.core.run.view import RunState
 from nep.i18n import _
 from nep.programs.alarms import AlarmEvent
-from nep.programs.alarms.sentences import what_words
+from nep.programs.alarms.sentences import event_text
 
-MAX_PRESENT = 200
+MAX_ACTIVE = 200
 """Maximum number of active alarms that are sent repeatedly; further ones are sent once."""
 MAX_TEXT_LENGTH = 200
 _ACTIVE_STATES = frozenset({"running", "paused"})
 
 
-class Say(Protocol):
+class SendEvent(Protocol):
     """Function that sends an event to the recorder."""
 
     def __call__(self, role: str, value: Mapping[str, object], to: str = "") -> object:
@@ -33,7 +33,7 @@ class RecordedEvents:
     to the flight recorder, so that each saved part contains them. Otherwise only changes are sent.
     """
 
-    def __init__(self, say: Say, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
+    def __init__(self, say: SendEvent, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
         # `clock_ns` is ns since 1970, as in the recorder.
         self._say, self._clock_ns = say, clock_ns
         self._numbers = count(1)
@@ -48,7 +48,7 @@ class RecordedEvents:
 
     # ---- behaviours
 
-    def follow_run(self, run: RunState) -> None:
+    def update_run(self, run: RunState) -> None:
         """Apply the state of the run. Called at each tick."""
         before, self._run = self._run, run
         if run is before:
@@ -58,9 +58,9 @@ class RecordedEvents:
         if was_on and not (is_on and is_same):
             self._end_run(run if is_same else None)
         elif self._run_told and not is_on:
-            self._tell_result(run)
+            self._send_result(run)
         if is_on and not is_same:
-            self._run_told = self._new(f"run-{next(self._numbers)}", run.trying or run.name)
+            self._run_told = self._new_entry(f"run-{next(self._numbers)}", run.tried_label or run.name)
             self._add("runs", self._run_told)
 
     def _end_run(self, run: RunState | None) -> None:
@@ -71,9 +71,9 @@ class RecordedEvents:
             self._say("runs", dict(self._run_told))
             self._run_told = {}
         else:
-            self._tell_result(run)
+            self._send_result(run)
 
-    def _tell_result(self, run: RunState) -> None:
+    def _send_result(self, run: RunState) -> None:
         # Sent again with the robots' time once they have replied.
         told = {**self._run_told, **_result(run)}
         if told != self._run_told:
@@ -84,7 +84,7 @@ class RecordedEvents:
 
     # ---- alarms
 
-    def take_alarm(self, event: AlarmEvent) -> None:
+    def on_alarm(self, event: AlarmEvent) -> None:
         """Apply an alarm event: raised, cleared, or still on."""
         key = f"alarm-{event.rule.id}"
         known = self._present.get(key)
@@ -96,14 +96,14 @@ class RecordedEvents:
         if known is not None:
             return
         condition = event.rule.condition
-        told = self._new(f"{key}-{next(self._numbers)}", what_words(condition, event.seen))
+        told = self._new_entry(f"{key}-{next(self._numbers)}", event_text(condition, event.value))
         told["severity"] = severity_of(condition)
         told["topic"] = "" if condition.is_about_node else condition.name
         self._add("alarms", told, key)
 
     # ---- private
 
-    def _new(self, id: str, name: str) -> dict[str, object]:
+    def _new_entry(self, id: str, name: str) -> dict[str, object]:
         since_ns = self._clock_ns()
         return {
             "id": f"{id}-{since_ns}",
@@ -114,13 +114,13 @@ class RecordedEvents:
 
     def _add(self, role: str, told: Mapping[str, object], key: str = "") -> None:
         self._say(role, dict(told))
-        if len(self._present) < MAX_PRESENT:
+        if len(self._present) < MAX_ACTIVE:
             self._present[key or str(told["id"])] = (role, told)
 
 
 def _is_same(before: RunState, run: RunState) -> bool:
     # The clock of the same run is set once more when its scripts begin.
-    return run.started_s == before.started_s or (run.begun and not before.begun)
+    return run.started_s == before.started_s or (run.is_started and not before.is_started)
 
 
 def _result(run: RunState) -> dict[str, object]:
@@ -129,7 +129,7 @@ def _result(run: RunState) -> dict[str, object]:
     if run.finished:
         return {"result": "ended", "words": ""}
     report = run.report
-    if report is None or not report.proven or not report.robots:
+    if report is None or not report.is_proven or not report.robots:
         return {"result": "stopped", "words": ""}
     elapsed = max(1, round(report.elapsed_ms))
     return {"result": "stopped", "words": _("Stop, {elapsed} ms").format(elapsed=elapsed)}

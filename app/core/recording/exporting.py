@@ -8,8 +8,8 @@ from pathlib import Path
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import NepError
 from nep.i18n import _, ngettext
-from nep.recordings.export import ALL_OF_IT, Exported, Part, export
-from nep.recordings.formats.damage import damage_words
+from nep.recordings.export import FULL_RECORDING, ExportedFile, Part, export
+from nep.recordings.formats.damage import corruption_text
 
 
 class _CancelledError(Exception):
@@ -24,7 +24,7 @@ class RecordingExport:
         recording: Path,
         kind: str,
         folder: Path,
-        part: Part = ALL_OF_IT,
+        part: Part = FULL_RECORDING,
         opener: RecordingOpener | None = None,
     ) -> None:
         # `kind` is one of `nep.recordings.export.FORMATS`; the folder is created. `opener` is closed at the
@@ -34,7 +34,7 @@ class RecordingExport:
         """Description of parts of the recording that can't be read, or ""."""
         self._part = part
         self.folder = folder
-        self.files: tuple[Exported, ...] = ()
+        self.files: tuple[ExportedFile, ...] = ()
         self.problem = ""
         """Reason why the export failed, or ""."""
         self._recording, self._kind = recording, kind
@@ -55,7 +55,7 @@ class RecordingExport:
         return self._is_cancelled.is_set()
 
     @property
-    def share(self) -> float | None:
+    def progress(self) -> float | None:
         """Progress from 0 to 1; None if unknown."""
         done, total = self._progress
         return done / total if total else None
@@ -70,7 +70,7 @@ class RecordingExport:
         self._thread.join(wait_s)
         self._opener.close()
 
-    def words(self) -> str:
+    def result_text(self) -> str:
         """Return the result as a sentence without a full stop; "" while the export is running."""
         if not self.is_over:
             return ""
@@ -86,7 +86,7 @@ class RecordingExport:
         try:
             with self._opener.open(self._recording) as recording:
                 files = export(recording, self._kind, self.folder, self._part, progress=self._report_progress)
-                self.damage = damage_words(recording.damage, recording.start_ns)
+                self.damage = corruption_text(recording.corruption, recording.start_ns)
             self.files = tuple(files)
         except _CancelledError:
             pass

@@ -19,12 +19,12 @@ _BUDGET = (1_000_000_000, 20.0)
 _MAX_TOPICS = 10_000
 SAMPLES = 4
 """Number of messages of a topic that are read to estimate the total size."""
-MAX_SAMPLED = 200
+MAX_SAMPLED_TOPICS = 200
 """Maximum number of topics whose size is estimated."""
 
 
 @dataclass(frozen=True)
-class FilmStripLook:
+class FilmStripPreview:
     """Preview of a recording from ``start_ns`` to ``end_ns``.
 
     Attributes:
@@ -80,7 +80,7 @@ class FilmStripLook:
 
 def film_strip(
     path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
-) -> FilmStripLook | None:
+) -> FilmStripPreview | None:
     """Read the preview of a recording, with this number and size of images; None if it can't be read."""
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
@@ -92,7 +92,7 @@ def film_strip(
             topics = tuple(recording.topics.values())
             images = _pictures(recording, pictures, fit)
             sizes = _message_bytes(recording)
-            return FilmStripLook(path, start_ns, end_ns, images, counts, topics, counted, sizes)
+            return FilmStripPreview(path, start_ns, end_ns, images, counts, topics, counted, sizes)
     except (NepError, OSError):
         return None
 
@@ -113,13 +113,13 @@ def _pictures(recording: Recording, count: int, fit: Size) -> tuple[Picture | No
 
 def _message_bytes(recording: Recording) -> dict[str, float]:
     # From the recorder's counts, else from a few messages along the time.
-    figures = recording.figures()
+    figures = recording.stats()
     made = {
         topic: each.size_bytes / each.received
         for topic, each in figures.items()
         if each.received and topic in recording.topics
     }
-    others = [topic for topic in recording.topics if topic not in made][:MAX_SAMPLED]
+    others = [topic for topic in recording.topics if topic not in made][:MAX_SAMPLED_TOPICS]
     seen: dict[str, dict[int, int]] = {topic: {} for topic in others}
     span = recording.end_ns - recording.start_ns
     for place in range(SAMPLES if others else 0):
@@ -129,8 +129,8 @@ def _message_bytes(recording: Recording) -> dict[str, float]:
     return made | {topic: sum(sizes.values()) / len(sizes) for topic, sizes in seen.items() if sizes}
 
 
-def part_of(
-    look: FilmStripLook, begin_ns: int, end_ns: int, wanted: Sequence[str], unwanted: Sequence[str]
+def select_part(
+    look: FilmStripPreview, begin_ns: int, end_ns: int, wanted: Sequence[str], unwanted: Sequence[str]
 ) -> Part:
     """Return the part of a recording in a time range (inclusive), limited to topics that match the patterns.
 

@@ -20,7 +20,7 @@ from nep.recordings.reader import Recording
 
 SUFFIX = ".mcap"
 MAX_FILES = 2_000
-AT_ONCE = 50
+MAX_READS_PER_SCAN = 50
 """Number of files after which a partial result is reported."""
 MAX_SCAN_S = 2.0
 """Time after which a partial result is reported; reading one file may take some seconds."""
@@ -57,9 +57,9 @@ class RecordingFacts:
     note: str = ""
     is_complete: bool = False
     is_repaired: bool = False
-    is_kept: bool = False
+    is_from_flight_recorder: bool = False
     problem: str = ""
-    not_scanned: str = ""
+    scan_problem: str = ""
     lost: int | None = None
 
 
@@ -75,11 +75,11 @@ class FolderScan:
 
     files: Sequence[RecordingFacts] = ()
     problem: str = ""
-    left_out: int = 0
-    is_whole: bool = True
+    omitted_count: int = 0
+    is_complete: bool = True
 
 
-def usual_folder() -> Path:
+def default_folder() -> Path:
     """Return the default folder of recordings."""
     home = os.environ.get("NEP_STUDIO_HOME")
     return Path(home or platformdirs.user_documents_dir()) / _("Recordings")
@@ -109,7 +109,7 @@ class RecordingFolder:
 
         ``being_written`` is not opened.
         """
-        self._worker.ask(_OWNER, lambda: self._scan(being_written))
+        self._worker.submit(_OWNER, lambda: self._scan(being_written))
 
     def pop_result(self) -> FolderScan | None:
         """Return and clear a new scan result; None if there is none."""
@@ -141,7 +141,11 @@ class RecordingFolder:
                 files.append(known[1])
                 continue
             plain = RecordingFacts(path, about.st_size, about.st_mtime)
-            if path != being_written and opened < AT_ONCE and (not opened or time.monotonic() < until):
+            if (
+                path != being_written
+                and opened < MAX_READS_PER_SCAN
+                and (not opened or time.monotonic() < until)
+            ):
                 opened += 1
                 plain = read_facts(plain, self._opener)
                 self._known[path] = (mark, plain)
@@ -154,7 +158,7 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
     """Return the facts completed from the file, or with the reason why it wasn't read."""
     try:
         with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
-            words = recording.words
+            words = recording.recorder_metadata
             return RecordingFacts(
                 plain.path,
                 plain.size_bytes,
@@ -167,19 +171,19 @@ def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts
                 note=words.get("note", ""),
                 is_complete=recording.is_complete,
                 is_repaired=words.get("repaired") == "1",
-                is_kept=words.get("kept") == "1",
+                is_from_flight_recorder=words.get("kept") == "1",
                 lost=_lost(recording),
             )
     except RecordingTooLargeError as error:
         why = _("Not scanned: {reason}.").format(reason=error.reason)
-        return replace(plain, is_read=True, is_complete=True, not_scanned=why)
+        return replace(plain, is_read=True, is_complete=True, scan_problem=why)
     except (NepError, OSError) as error:
         return replace(plain, is_read=True, problem=str(error))
 
 
 def _lost(recording: Recording) -> int | None:
     try:
-        figures = recording.figures()
+        figures = recording.stats()
     except RecordingTooLargeError:  # a file that was not closed would have to be read completely
         return None
     return sum((each.lost or 0) + each.unkept for each in figures.values()) if figures else None

@@ -13,19 +13,19 @@ from typing import TYPE_CHECKING
 from app.core.alerts import Alerts
 from app.core.recording.choice import (
     RecordingChoice,
-    RingWish,
+    RingSettings,
+    choice_to_json,
     file_stem,
     free_path,
-    plain_choice,
-    plain_wish,
-    read_choice,
-    read_wish,
+    parse_choice,
+    parse_ring_settings,
+    ring_settings_to_json,
 )
 from app.core.recording.client import (
     RecorderClient,
-    RecorderGone,
+    RecorderEvent,
+    RecorderExited,
     RecorderProcess,
-    RecorderSaid,
     RingChoice,
     StartRecorder,
 )
@@ -34,8 +34,8 @@ from app.core.storage.settings import Settings, data_home
 from app.errors import SettingsError
 from nep.i18n import _
 from nep.programs.alarms import AlarmAction, AlarmEvent
-from nep.programs.alarms.alarms import Done
-from nep.programs.alarms.sentences import what_words
+from nep.programs.alarms.alarms import DoneCallback
+from nep.programs.alarms.sentences import event_text
 from nep.system.lazy_import import lazy_module
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ NO_FOLDER = "recorder:folder"
 CHOOSE_FOLDER = "recording.folder"
 """Window command that opens the choice of another folder."""
 _GB = 1_000_000_000
-_KEPT_FILE = re.compile(r"[\w.-]+\.mcap\b")
+_SAVED_FILE = re.compile(r"[\w.-]+\.mcap\b")
 
 
 def _ignore_made(_path: Path, _kind: str) -> None: ...
@@ -79,13 +79,13 @@ class SessionRecordings:
         self._settings, self._alerts, self._clock, self._now = settings, alerts, clock, now
         self.client = RecorderClient(address, alerts, post_event, start=start, clock=clock)
         self.events = RecordedEvents(self.client.write_entry)
-        self.choice = read_choice(settings.get(CHOICE_KEY, {}))
-        self.wish = read_wish(settings.get(RING_KEY, {}))
+        self.choice = parse_choice(settings.get(CHOICE_KEY, {}))
+        self.wish = parse_ring_settings(settings.get(RING_KEY, {}))
         self.on_made: Callable[[Path, str], object] = _ignore_made
         self.recorded = self.choice
         """Selection of the recording in progress."""
         self._started_s: float | None = None
-        self._keeping: dict[Path, Done | None] = {}
+        self._keeping: dict[Path, DoneCallback | None] = {}
 
     # ---- folder
 
@@ -93,14 +93,14 @@ class SessionRecordings:
     def folder(self) -> Path:
         """Folder of recordings."""
         chosen = self._settings.get(FOLDER_KEY, "")
-        return Path(chosen) if chosen else folders.usual_folder()
+        return Path(chosen) if chosen else folders.default_folder()
 
     def set_folder(self, folder: Path) -> None:
         """Set and save the folder of recordings."""
         self._save_setting(FOLDER_KEY, str(folder))
         self._alerts.resolve(NO_FOLDER)
 
-    def _ready_folder(self) -> Path | None:
+    def _prepare_folder(self) -> Path | None:
         # None if it doesn't exist, which an alert reports. A chosen folder is not created: its disk may not
         # be mounted.
         folder = self.folder
@@ -116,7 +116,7 @@ class SessionRecordings:
         if not problem:
             self._alerts.resolve(NO_FOLDER)
             return folder
-        self._alerts.put(
+        self._alerts.raise_alert(
             NO_FOLDER,
             "error",
             _("Not recording: the recordings folder is missing."),
@@ -142,10 +142,10 @@ class SessionRecordings:
         """Duration of the recording in seconds; 0 when idle or while its process starts."""
         return 0.0 if self._started_s is None else max(0.0, self._clock() - self._started_s)
 
-    def choose(self, choice: RecordingChoice) -> None:
+    def set_choice(self, choice: RecordingChoice) -> None:
         """Set and save the selection for the next recordings."""
         self.choice = choice
-        self._save_setting(CHOICE_KEY, plain_choice(choice))
+        self._save_setting(CHOICE_KEY, choice_to_json(choice))
 
     def record(self, name: str = "", note: str = "", choice: RecordingChoice | None = None) -> str:
         """Start a recording; return the reason why it can't start, or "".
@@ -157,7 +157,7 @@ class SessionRecordings:
             return _("Already recording.")
         if choice.problem:
             return choice.problem
-        folder = self._ready_folder()
+        folder = self._prepare_folder()
         if folder is None:
             return _("The recordings folder is missing.")
         stem = file_stem(name)
@@ -168,10 +168,10 @@ class SessionRecordings:
         self.client.record(
             path,
             selection.topics,
-            selection.left_out,
+            selection.excluded,
             note,
-            seconds=None if choice.ends_min is None else 60.0 * choice.ends_min,
-            most_bytes=None if choice.ends_gb is None else round(choice.ends_gb * _GB),
+            seconds=None if choice.max_minutes is None else 60.0 * choice.max_minutes,
+            most_bytes=None if choice.max_gb is None else round(choice.max_gb * _GB),
         )
         self.recorded, self._started_s = choice, None
         return ""
@@ -187,34 +187,36 @@ class SessionRecordings:
         """True if the flight recorder is on."""
         return self.client.state.ring_s is not None
 
-    def set_wish(self, wish: RingWish) -> None:
+    def set_ring_settings(self, wish: RingSettings) -> None:
         """Set and save the settings of the flight recorder.
 
         Changing the selection of topics restarts the flight recorder and discards its content.
         """
         self.wish = wish
-        self._save_setting(RING_KEY, plain_wish(wish))
-        self._follow_wish()
+        self._save_setting(RING_KEY, ring_settings_to_json(wish))
+        self._apply_ring_settings()
 
-    def _follow_wish(self) -> None:
+    def _apply_ring_settings(self) -> None:
         wish = self.wish
         if not wish.is_on:
-            self.client.follow_ring(None)
+            self.client.set_ring(None)
             return
         folder = data_home() / "flight-recorder"
         size_bytes = round(wish.size_gb * _GB)
-        self.client.follow_ring(
-            RingChoice(folder, float(wish.seconds), size_bytes, wish.patterns, wish.left_out)
+        self.client.set_ring(
+            RingChoice(folder, float(wish.seconds), size_bytes, wish.patterns, wish.excluded)
         )
 
-    def save_last(self, note: str = "", seconds: float | None = None, done: Done | None = None) -> str:
+    def save_last(
+        self, note: str = "", seconds: float | None = None, done: DoneCallback | None = None
+    ) -> str:
         """Save the last seconds to a file; return the reason why that can't start, or "".
 
         ``done`` is called with the result when the file is finished.
         """
         if not self.wish.is_on:
             return _("The flight recorder is off.")
-        folder = self._ready_folder()
+        folder = self._prepare_folder()
         if folder is None:
             return _("The recordings folder is missing.")
         word = "alarm" if done is not None else "kept"
@@ -229,9 +231,9 @@ class SessionRecordings:
         self._keeping[path] = done
         return ""
 
-    def carry(self, event: AlarmEvent, action: AlarmAction, done: Done) -> None:
+    def save_for_alarm(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
         """Save the last seconds as the action of an alarm; ``done`` is called with the result."""
-        said = what_words(event.rule.condition, event.seen)
+        said = event_text(event.rule.condition, event.value)
         why_not = self.save_last(said, action.seconds, done)
         if why_not:
             words = _("nothing saved: {reason}")
@@ -241,14 +243,14 @@ class SessionRecordings:
 
     def start(self) -> None:
         """Start the flight recorder if it was on when Studio closed."""
-        self._follow_wish()
+        self._apply_ring_settings()
 
     def check(self) -> None:
         """Monitor the recorder process. Called once a second."""
         self.client.check()
         self.events.repeat("ring")
 
-    def on_event(self, event: RecorderSaid | RecorderGone) -> None:
+    def on_event(self, event: RecorderEvent | RecorderExited) -> None:
         """Apply an event of the recorder's process."""
         was = self.client.state
         self.client.on_event(event)
@@ -260,7 +262,7 @@ class SessionRecordings:
             self._started_s = None
             if state.last is not None and state.last == was.path:
                 self.on_made(state.last, "recorded")
-        for path in [each for each in self._keeping if each not in state.keeping]:
+        for path in [each for each in self._keeping if each not in state.saving]:
             done = self._keeping.pop(path)
             is_there = state.last == path
             if is_there:
@@ -278,7 +280,7 @@ class SessionRecordings:
             self._settings.set(key, value)
 
 
-def kept_file(words: str) -> str:
+def saved_file_name(words: str) -> str:
     """Return the file name contained in a text such as "kept alarm-2026-11-27-10-00-00.mcap", or ""."""
-    found = _KEPT_FILE.search(words)
+    found = _SAVED_FILE.search(words)
     return found[0] if found is not None else ""

@@ -23,9 +23,9 @@ CRASH_SIGNALS = frozenset(
 """Signals that mean a crash. The system sends SIGKILL when it runs out of memory."""
 FIRST_BAD_STATUS = 0xC0000000
 """Lowest exit code that means a crash on Windows, where exit codes of crashes are NTSTATUS values."""
-ASKED_STATUS = 0xC000013A
+CTRL_C_STATUS = 0xC000013A
 """Exit code on Windows after Ctrl+C or when the user logs out, which is not a crash."""
-STATUS_WORDS = {
+STATUS_TEXTS = {
     0xC0000005: "access violation",
     0xC000001D: "illegal instruction",
     0xC0000094: "division by zero",
@@ -35,7 +35,7 @@ STATUS_WORDS = {
 }
 TRACE_BEGINS = ("Fatal Python error:", "Windows fatal exception:")
 """First words of a stack trace written by Python's faulthandler."""
-MAYBE_CAUGHT = "Windows fatal exception: code "
+CAUGHT_EXCEPTION_PREFIX = "Windows fatal exception: code "
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Crash:
     """
 
     part: Part
-    how: str
+    cause: str
     text: str = ""
     version: str = __version__
 
@@ -64,10 +64,10 @@ def is_crash(code: int) -> bool:
     """Return True if an exit code means a crash. Negative codes are signal numbers."""
     if code < 0:
         return -code in CRASH_SIGNALS
-    return code >= FIRST_BAD_STATUS and code != ASKED_STATUS
+    return code >= FIRST_BAD_STATUS and code != CTRL_C_STATUS
 
 
-def end_words(code: int) -> str:
+def exit_text(code: int) -> str:
     """Describe an exit code in English: "ended by signal 11 (SIGSEGV)"."""
     if code < 0:
         try:
@@ -76,7 +76,7 @@ def end_words(code: int) -> str:
             name = ""
         return f"ended by signal {-code}{name}"
     if code >= FIRST_BAD_STATUS:
-        words = STATUS_WORDS.get(code)
+        words = STATUS_TEXTS.get(code)
         return f"ended with the status 0x{code:08X}" + (f" ({words})" if words else "")
     return f"ended with the code {code}"
 
@@ -96,4 +96,4 @@ def fatal_line(trace: str) -> str:
     On Windows, faulthandler also writes exceptions that a system library raises and handles internally.
     """
     headers = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
-    return next((line for line in reversed(headers) if not line.startswith(MAYBE_CAUGHT)), "")
+    return next((line for line in reversed(headers) if not line.startswith(CAUGHT_EXCEPTION_PREFIX)), "")

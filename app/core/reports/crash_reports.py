@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.core.alerts import Alerts
-from app.core.faults import IN_CONSOLE, RepeatFilter, log_folder
+from app.core.faults import CONSOLE_EXTRA, RepeatFilter, log_folder
 from app.core.reports.crash import PARTS, Crash, Part
 from app.core.reports.privacy import without_home
-from app.core.reports.studio_versions import PLAIN
-from app.core.storage.atomic_file import MAX_BYTES, read_whole, write_atomically
+from app.core.reports.studio_versions import VERSION_PATTERN
+from app.core.storage.atomic_file import MAX_BYTES, read_regular_file, write_atomically
 from nep.i18n import _, lazy
 from nep.system.replace_file import replace_file
 from nep.version import __version__
@@ -26,7 +26,7 @@ from nep.version import __version__
 MAX_REPORTS = 10
 MAX_REPORT_CHARS = 100_000
 ALERT = "crash"
-OFFER = "help.report"
+REPORT_COMMAND = "help.report"
 _STAMP = "%Y-%m-%d %H.%M.%S"
 _NAME = re.compile(
     rf"crash (?P<stamp>\d{{4}}-\d\d-\d\d \d\d\.\d\d\.\d\d) (?P<part>{'|'.join(PARTS)})(?: \d+)?"
@@ -40,7 +40,7 @@ TITLES: dict[Part, str] = {
     "editor": lazy("The block editor crashed last time."),
 }
 HEADING = "Crash report of NEP Studio "
-OF_ANOTHER = lazy("That was NEP Studio {version}; this is {own}.")
+OTHER_VERSION_MESSAGE = lazy("That was NEP Studio {version}; this is {own}.")
 DETAIL = lazy("A report helps us fix the problem. Nothing is sent automatically.")
 
 _log = logging.getLogger("studio.crashes")
@@ -71,7 +71,7 @@ class CrashReports:
             path = self._unused_path(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
             write_atomically(path, _text(crash, now).encode("utf-8", "replace"), durable=False, private=True)
         except OSError as error:
-            _log.warning("a crash report can't be kept: %s", error, extra=IN_CONSOLE)
+            _log.warning("a crash report can't be kept: %s", error, extra=CONSOLE_EXTRA)
             return None
         for old in self.all()[MAX_REPORTS:]:
             with suppress(OSError):  # another instance has done this already
@@ -122,7 +122,7 @@ class CrashLog(logging.Handler):
             self._reports.add(crash)
 
 
-def offer(alerts: Alerts, reports: CrashReports) -> None:
+def show_crash_alert(alerts: Alerts, reports: CrashReports) -> None:
     """Show an alert about crashes since the last start, with a button that creates a problem report."""
     found = reports.take_new()
     if found:
@@ -130,14 +130,14 @@ def offer(alerts: Alerts, reports: CrashReports) -> None:
         version = _version_of(worst)
         sentences = [_(DETAIL)]
         if version not in {"", __version__}:  # it may be fixed already
-            sentences.insert(0, _(OF_ANOTHER).format(version=version, own=__version__))
-        alerts.put(
+            sentences.insert(0, _(OTHER_VERSION_MESSAGE).format(version=version, own=__version__))
+        alerts.raise_alert(
             ALERT,
             "warn",
             _(TITLES[worst.part]),
             " ".join(sentences),
             button=_("Report a problem"),
-            action=OFFER,
+            action=REPORT_COMMAND,
         )
 
 
@@ -146,18 +146,20 @@ def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
     found = []
     for each in reports:
         with suppress(OSError):
-            found.append((each.path.name.replace(".new.txt", ".txt"), read_whole(each.path, MAX_BYTES)))
+            found.append(
+                (each.path.name.replace(".new.txt", ".txt"), read_regular_file(each.path, MAX_BYTES))
+            )
     return found
 
 
 def _version_of(report: CrashReport) -> str:
     # From the report's first line; "" if it has none.
     try:
-        first = read_whole(report.path, MAX_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
+        first = read_regular_file(report.path, MAX_BYTES).partition(b"\n")[0].decode("utf-8", "replace")
     except OSError:
         return ""
     found = first.removeprefix(HEADING).strip()
-    return found if first.startswith(HEADING) and PLAIN.fullmatch(found) else ""
+    return found if first.startswith(HEADING) and VERSION_PATTERN.fullmatch(found) else ""
 
 
 def _text(crash: Crash, now_s: float) -> str:
@@ -168,7 +170,7 @@ def _text(crash: Crash, now_s: float) -> str:
         f"{HEADING}{crash.version or '(version not known)'}",
         "",
         f"part: {crash.part}",
-        f"how: {crash.how}",
+        f"how: {crash.cause}",
         f"noticed: {noticed}{by}",
         "",
         crash.text[-MAX_REPORT_CHARS:],

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from app.core.alerts import Alerts
-from nep.i18n import _, listed, ngettext
+from nep.i18n import _, format_list, ngettext
 
 ALERT = "system-libraries"
 LIBRARIES: Mapping[str, str] = {
@@ -62,9 +62,9 @@ EXTRA_MODULES = (
     "pyqtgraph",
 )
 """Modules of the extra ``studio`` in pyproject.toml that the window needs."""
-_RENAMED = {"libasound2": "libasound2t64", "libglib2.0-0": "libglib2.0-0t64"}
+_RENAMED_PACKAGES = {"libasound2": "libasound2t64", "libglib2.0-0": "libglib2.0-0t64"}
 _RENAMED_SINCE = {"debian": 13.0, "ubuntu": 24.04}
-_UNOPENED = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
+_MISSING_LIBRARY = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class MissingLibraries:
             "NEP Studio can't start: the system libraries {names} are missing.",
             len(self.names),
         )
-        return words.format(names=listed(self.names))
+        return words.format(names=format_list(self.names))
 
     @property
     def start_remedy(self) -> str:
@@ -105,7 +105,7 @@ class MissingLibraries:
             "The block editor can't open: the system libraries {names} are missing.",
             len(self.names),
         )
-        return words.format(names=listed(self.names))
+        return words.format(names=format_list(self.names))
 
     @property
     def remedy(self) -> str:
@@ -131,7 +131,7 @@ def missing_libraries(
     Python's error names one library; the others are found by loading each library that Qt may need. If a
     library can't be loaded because of a missing dependency, the dependency is returned.
     """
-    named = _named_in(str(error))
+    named = _library_in(str(error))
     if not named:
         return None
     names = {named: None}
@@ -139,22 +139,22 @@ def missing_libraries(
         try:
             load(name)
         except OSError as failure:
-            names[_named_in(str(failure)) or name] = None
-    return _missing(tuple(names), release)
+            names[_library_in(str(failure)) or name] = None
+    return _missing_libraries(tuple(names), release)
 
 
-def tell_missing(alerts: Alerts, missing: MissingLibraries) -> None:
+def alert_missing(alerts: Alerts, missing: MissingLibraries) -> None:
     """Show the alert that the block editor can't be opened, even on the start page."""
-    alerts.put(ALERT, "error", missing.title, missing.remedy, count=0)
+    alerts.raise_alert(ALERT, "error", missing.title, missing.remedy, count=0)
 
 
-def _named_in(error: str) -> str:
+def _library_in(error: str) -> str:
     # From an error of the dynamic linker; "" when it names none.
-    found = _UNOPENED.search(error)
+    found = _MISSING_LIBRARY.search(error)
     return found[1] if found is not None else ""
 
 
-def why_not_imported(
+def import_problem(
     error: ImportError,
     is_installed: Callable[[str], bool] = lambda name: bool(importlib.util.find_spec(name)),
 ) -> str:
@@ -164,16 +164,16 @@ def why_not_imported(
         missing = [each for each in EXTRA_MODULES if each == package or not is_installed(each)]
         return _(
             "NEP Studio needs packages that are not installed ({names}). Install them with “{command}”"
-        ).format(names=listed(missing), command="pip install 'nep-studio[studio]'")
+        ).format(names=format_list(missing), command="pip install 'nep-studio[studio]'")
     libraries = missing_libraries(error)
     return f"{libraries.start_title} {libraries.start_remedy}" if libraries is not None else ""
 
 
-def _missing(names: tuple[str, ...], release: Callable[[], Mapping[str, str]]) -> MissingLibraries:
+def _missing_libraries(names: tuple[str, ...], release: Callable[[], Mapping[str, str]]) -> MissingLibraries:
     packages = dict.fromkeys(LIBRARIES[name] for name in names if name in LIBRARIES)
     is_renamed = _has_time64_names(release)
     return MissingLibraries(
-        names, tuple(_RENAMED.get(each, each) if is_renamed else each for each in packages)
+        names, tuple(_RENAMED_PACKAGES.get(each, each) if is_renamed else each for each in packages)
     )
 
 

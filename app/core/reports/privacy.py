@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from urllib.parse import quote
 
-HARMLESS = frozenset({
+PUBLIC_SETTINGS = frozenset({
     "begun", "first_steps", "format", "high_contrast", "language", "layout", "less_motion", "robots_heard",
     "shortcuts", "text_percent", "theme", "toolbox_pinned", "virtual_robots_come_back", "window",
 })  # fmt: skip
@@ -17,8 +17,8 @@ HARMLESS = frozenset({
 Of all other settings only the names are included, so that future settings, such as keys of networks and
 access codes, stay private until they are added here.
 """
-LEFT_OUT = "(left out)"
-_END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""
+OMITTED_TEXT = "(left out)"
+_PATH_END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""
 
 
 def without_home(text: str, folder: Path | None = None) -> str:
@@ -30,10 +30,12 @@ def without_home(text: str, folder: Path | None = None) -> str:
     forms = {home, slashes, home.replace("\\", "\\\\"), quote(slashes), quote(slashes, safe="/:")}
     flags = re.IGNORECASE if os.name == "nt" else 0
     for form in sorted(forms, key=len, reverse=True):
-        text = re.sub(re.escape(form) + _END, "~", text, flags=flags)
+        text = re.sub(re.escape(form) + _PATH_END, "~", text, flags=flags)
     return text
 
 
-def shown_settings(values: Mapping[str, object]) -> dict[str, object]:
+def reportable_settings(values: Mapping[str, object]) -> dict[str, object]:
     """Return the settings for a report: the values of `HARMLESS` ones, and only the names of all others."""
-    return {name: value if name in HARMLESS else LEFT_OUT for name, value in sorted(values.items())}
+    return {
+        name: value if name in PUBLIC_SETTINGS else OMITTED_TEXT for name, value in sorted(values.items())
+    }

@@ -22,14 +22,14 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.core.documents.file_format import FULL, SUFFIX
-from app.core.faults import error_words, log_folder
+from app.core.documents.file_format import DISK_FULL_ERRNOS, SUFFIX
+from app.core.faults import error_text, log_folder
 from app.core.reports.crash_reports import CrashReports, texts
-from app.core.reports.privacy import shown_settings, without_home
-from app.core.reports.studio_versions import used_here
-from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.reports.privacy import reportable_settings, without_home
+from app.core.reports.studio_versions import format_versions
+from app.core.storage.atomic_file import read_regular_file, write_atomically
 from app.errors import ReportError
-from nep.i18n import _, language, listed, ngettext, number
+from nep.i18n import _, format_list, language, ngettext, number
 from nep.system.lazy_import import lazy_module
 from nep.version import __version__
 
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-ENDING = ".zip"
-READ_ME = (
+FILE_SUFFIX = ".zip"
+README_TEXT = (
     "A report of a problem, made by NEP Studio {version} because a person asked for it.\n\n"
     "what-happened.txt  what the person wrote\n"
     "versions.txt       what Studio is made of and runs on\n"
@@ -85,10 +85,10 @@ class ReportParts:
 
 def file_name(now_s: float) -> str:
     """Return the default file name of a report."""
-    return f"nep-studio-report-{time.strftime('%Y-%m-%d', time.localtime(now_s))}{ENDING}"
+    return f"nep-studio-report-{time.strftime('%Y-%m-%d', time.localtime(now_s))}{FILE_SUFFIX}"
 
 
-def what_goes_in(parts: ReportParts) -> list[str]:
+def describe_contents(parts: ReportParts) -> list[str]:
     """Return descriptions of the contents, one line each, so that the user can decide to share them."""
     size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
     lines = [
@@ -106,26 +106,26 @@ def what_goes_in(parts: ReportParts) -> list[str]:
     return lines
 
 
-def work_words(names: Sequence[str]) -> str:
+def work_text(names: Sequence[str]) -> str:
     """Return the line about included behaviours."""
-    return _("Current settings: {names}").format(names=listed([f"“{name}”" for name in names]))
+    return _("Current settings: {names}").format(names=format_list([f"“{name}”" for name in names]))
 
 
 def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
     """Create the zip file. Slow because of the doctor, so don't call this in the window's thread."""
     files: list[tuple[str, bytes]] = [
-        ("README.txt", READ_ME.format(version=__version__).encode()),
+        ("README.txt", README_TEXT.format(version=__version__).encode()),
         ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
-        ("versions.txt", _private(_versions(parts))),
-        ("settings.json", _private(_settings(parts.settings))),
-        ("doctor.txt", _private(parts.doctor())),
+        ("versions.txt", _anonymize(_versions(parts))),
+        ("settings.json", _anonymize(_settings(parts.settings))),
+        ("doctor.txt", _anonymize(parts.doctor())),
     ]
     for path in _logs(parts.log):
         with suppress(OSError):  # rotated or unreadable; the other files are included
-            files.append((f"log/{path.name}", _private(read_whole(path).decode("utf-8", "replace"))))
+            files.append((f"log/{path.name}", _anonymize(read_regular_file(path).decode("utf-8", "replace"))))
     for name, data in texts(parts.crashes.all()):
-        files.append((f"crashes/{name}", _private(data.decode("utf-8", "replace"))))
-    files += _named(work)
+        files.append((f"crashes/{name}", _anonymize(data.decode("utf-8", "replace"))))
+    files += _name_files(work)
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in files:
@@ -138,7 +138,7 @@ def write_report(path: Path, data: bytes) -> None:
     try:
         write_atomically(path, data)
     except (OSError, ValueError) as error:
-        full = isinstance(error, OSError) and error.errno in FULL
+        full = isinstance(error, OSError) and error.errno in DISK_FULL_ERRNOS
         advice = _("free some space or choose another folder") if full else _("choose another folder")
         reason = getattr(error, "strerror", None) or str(error)
         raise ReportError(path, reason, advice) from error
@@ -173,7 +173,7 @@ class ReportWriter:
             self.problem = str(error)
         except Exception as error:  # noqa: BLE001  shown to the user
             _log.exception("can't create a report")
-            self.problem = _("can't write the report: {error}").format(error=error_words(error))
+            self.problem = _("can't write the report: {error}").format(error=error_text(error))
 
 
 def _logs(folder: Path) -> list[Path]:
@@ -183,15 +183,15 @@ def _logs(folder: Path) -> list[Path]:
         return []
 
 
-def _private(text: str) -> bytes:
+def _anonymize(text: str) -> bytes:
     return without_home(text).encode("utf-8", "replace")
 
 
 def _settings(values: Mapping[str, object]) -> str:
-    return json.dumps(shown_settings(values), indent=1, ensure_ascii=False, default=str)
+    return json.dumps(reportable_settings(values), indent=1, ensure_ascii=False, default=str)
 
 
-def _named(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
+def _name_files(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
     # Each with a unique name that is valid on every system.
     found: dict[str, bytes] = {}
     for each in work:
@@ -205,7 +205,7 @@ def _named(work: Sequence[ReportedWork]) -> list[tuple[str, bytes]]:
 
 
 def _versions(parts: ReportParts) -> str:
-    used = ("versions used here", used_here(parts.settings))
+    used = ("versions used here", format_versions(parts.settings))
     lines = [f"{name}: {value}" for name, value in (*_own_facts(), used, *parts.facts)]
     return "\n".join([*lines, "", "packages:", *_packages()]) + "\n"
 

@@ -19,11 +19,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING
 
-from app.core.faults import IN_CONSOLE, error_words, log_folder
+from app.core.faults import CONSOLE_EXTRA, error_text, log_folder
 from app.core.reports.crash import Crash, fatal_line
 from app.core.reports.crash_reports import CrashReports
-from app.core.reports.studio_versions import plain_version
-from app.core.storage.atomic_file import private_folder, read_whole, write_atomically
+from app.core.reports.studio_versions import valid_version
+from app.core.storage.atomic_file import create_private_folder, read_regular_file, write_atomically
 from app.core.storage.file_lock import FileLock
 from app.core.storage.settings import state_home
 from nep.system.lazy_import import lazy_module
@@ -39,7 +39,7 @@ LOG_LINES = 80
 MAX_TRACE_BYTES = 1_000_000
 CLOCK_TOLERANCE_S = 2.0
 """Tolerance between the start time of a process as reported by the system and the clock."""
-WITHOUT_A_WORD = (
+NO_TRACE_CAUSE = (
     "it ended without a word: the system ended it (for lack of memory, say), or a person did, or the "
     "computer's session ended"
 )
@@ -69,11 +69,11 @@ class StudioRun:
         self._began_s = 0.0
 
     @property
-    def is_noted(self) -> bool:
+    def is_recorded(self) -> bool:
         """True if the marker exists; otherwise a crash of this run can't be detected."""
         return self._mark.exists()
 
-    def begin(self) -> None:
+    def start(self) -> None:
         """Create the marker. If that fails, one line is logged."""
         self._began_s = self._clock()
         try:
@@ -82,20 +82,20 @@ class StudioRun:
             self._enable_faulthandler()
         except OSError as error:
             self._delete_files()
-            _log.warning("a crash of this run will not be detected: %s", error, extra=IN_CONSOLE)
+            _log.warning("a crash of this run will not be detected: %s", error, extra=CONSOLE_EXTRA)
 
-    def expect_end(self) -> None:
+    def expect_exit(self) -> None:
         """Record that Studio was asked to exit, so that this does not count as a crash."""
-        if self.is_noted:
+        if self.is_recorded:
             with contextlib.suppress(OSError):
                 self._write(asked=True)
 
-    def end(self) -> None:
+    def finish(self) -> None:
         """Delete the marker, because Studio exits normally."""
         self._delete_files()
 
     def __enter__(self) -> Self:
-        self.begin()
+        self.start()
         return self
 
     def __exit__(
@@ -104,8 +104,8 @@ class StudioRun:
         # An uncaught exception is stored and propagates.
         if isinstance(error, Exception):
             text = "".join(traceback.format_exception(kind, error, trace))
-            CrashReports(self._log / "crashes", self._clock).add(Crash("studio", error_words(error), text))
-        self.end()
+            CrashReports(self._log / "crashes", self._clock).add(Crash("studio", error_text(error), text))
+        self.finish()
 
     def left(self) -> list[Crash]:
         """Return the crashes of earlier runs; each is returned to one caller only.
@@ -132,7 +132,7 @@ class StudioRun:
         write_atomically(self._mark, json.dumps(entry).encode(), durable=False, private=True)
 
     def _enable_faulthandler(self) -> None:
-        private_folder(self._log)
+        create_private_folder(self._log)
         path = self._log / _trace_name(self._mark)
         number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o600)
         self._trace = os.fdopen(number, "a", encoding="utf-8")
@@ -154,7 +154,7 @@ class StudioRun:
             return None  # its process is running
         judged: tuple[Mapping[str, object], float] | None = None
         try:
-            entry = json.loads(read_whole(mark))
+            entry = json.loads(read_regular_file(mark))
             began_s, pid = float(entry["began_s"]), int(entry["pid"])
             if _is_running(pid, began_s):  # on a file system without locks
                 return None
@@ -175,21 +175,23 @@ class StudioRun:
         if not how:
             if entry.get("asked") is True or psutil.boot_time() > began_s + CLOCK_TOLERANCE_S:
                 return None
-            how = WITHOUT_A_WORD
+            how = NO_TRACE_CAUSE
         began = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began_s))
-        version = plain_version(entry.get("version"))
+        version = valid_version(entry.get("version"))
         text = f"It was version {version or 'not known'}, begun {began}.\n\n{trace}\n{self._end_of_log()}"
         return Crash("studio", how, text, version)
 
     def _trace_of(self, mark: Path) -> str:
         try:
-            return read_whole(self._log / _trace_name(mark), MAX_TRACE_BYTES).decode("utf-8", "replace")
+            return read_regular_file(self._log / _trace_name(mark), MAX_TRACE_BYTES).decode(
+                "utf-8", "replace"
+            )
         except OSError:
             return ""
 
     def _end_of_log(self) -> str:
         try:
-            lines = read_whole(self._log / "studio.log").decode("utf-8", "replace").splitlines()
+            lines = read_regular_file(self._log / "studio.log").decode("utf-8", "replace").splitlines()
         except OSError:
             return ""
         return "\n".join(["The end of the log:", *lines[-LOG_LINES:]]) + "\n"

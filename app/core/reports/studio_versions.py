@@ -11,56 +11,56 @@ from nep.version import __version__
 KEY = "studio_versions"
 """Setting that stores the versions, newest last, with the time of their first start (seconds since 1970)."""
 MAX_VERSIONS = 10
-PLAIN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
+VERSION_PATTERN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
 """Pattern of a valid version; anything else in a file is ignored."""
-EARLIER = "earlier"
+UNKNOWN_VERSION = "earlier"
 """Placeholder for versions used before this setting existed; their start time is 0."""
-_LATEST_S = 1e10
+_MAX_TIME_S = 1e10
 """Latest valid time. A damaged file may contain a time that the calendar doesn't support."""
 
-Kept = list[dict[str, object]]
+VersionEntries = list[dict[str, object]]
 
 
-def plain_version(value: object) -> str:
+def valid_version(value: object) -> str:
     """Validate a version read from a file; return "" if it is invalid."""
-    return value if isinstance(value, str) and PLAIN.fullmatch(value) else ""
+    return value if isinstance(value, str) and VERSION_PATTERN.fullmatch(value) else ""
 
 
-def known(values: Mapping[str, object]) -> list[tuple[str, float]]:
+def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
     """Return the valid versions in the settings and their first starts (seconds since 1970), newest last."""
     entries = values.get(KEY)
     found = []
     for entry in entries if isinstance(entries, list) else ():
         if not isinstance(entry, Mapping):
             continue
-        version, since = plain_version(entry.get("version")), entry.get("since_s")
+        version, since = valid_version(entry.get("version")), entry.get("since_s")
         if (
             isinstance(since, int | float)
             and not isinstance(since, bool)
-            and 0 <= since <= _LATEST_S
+            and 0 <= since <= _MAX_TIME_S
             and version
         ):
             found.append((version, float(since)))
     return found[-MAX_VERSIONS:]
 
 
-def with_this_version(
+def add_this_version(
     values: Mapping[str, object], now_s: float, *, is_first: bool, version: str = __version__
-) -> Kept | None:
+) -> VersionEntries | None:
     """Return the updated setting that includes this version; None if this version is already the newest.
 
     ``is_first`` is True if no Studio ran on this computer before.
     """
-    before = known(values) or ([] if is_first else [(EARLIER, 0.0)])
+    before = known_versions(values) or ([] if is_first else [(UNKNOWN_VERSION, 0.0)])
     if before and before[-1][0] == version:
         return None
     return [{"version": each, "since_s": s} for each, s in [*before, (version, now_s)][-MAX_VERSIONS:]]
 
 
-def used_here(values: Mapping[str, object]) -> str:
+def format_versions(values: Mapping[str, object]) -> str:
     """Format the versions for developers: "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
     versions = [
         f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}" if since_s else version
-        for version, since_s in known(values)
+        for version, since_s in known_versions(values)
     ]
     return ", ".join(versions) or "unknown"

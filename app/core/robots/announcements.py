@@ -16,10 +16,17 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import Watch, Watches
 from app.errors import DescriptionError
 from app.robots import rize
-from app.robots.description.description import Robot, announced
-from app.robots.identity import DESCRIPTION_TYPE, Identity, Senders, identity_of, publishing, wrong_topic
+from app.robots.description.description import Robot, parse_announcement
+from app.robots.identity import (
+    DESCRIPTION_TYPE,
+    Identity,
+    Senders,
+    description_topic_problem,
+    identity_of,
+    publisher_nodes,
+)
 from nep.errors import NepError
-from nep.i18n import _, listed, ngettext
+from nep.i18n import _, format_list, ngettext
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
@@ -27,9 +34,9 @@ MAX_ROBOTS = 200
 MAX_CLAIMANTS = 8
 MAX_OWNERS = 4
 """Maximum number of earlier programs of a robot whose descriptions are stored, in case they return."""
-READING_SHARE = 0.2
+MAX_CPU_SHARE = 0.2
 """Maximum share of the time of the window's thread that parsing descriptions takes on average."""
-READING_S = 1.0
+MAX_PARSE_BUDGET_S = 1.0
 """Maximum time for parsing after an idle period, for example for all robots of a room."""
 
 NATIVE = frozenset({"native", "gateway"})
@@ -45,7 +52,7 @@ class Claim:
 
 
 @dataclass(slots=True)
-class _Announced:
+class _Announcement:
     """Description topic, its owner, and the newest description of each publisher.
 
     ``place`` is the number of topics that the same node announced before this one. ``owners`` are the nodes
@@ -56,13 +63,13 @@ class _Announced:
     watch: Watch | None = None
     owner: Identity | None = None
     owners: tuple[str, ...] = ()
-    told: dict[int, Message] = field(default_factory=dict)
+    messages: dict[int, Message] = field(default_factory=dict)
     parsed: Message | None = None
     robot: Robot | None = None
-    wrong: Claim | None = None
+    claim: Claim | None = None
     is_unreadable: bool = False
-    place: int = 0
-    twins: tuple[Identity, ...] = ()
+    rank: int = 0
+    other_owners: tuple[Identity, ...] = ()
 
 
 class Announcements:
@@ -78,9 +85,9 @@ class Announcements:
         # A robot whose topic `is_proven` (it has answered, or may move) is never evicted.
         self._is_proven = is_proven
         self._watches, self._senders, self._clock = watches, senders, clock
-        self._parse_budget_s, self._budget_updated_s = READING_S, clock()
+        self._parse_budget_s, self._budget_updated_s = MAX_PARSE_BUDGET_S, clock()
         self._waiting: set[str] = set()
-        self._topics: dict[str, _Announced] = {}
+        self._topics: dict[str, _Announcement] = {}
         self.left_out: tuple[str, ...] = ()
         """Description topics of robots beyond `MAX_ROBOTS`."""
 
@@ -110,19 +117,21 @@ class Announcements:
         for topic, known in self._topics.items():
             if known.watch is None:
                 continue
-            if known.twins and known.owner is not None:
+            if known.other_owners and known.owner is not None:
                 name = known.robot.name if known.robot is not None else topic
                 found[topic] = Claim(
                     _("{count} programs announce themselves as {robot}.").format(
-                        count=len(known.twins) + 1, robot=name
+                        count=len(known.other_owners) + 1, robot=name
                     ),
                     _("{first} was first and is used; {others} is ignored. Close all but one.").format(
-                        first=known.owner.words,
-                        others=listed([twin.words for twin in known.twins[:MAX_CLAIMANTS]]),
+                        first=known.owner.display_name,
+                        others=format_list(
+                            [twin.display_name for twin in known.other_owners[:MAX_CLAIMANTS]]
+                        ),
                     ),
                 )
-            elif known.wrong is not None:
-                found[topic] = known.wrong
+            elif known.claim is not None:
+                found[topic] = known.claim
         if self.left_out:
             title = ngettext(
                 "{count} more robot is on the network; Studio shows at most {most}.",
@@ -137,37 +146,37 @@ class Announcements:
         there = {
             topic: nodes
             for topic, info in view.topics.items()
-            if info.msg_type == DESCRIPTION_TYPE and (nodes := publishing(view, topic))
+            if info.msg_type == DESCRIPTION_TYPE and (nodes := publisher_nodes(view, topic))
         }
-        self._senders.learn(view, there)
+        self._senders.update(view, there)
         for topic, known in self._topics.items():
             if topic not in there:
                 self._mark_vanished(known)
         left_out: list[str] = []
-        for place, topic in _in_fair_order(there):
+        for place, topic in _fair_order(there):
             nodes = there[topic]
             begun = self._topics.get(topic) or self._add_topic(topic, place, left_out)
             if begun is None:
                 left_out.append(topic)
                 continue
-            known, begun.place = begun, place
+            known, begun.rank = begun, place
             if known.watch is None:
                 known.watch = self._watches.open([topic])
             if known.owner is None or known.owner.node_id not in nodes:
                 known.owner, known.robot, known.parsed = identity_of(view, nodes[0]), None, None
-                known.wrong = None
+                known.claim = None
                 known.owners = tuple(dict.fromkeys((nodes[0], *known.owners)))[:MAX_OWNERS]
             others = (node for node in nodes if node != known.owner.node_id)
-            known.twins = tuple(identity_of(view, node) for node in others)
+            known.other_owners = tuple(identity_of(view, node) for node in others)
             ids = {publisher.id for publisher in view.topics[topic].publishers}
-            known.told = {
+            known.messages = {
                 id: message
-                for id, message in known.told.items()
+                for id, message in known.messages.items()
                 if id in ids or self._senders.node_of(message) in known.owners
             }
             self._waiting.add(topic)
         self.left_out = tuple(left_out)
-        self._parse_waiting()
+        self._parse_pending()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
         """Add received descriptions; return True if any was parsed, including earlier ones."""
@@ -175,65 +184,67 @@ class Announcements:
             known = self._topics[topic]
             for message in batches[topic].messages:
                 if message.publisher is not None:
-                    known.told.pop(message.publisher, None)  # so that the newest is last
-                    known.told[message.publisher] = message
-            while len(known.told) > MAX_CLAIMANTS:
+                    known.messages.pop(message.publisher, None)  # so that the newest is last
+                    known.messages[message.publisher] = message
+            while len(known.messages) > MAX_CLAIMANTS:
                 self._evict_one(known)
             self._waiting.add(topic)
-        return self._parse_waiting()
+        return self._parse_pending()
 
     # -- private ---------------------------------------------------------------------------------------------
 
-    def _add_topic(self, topic: str, place: int, left_out: list[str]) -> _Announced | None:
+    def _add_topic(self, topic: str, place: int, left_out: list[str]) -> _Announcement | None:
         # None when there are too many. Vanished topics are evicted first, then those of nodes that announce
         # more robots than this one.
         if len(self._topics) >= MAX_ROBOTS:
             strangers = [name for name in self._topics if not self._is_proven(name)]
             gone = next((name for name in strangers if self._topics[name].watch is None), None)
-            last = max(strangers, key=lambda name: self._topics[name].place, default=None)
-            if gone is None and last is not None and self._topics[last].place > place:
+            last = max(strangers, key=lambda name: self._topics[name].rank, default=None)
+            if gone is None and last is not None and self._topics[last].rank > place:
                 gone = last
                 left_out.append(last)
             if gone is None:
                 return None
             self._mark_vanished(self._topics.pop(gone))
-        return self._topics.setdefault(topic, _Announced())
+        return self._topics.setdefault(topic, _Announcement())
 
-    def _mark_vanished(self, known: _Announced) -> None:
+    def _mark_vanished(self, known: _Announcement) -> None:
         # The owner and its description are kept: after a restart of the master or a suspension it returns
         # over the same connection.
         if known.watch is not None:
             known.watch.close()
-        known.watch, known.robot, known.parsed, known.twins = None, None, None, ()
-        known.told = {id: told for id, told in known.told.items() if self._is_owners(known, told)}
+        known.watch, known.robot, known.parsed, known.other_owners = None, None, None, ()
+        known.messages = {id: told for id, told in known.messages.items() if self._is_from_owner(known, told)}
 
-    def _evict_one(self, known: _Announced) -> None:
+    def _evict_one(self, known: _Announcement) -> None:
         # Evicts another publisher's description; those of the robot's programs last.
         for owners in (known.owners, known.owners[:1]):
-            for id, told in known.told.items():
+            for id, told in known.messages.items():
                 if self._senders.node_of(told) not in owners:
-                    del known.told[id]
+                    del known.messages[id]
                     return
-        del known.told[next(iter(known.told))]
+        del known.messages[next(iter(known.messages))]
 
-    def _is_owners(self, known: _Announced, message: Message) -> bool:
+    def _is_from_owner(self, known: _Announcement, message: Message) -> bool:
         return known.owner is not None and self._senders.node_of(message) == known.owner.node_id
 
-    def _parse_waiting(self) -> bool:
+    def _parse_pending(self) -> bool:
         # New robots first, then the shortest description. The time is limited, so that a program that keeps
         # changing a long description can't block the window and its Stop.
         now = self._clock()
         self._parse_budget_s = min(
-            READING_S, self._parse_budget_s + (now - self._budget_updated_s) * READING_SHARE
+            MAX_PARSE_BUDGET_S, self._parse_budget_s + (now - self._budget_updated_s) * MAX_CPU_SHARE
         )
         self._budget_updated_s = now
-        wait = {topic: newest for topic in self._waiting if (newest := self._unread(topic)) is not None}
+        wait = {
+            topic: newest for topic in self._waiting if (newest := self._unparsed_message(topic)) is not None
+        }
         self._waiting = set(wait)
 
-        def turn(each: tuple[str, Message]) -> tuple[bool, int]:
+        def sort_key(each: tuple[str, Message]) -> tuple[bool, int]:
             return self._topics[each[0]].parsed is not None, len(each[1].data)
 
-        for topic, newest in sorted(wait.items(), key=turn):
+        for topic, newest in sorted(wait.items(), key=sort_key):
             if self._parse_budget_s <= 0:
                 break
             began = self._clock()
@@ -242,24 +253,26 @@ class Announcements:
             self._waiting.discard(topic)
         return len(self._waiting) < len(wait)
 
-    def _unread(self, topic: str) -> Message | None:
+    def _unparsed_message(self, topic: str) -> Message | None:
         # None if the newest description of the robot's own program has been parsed.
         known = self._topics.get(topic)
         if known is None or known.watch is None:
             return None
-        newest = next((told for told in reversed(known.told.values()) if self._is_owners(known, told)), None)
+        newest = next(
+            (told for told in reversed(known.messages.values()) if self._is_from_owner(known, told)), None
+        )
         return None if newest is known.parsed else newest
 
     def _parse(self, topic: str, newest: Message) -> None:
         known = self._topics[topic]
-        known.parsed, known.wrong, known.is_unreadable = newest, None, False
+        known.parsed, known.claim, known.is_unreadable = newest, None, False
         try:
-            robot = announced(newest)
+            robot = parse_announcement(newest)
         except NepError:
             return  # reported by the session's alert `message:<topic>`; the previous description stays valid
         except DescriptionError as error:
             sentence = f"{error.sentence[:1].upper()}{error.sentence[1:]}."
-            whose = known.owner.words if known.owner is not None else topic
+            whose = known.owner.display_name if known.owner is not None else topic
             words = (
                 _("{program} sent this invalid description; fix its driver.")
                 if known.robot is None
@@ -268,15 +281,15 @@ class Announcements:
                     "The previous description is used."
                 )
             )
-            known.wrong, known.is_unreadable = Claim(sentence, words.format(program=whose)), True
+            known.claim, known.is_unreadable = Claim(sentence, words.format(program=whose)), True
             return
-        wrong = wrong_topic(robot, topic)
+        wrong = description_topic_problem(robot, topic)
         known.robot = robot if wrong is None else None
         if wrong is not None:
-            known.wrong = Claim(f"{wrong}.", _("Find out what this program is, and close it."))
+            known.claim = Claim(f"{wrong}.", _("Find out what this program is, and close it."))
 
 
-def _in_fair_order(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
+def _fair_order(there: Mapping[str, Sequence[str]]) -> list[tuple[int, str]]:
     # Sorted so that the first topic of each node comes before the second topic of any node.
     counts: Counter[str] = Counter()
     placed = []
@@ -298,7 +311,7 @@ class RizeNames:
         if len(self._told) > MAX_ROBOTS:
             del self._told[next(iter(self._told))]
 
-    def present(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
+    def names_in(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
         """Return the names of the robots of RIZE in this graph.
 
         ``native`` are the robots with a description, which also send ready messages on ``rize_event``.
@@ -311,10 +324,10 @@ class RizeNames:
         ]
         if len(nodes) == 1 and len(candidates) == 1:
             return {candidates[0]}
-        return {_name(node, candidates) for node in nodes}
+        return {_match_name(node, candidates) for node in nodes}
 
 
-def _name(node: str, told: Collection[str]) -> str:
+def _match_name(node: str, told: Collection[str]) -> str:
     stem = node
     for suffix in SUFFIXES:
         stem = stem.removesuffix(suffix)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from app.blocks.model.robot_text import TextParts, type_of
+from app.blocks.model.robot_text import BlockTemplate, block_type_of
 from app.blocks.model.workspace import saved_blocks
 from app.robots.description.description import Event, Robot
 
-MAX_WORDS = 12
+MAX_VALUES = 12
 MIN_LENGTH, MAX_LENGTH = 1, 60
 
 
@@ -19,23 +19,23 @@ def awaited_values(
 
     Unique, at most `MAX_WORDS`. ``workspaces`` are saved workspaces, that of the current behaviour first.
     """
-    hat = type_of(robot.model, "when", event.name)
-    argument = TextParts(event.text, event.filters).arguments.get(name, "")
-    sensors = {type_of(robot.model, "get", each.name) for each in robot.sensors if each.kind == "text"}
+    hat = block_type_of(robot.model, "when", event.name)
+    argument = BlockTemplate(event.text, event.filters).arguments.get(name, "")
+    sensors = {block_type_of(robot.model, "get", each.name) for each in robot.sensors if each.kind == "text"}
     found: dict[str, None] = {}
     for workspace in workspaces:
         for block in saved_blocks(workspace):
             if block.get("type") == hat and _fields(block).get("ROBOT", robot.name) == robot.name:
                 found[str(_fields(block).get(argument) or "").strip()] = None
             else:
-                found.update(dict.fromkeys(_compared(block, sensors)))
+                found.update(dict.fromkeys(_compared_texts(block, sensors)))
     parameter = next((each for each in event.fields if each.name == name), None)
     if parameter is not None and isinstance(parameter.default, str):
         found[parameter.default] = None
-    return tuple(word for word in found if MIN_LENGTH <= len(word) <= MAX_LENGTH)[:MAX_WORDS]
+    return tuple(word for word in found if MIN_LENGTH <= len(word) <= MAX_LENGTH)[:MAX_VALUES]
 
 
-def _compared(block: Mapping[str, object], sensors: set[str]) -> list[str]:
+def _compared_texts(block: Mapping[str, object], sensors: set[str]) -> list[str]:
     # Texts compared with a sensor in one block: “last word heard” = “yes”.
     inputs = block.get("inputs")
     held: list[Mapping[str, object]] = []

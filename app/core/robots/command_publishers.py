@@ -42,7 +42,7 @@ class CommandPublishers:
 
         self._submit(_("connect to {robot}").format(robot=link.name), open_them)
 
-    def leave(self, link: RobotLink) -> None:
+    def close_outdated(self, link: RobotLink) -> None:
         """Close the publishers for topics that the robot's description no longer contains."""
         old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
         link.publisher = link.world = None
@@ -54,7 +54,7 @@ class CommandPublishers:
         if old:
             self._submit(_("close the old publishers of {robot}").format(robot=link.name), close_them)
 
-    def end(self, link: RobotLink) -> None:
+    def close(self, link: RobotLink) -> None:
         """Close the publishers for a robot that is discarded, including those that are being opened."""
         if link.is_opening or link.publisher is not None or link.world is not None:
             self._submit("", lambda _node: close_publishers(link))

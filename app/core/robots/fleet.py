@@ -20,17 +20,17 @@ from app.core.robots.robot_link import (
     Invocation,
     Payload,
     RobotLink,
-    excess_away,
+    excess_disconnected,
     topics_of,
 )
 from app.core.robots.robot_messages import RobotMessages
 from app.core.robots.stop.lines import MAX_TOPICS, StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
 from app.core.robots.stop.reach import targets_of, unlisted_targets
-from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, StopReport
-from app.core.robots.tries import Tries
+from app.core.robots.stop.report import STOPPING_DISPLAY_DELAY_S, StopReport
+from app.core.robots.tries import ManualInvocations
 from app.core.storage.settings import Settings
-from app.errors import AppError, RobotInputError, RobotUnknownError
+from app.errors import AppError, RobotInputError, UnknownRobotError
 from app.robots import rize
 from app.robots.description.description import Robot, topic_of
 from app.robots.heartbeat import Heartbeat
@@ -39,15 +39,15 @@ from app.robots.identity import (
     Identity,
     RobotProcesses,
     Senders,
-    foreign_topic,
-    publishing,
+    publisher_nodes,
+    topic_conflict,
 )
 from nep.errors import NepError
 from nep.i18n import _
 from nep.programs.robots.moving import MovingTopics
 from nep.protocol.graph_view import GraphView
 
-BEGINS_AT_START = "runs_begin_at_start"
+RESET_SETTING = "runs_begin_at_start"
 
 
 class Fleet:
@@ -85,7 +85,7 @@ class Fleet:
         has_ended = self._processes.has_ended
         self.moved = MovedRobots(self._identity_of, has_ended, clock, self._own.other_programs)
         """Robots that may move, and so must be named by a Stop."""
-        self._tries = Tries(self._send, self._heartbeat.stop, clock)
+        self._tries = ManualInvocations(self._send, self._heartbeat.stop, clock)
         self._messages = RobotMessages(self._own, self._tries, self.moved, clock)
         self._chosen = ""
         self._has_graph = False
@@ -103,17 +103,17 @@ class Fleet:
     @property
     def connected(self) -> tuple[RobotLink, ...]:
         """Connected robots."""
-        return tuple(link for link in self._links.values() if link.connected)
+        return tuple(link for link in self._links.values() if link.is_connected)
 
     @property
-    def moving(self) -> MovingTopics:
+    def moving_topics(self) -> MovingTopics:
         """Topics whose messages move robots, including robots whose descriptions can't be read."""
-        return self._movable.moving
+        return self._movable.moving_topics
 
-    def is_there(self, name: str) -> bool | None:
+    def is_present(self, name: str) -> bool | None:
         """Return True if a robot with this name is connected or announced; None before the first graph."""
         link = self._links.get(name)
-        if (link is not None and link.connected) or self._announcements.is_announced(
+        if (link is not None and link.is_connected) or self._announcements.is_announced(
             topic_of(name, "description")
         ):
             return True
@@ -130,12 +130,12 @@ class Fleet:
         The chosen one if it is connected, else a virtual one, else the first.
         """
         chosen = self._links.get(self._chosen)
-        if chosen is not None and chosen.connected:
+        if chosen is not None and chosen.is_connected:
             return chosen
         connected = self.connected
         return next((link for link in connected if link.virtual), connected[0] if connected else chosen)
 
-    def choose(self, name: str) -> None:
+    def select(self, name: str) -> None:
         """Choose the robot shown by panels for one robot."""
         if name != self._chosen:
             self._chosen = name
@@ -143,7 +143,7 @@ class Fleet:
 
     # -- commands of the user --------------------------------------------------------------------------------
 
-    def look_at(self, name: str) -> Watch:
+    def watch_sensors(self, name: str) -> Watch:
         """Subscribe to the sensors of a robot until the returned watch is closed.
 
         Raises:
@@ -168,18 +168,20 @@ class Fleet:
         wrong = described.check(input)
         if wrong:
             raise RobotInputError(wrong, described.problems(input))
-        if not self.permission.permits(
-            [(link.robot, [action])], lambda: self._try_again(name, action, input)
+        if not self.permission.request_permission(
+            [(link.robot, [action])], lambda: self._retry_invoke(name, action, input)
         ):
             raise MayNotMoveError([name])
-        invocation = self._tries.begin(link, described, input)
-        if invocation.running:  # a speed continues after its final reply: only a Stop ends it
-            self.moved.note([name], "form", id="" if described.repeat_s is not None else invocation.id)
-        if invocation.running and link.publisher is not None and link.robot.dialect == "native":
-            self._heartbeat.beat(name, link.publisher.publish)
+        invocation = self._tries.start(link, described, input)
+        if invocation.is_running:  # a speed continues after its final reply: only a Stop ends it
+            self.moved.record_command(
+                [name], "form", id="" if described.repeat_s is not None else invocation.id
+            )
+        if invocation.is_running and link.publisher is not None and link.robot.dialect == "native":
+            self._heartbeat.start(name, link.publisher.publish)
         return invocation
 
-    def _try_again(self, name: str, action: str, input: Payload) -> None:
+    def _retry_invoke(self, name: str, action: str, input: Payload) -> None:
         try:
             self.invoke(name, action, input)
         except AppError:
@@ -189,39 +191,41 @@ class Fleet:
         """Cancel the last invocation of an action, if it is still running."""
         self._tries.cancel(self._get(name), action)
 
-    def world(self, name: str, change: Payload) -> None:
+    def change_world(self, name: str, change: Payload) -> None:
         """Change the world of a virtual robot: touch its head, move the ball, say a word.
 
         As for a motion, the user must allow this first if Studio doesn't know that the robot is virtual.
         """
         link = self._get(name)
         actions = [action.name for action in link.robot.actions]
-        may = self.permission.permits([(link.robot, actions)], lambda: self._change_again(name, change))
+        may = self.permission.request_permission(
+            [(link.robot, actions)], lambda: self._retry_change(name, change)
+        )
         if may and link.world is not None:
             link.world.publish(dict(change))
 
     @property
-    def begins_at_start(self) -> bool:
+    def resets_at_start(self) -> bool:
         """True if virtual robots return to their start position when a behaviour starts."""
-        return self._settings is None or self._settings.get(BEGINS_AT_START, True)
+        return self._settings is None or self._settings.get(RESET_SETTING, True)
 
-    def choose_start(self, *, begins: bool) -> None:
+    def set_resets_at_start(self, *, begins: bool) -> None:
         """Set `begins_at_start`. Raises SettingsError if the setting can't be saved."""
         if self._settings is not None:
-            self._settings.set(BEGINS_AT_START, begins)
+            self._settings.set(RESET_SETTING, begins)
 
-    def to_start(self, names: Iterable[str]) -> None:
+    def return_to_start(self, names: Iterable[str]) -> None:
         """Move the virtual robots among ``names`` to their start position if `begins_at_start` is set."""
         links = [link for name in names if (link := self._links.get(name)) is not None and link.virtual]
-        for link in links if self.begins_at_start else ():
+        for link in links if self.resets_at_start else ():
             if link.world is not None:
                 link.world.publish({"start": [each.name for each in links]})
 
-    def _change_again(self, name: str, change: Payload) -> None:
+    def _retry_change(self, name: str, change: Payload) -> None:
         if name in self._links:
-            self.world(name, change)
+            self.change_world(name, change)
 
-    def told_to_stop(self, names: Iterable[str]) -> None:
+    def mark_stopping(self, names: Iterable[str]) -> None:
         """Set robots to the state "stopping" until `stopped` applies the result."""
         self.stops += 1
         for link in map(self._links.get, names):
@@ -229,14 +233,14 @@ class Fleet:
                 link.stop_began_s = self._clock()
 
     @property
-    def stopping(self) -> tuple[str, ...]:
+    def stopping_robots(self) -> tuple[str, ...]:
         """Names of robots that have not replied to a Stop yet."""
         return tuple(link.name for link in self._links.values() if link.stop_began_s is not None)
 
     @property
-    def unheard(self) -> tuple[str, ...]:
+    def unresponsive(self) -> tuple[str, ...]:
         """Names of robots that may be moving and don't reply. Every Stop reports them."""
-        return tuple(name for name in self.moved.names if not self._is_heard(self._links.get(name)))
+        return tuple(name for name in self.moved.names if not self._is_responsive(self._links.get(name)))
 
     @property
     def stoppable(self) -> tuple[str, ...]:
@@ -250,10 +254,10 @@ class Fleet:
         return targets_of(self._links.values(), self.moved, self._unlisted)
 
     @staticmethod
-    def _is_heard(link: RobotLink | None) -> bool:
-        return link is not None and link.connected and not link.mute
+    def _is_responsive(link: RobotLink | None) -> bool:
+        return link is not None and link.is_connected and not link.is_unresponsive
 
-    def stopped(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
+    def apply_stop(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
         """Apply the result of a Stop.
 
         Invocations of a robot whose stop was not confirmed end only when the robot reports their end.
@@ -262,27 +266,27 @@ class Fleet:
             words: Message and status for each robot.
             report: Result of the Stop.
         """
-        wrong = {name: robot.wrong for name, robot in report.by_name.items()}
+        wrong = {name: robot.problem for name, robot in report.by_name.items()}
         for name, (last_stop, status) in words.items():
             link = self._links.get(name)
             if link is None:
                 continue
             link.last_stop, link.last_stop_status = last_stop, status
-            link.not_stopped = wrong.get(name, "")
-            link.stop_began_s, link.stopping = None, False
-            link.has_proven_stop |= name in report.still
-            if not link.not_stopped:
+            link.stop_problem = wrong.get(name, "")
+            link.stop_began_s, link.is_stopping = None, False
+            link.has_proven_stop |= name in report.stopped_names
+            if not link.stop_problem:
                 self._tries.end_all(link, "canceled")
             self._heartbeat.stop(name)
 
-    def stands_still(self, names: Iterable[str]) -> None:
+    def confirm_stopped(self, names: Iterable[str]) -> None:
         """Apply the user's confirmation that these robots are not moving."""
         known = tuple(names)
         self.moved.confirm(known)
         for link in map(self._links.get, known):
             if link is not None:
-                link.not_stopped = ""
-                self._judge_motion(link)
+                link.stop_problem = ""
+                self._update_motion(link)
 
     def take_settled(self) -> tuple[str, ...]:
         """Return and clear the robots without a proven Stop that have since ended all actions.
@@ -300,27 +304,27 @@ class Fleet:
         self._own.update(view)
         self._announcements.update(view)
         topics = (self._own.topics(link.robot) for link in self._links.values())
-        self._senders.learn(view, {rize.ANSWERS}.union(*topics))
-        self._follow_announced()
+        self._senders.update(view, {rize.ANSWERS}.union(*topics))
+        self._update_announced()
         known = self._announcements
         self._unlisted = (
             *unlisted_targets(view, known.left_out),
             *unlisted_targets(view, known.unreadable, is_expected=False),
         )
         self._update_rize(view)
-        commanded = map(self._links.get, self.moved.sent_to)
-        newcomers = {link.name: self._own.newcomers(link, before) for link in commanded if link}
-        self.moved.take_newcomers(newcomers)
-        self._messages.release_held(self._links)
+        commanded = map(self._links.get, self.moved.recently_commanded)
+        newcomers = {link.name: self._own.new_programs(link, before) for link in commanded if link}
+        self.moved.record_new_programs(newcomers)
+        self._messages.apply_held(self._links)
         for link in self._links.values():
-            if link.connected and link.publisher is None:
+            if link.is_connected and link.publisher is None:
                 self._publishers.open(link)
         self._evict_disconnected()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
         """Process received messages: descriptions, replies, sensor values."""
         if self._announcements.add(batches):
-            self._follow_announced()
+            self._update_announced()
             self._evict_disconnected()
         events = batches.get(rize.EVENTS)
         for message in events.messages if events is not None else ():
@@ -330,30 +334,30 @@ class Fleet:
         for link in self._links.values():
             self._messages.read(link, batches)
             began_s = link.stop_began_s
-            link.stopping = began_s is not None and self._clock() - began_s >= STOPPING_SHOWN_AFTER_S
+            link.is_stopping = began_s is not None and self._clock() - began_s >= STOPPING_DISPLAY_DELAY_S
         self._tries.check_timeouts(self._links.values())
-        self.gate.follow()
+        self.gate.update()
         for link in self._links.values():
-            self._judge_motion(link)
+            self._update_motion(link)
 
     @property
     def claims(self) -> Mapping[str, Claim]:
         """Rejected announcements of programs by id."""
         return {**self._announcements.claims, **self._foreign_claims}
 
-    def take_notes(self) -> tuple[str, ...]:
+    def take_notices(self) -> tuple[str, ...]:
         """Return and clear notices for the user about restarted robots."""
         notes, self._notes = tuple(self._notes), []
         return notes
 
     def close(self) -> None:
         """Stop the heartbeat and close the command publishers."""
-        self.known.saw([link.robot for link in self.connected])
+        self.known.record([link.robot for link in self.connected])
         self._heartbeat.close()
         for link in self._links.values():
             close_publishers(link)
 
-    def unwatched(self, topic: str) -> None:
+    def on_unwatched(self, topic: str) -> None:
         """Discard the sensor values of a topic that is no longer subscribed to."""
         for link in self._links.values():
             for sensor in link.robot.sensors:
@@ -370,14 +374,14 @@ class Fleet:
         # A virtual robot is its program: it has stopped once the process has ended.
         if link.virtual and link.name in self.moved:
             self.moved.drop_ended(link.name)
-            link.not_stopped = link.not_stopped if link.name in self.moved else ""
+            link.stop_problem = link.stop_problem if link.name in self.moved else ""
 
-    def _judge_motion(self, link: RobotLink) -> None:
+    def _update_motion(self, link: RobotLink) -> None:
         # Explains why a robot that may move and doesn't answer is not known to have stopped.
-        if not link.connected:
+        if not link.is_connected:
             self._drop_ended(link)
         motion = self.moved.motion(link.name)
-        link.may_move = motion.sentence if motion is not None and not self._is_heard(link) else ""
+        link.motion_warning = motion.reason if motion is not None and not self._is_responsive(link) else ""
 
     def _is_proven(self, topic: str) -> bool:
         link = self._links.get(self._names.get(topic, ""))
@@ -386,53 +390,53 @@ class Fleet:
     def _get(self, name: str) -> RobotLink:
         link = self._links.get(name)
         if link is None:
-            raise RobotUnknownError(name)
+            raise UnknownRobotError(name)
         return link
 
     def _update_rize(self, view: GraphView) -> None:
         if self._rize_events is None and rize.EVENTS in view.topics:
             self._rize_events = self._watches.open([rize.EVENTS])
         native = {link.name for link in self._links.values() if link.robot.dialect == "native"}
-        there = self._rize_names.present(view, native)
+        there = self._rize_names.names_in(view, native)
         for name in there:
             known = self._links.get(name)
             if known is None or known.robot.dialect == "rize":
-                self.join(rize.robot(name), f"{rize.COMMANDS} {name}")
+                self.connect(rize.robot(name), f"{rize.COMMANDS} {name}")
         for link in self._links.values():
-            if link.robot.dialect == "rize" and link.connected and link.name not in there:
+            if link.robot.dialect == "rize" and link.is_connected and link.name not in there:
                 self._disconnect(link)
 
-    def _follow_announced(self) -> None:
+    def _update_announced(self) -> None:
         # Connects announced robots; disconnects those whose program is no longer listed.
         found = {topic: (robot, identity) for topic, robot, identity in self._announcements.robots}
         for topic, name in list(self._names.items()):
             link, now = self._links.get(name), found.get(topic)
-            if link is None or not link.connected:
+            if link is None or not link.is_connected:
                 continue
             is_same = now is not None and now[0].name == name and now[1] == link.identity
-            if not is_same and not (now is None and self._is_unread(topic, link)):
+            if not is_same and not (now is None and self._is_listed(topic, link)):
                 self._disconnect(link)
         for topic in self._foreign_claims.keys() - found.keys():
             del self._foreign_claims[topic]
         for topic, (robot, identity) in found.items():
-            claim = self._foreign(robot)
+            claim = self._foreign_claim(robot)
             if claim is None:
                 self._foreign_claims.pop(topic, None)
-                self.join(robot, topic, identity)
+                self.connect(robot, topic, identity)
                 continue
             self._foreign_claims[topic] = claim
             link = self._links.get(robot.name)
-            if link is not None and link.connected:
+            if link is not None and link.is_connected:
                 self._disconnect(link)
 
-    def _is_unread(self, topic: str, link: RobotLink) -> bool:
+    def _is_listed(self, topic: str, link: RobotLink) -> bool:
         # The program is still listed, but its newest description can't be parsed.
-        there = publishing(self._own.view, topic)
+        there = publisher_nodes(self._own.view, topic)
         return link.identity is not None and link.identity.node_id in there
 
-    def _foreign(self, robot: Robot) -> Claim | None:
+    def _foreign_claim(self, robot: Robot) -> Claim | None:
         # Rejects a robot whose description names topics of another robot.
-        why = foreign_topic(robot, (link.robot for link in self._links.values()))
+        why = topic_conflict(robot, (link.robot for link in self._links.values()))
         if why is None:
             return None
         return Claim(
@@ -440,7 +444,7 @@ class Fleet:
             _("{robot} is ignored. Find out what this program is, and close it.").format(robot=robot.name),
         )
 
-    def join(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
+    def connect(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
         """Connect a robot described on ``topic``.
 
         No effect if neither the robot nor its program has changed.
@@ -449,29 +453,29 @@ class Fleet:
         was_real = not robot.virtual or (link is not None and link.identity == identity and link.was_real)
         if identity is not None:
             self._names[topic] = robot.name
-            is_virtual = not was_real and self._processes.is_ours(identity)
+            is_virtual = not was_real and self._processes.is_started_by_studio(identity)
             robot = replace(robot, virtual=is_virtual)
         if link is None:
             link = self._links[robot.name] = RobotLink(robot.name, robot)
-        elif link.connected and link.robot == robot and link.identity == identity:
+        elif link.is_connected and link.robot == robot and link.identity == identity:
             return
-        self._take_identity(link, identity)
+        self._apply_identity(link, identity)
         link.was_real = was_real
         before, link.robot = link.robot, robot
-        link.connected, link.gone_s = True, None
+        link.is_connected, link.gone_s = True, None
         if before.topics != robot.topics or before.dialect != robot.dialect:
             if before.dialect == robot.dialect:
                 known = dict.fromkeys((*link.topics_before, before.topics))
                 link.topics_before = tuple(known)[:MAX_TOPICS]
-            self._leave_topics(link)
+            self._close_topics(link)
         if link.watch is None:
             link.watch = self._watches.open([robot.topics.answer])
-        self._senders.learn(self._own.view, self._own.topics(robot))
+        self._senders.update(self._own.view, self._own.topics(robot))
         self._publishers.open(link)
-        self.known.saw([robot])
+        self.known.record([robot])
         self.revision += 1
 
-    def _take_identity(self, link: RobotLink, identity: Identity | None) -> None:
+    def _apply_identity(self, link: RobotLink, identity: Identity | None) -> None:
         # The previous program may still run on another computer and move the robot.
         before, link.identity = link.identity, identity
         if before is None or identity is None or before.node_id == identity.node_id:
@@ -479,13 +483,13 @@ class Fleet:
         link.rejected, link.errors = ReportedCount(), ReportedCount()
         self._notes.append(
             _("{robot} was restarted as {now} (previously {before})").format(
-                robot=link.name, now=identity.words, before=before.words
+                robot=link.name, now=identity.display_name, before=before.display_name
             )
         )
         self._record_unended_actions(link, before)
         self._drop_ended(link)
 
-    def _leave_topics(self, link: RobotLink) -> None:
+    def _close_topics(self, link: RobotLink) -> None:
         # The description names other topics: invocations on the old ones fail.
         self._heartbeat.stop(link.name)
         self._tries.end_all(
@@ -494,24 +498,24 @@ class Fleet:
         if link.watch is not None:
             link.watch.close()
             link.watch = None
-        self._publishers.leave(link)
+        self._publishers.close_outdated(link)
 
     def _record_unended_actions(self, link: RobotLink, program: Identity | None) -> None:
         # Records actions that the robot could not end: their end can no longer be observed.
-        if link.goes_on and not link.virtual:  # a virtual robot is its program
-            self.moved.note([link.name], "action", program=program)
-            link.not_stopped = link.not_stopped or link.goes_on
-        link.goes_on = ""
+        if link.unended_actions and not link.virtual:  # a virtual robot is its program
+            self.moved.record_command([link.name], "action", program=program)
+            link.stop_problem = link.stop_problem or link.unended_actions
+        link.unended_actions = ""
 
     def _disconnect(self, link: RobotLink) -> None:
-        link.connected, link.gone_s = False, self._clock()
+        link.is_connected, link.gone_s = False, self._clock()
         self._record_unended_actions(link, link.identity)
-        self.known.saw([link.robot])
+        self.known.record([link.robot])
         self._heartbeat.stop(link.name)
         if link.watch is not None:
             link.watch.close()
             link.watch = None
-        link.mute = False
+        link.is_unresponsive = False
         if self.permission.question is not None and link.name in self.permission.question.moves:
             self.permission.withdraw()
         self._tries.end_all(
@@ -522,16 +526,16 @@ class Fleet:
     def _evict_disconnected(self) -> None:
         # Limits disconnected robots: any program can announce any number of names.
         in_use = {self._chosen, *self.used(), *self.moved.names}
-        for link in excess_away(self._links.values(), in_use):
+        for link in excess_disconnected(self._links.values(), in_use):
             del self._links[link.name]
             for topic in [topic for topic, name in self._names.items() if name == link.name]:
                 del self._names[topic]
-            self._messages.forget(link.name)
-            self._publishers.end(link)
+            self._messages.discard(link.name)
+            self._publishers.close(link)
             self.revision += 1
 
     def _send(self, link: RobotLink, command: Payload) -> bool:
-        if link.publisher is None or not link.connected:
+        if link.publisher is None or not link.is_connected:
             return False
         try:
             link.publisher.publish(command)

@@ -6,32 +6,32 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.core.alerts import Alerts
-from app.core.network.decode_checks import Checked
+from app.core.network.decode_checks import CheckResult
 from app.core.network.topics import Topics
-from app.core.own_process import Fate
+from app.core.own_process import ExecutableState
 from app.core.robots.fleet import Fleet
 from app.core.robots.robot_link import RobotLink
-from nep.i18n import _, lazy, listed, ngettext
+from nep.i18n import _, format_list, lazy, ngettext
 from nep.protocol.graph_view import Alert, GraphView
 
 SILENT_S = 3.0
 RECOVERY_S = 1.0
 RESTART_TIMEOUT_S = 5.0
 """Time within which a restarted driver is expected to be connected again."""
-PORTS = "ports"
-ASK_DOCTOR = lazy("Open the connection doctor")
-GIVES_UP = "leaving"
-INSTALLATION = "installation"
+PORTS_ALERT = "ports"
+OPEN_DOCTOR_LABEL = lazy("Open the connection doctor")
+DISCARD_ALERT = "leaving"
+INSTALLATION_ALERT = "installation"
 """Id of the alert about Studio's installation; "program" is the alert about the program of a behaviour."""
 ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
 """Prefixes of the ids of alerts about one robot. A colon and the name of the robot follow."""
 
-REAL = lazy("Check that it is switched on and connected to the same Wi-Fi.")
-VIRTUAL = lazy("Start the virtual robot again.")
+REAL_ROBOT_HINT = lazy("Check that it is switched on and connected to the same Wi-Fi.")
+VIRTUAL_ROBOT_HINT = lazy("Start the virtual robot again.")
 
 
 @dataclass(slots=True)
-class _Bad:
+class _BadTopic:
     """Topic with messages that can't be decoded.
 
     Attributes:
@@ -44,7 +44,7 @@ class _Bad:
     count: int = 0
     unchecked: int = 0
     since: float = 0.0
-    is_well: bool = False
+    has_recovered: bool = False
 
 
 class Health:
@@ -55,11 +55,11 @@ class Health:
         self._from_graph: set[str] = set()
         self._claims: set[str] = set()
         self._unreachable: set[str] = set()
-        self._bad: dict[str, _Bad] = {}
+        self._bad: dict[str, _BadTopic] = {}
         self._gone_since: dict[str, float] = {}
         self._robots: set[str] = set()
 
-    def update(self, found: Mapping[str, Checked]) -> None:
+    def update(self, found: Mapping[str, CheckResult]) -> None:
         """Raise alerts about topics with undecodable messages, including their exact number.
 
         `check` resolves the alert after a second without undecodable messages, so that a topic with both
@@ -68,17 +68,17 @@ class Health:
         for topic, checked in found.items():
             bad = self._bad.get(topic)
             if bad is None and checked.bad:
-                bad = self._bad[topic] = _Bad()
+                bad = self._bad[topic] = _BadTopic()
             if bad is None:
                 continue
-            bad.is_well = checked.last_good
+            bad.has_recovered = checked.is_last_good
             bad.unchecked += checked.unchecked
             if checked.bad:
                 bad.since = self._clock()
                 bad.count += checked.bad
                 self._alert_bad_topic(topic, bad, checked)
 
-    def forget(self, topic: str) -> None:
+    def discard(self, topic: str) -> None:
         """Discard the problems of a topic that is no longer watched or has recovered."""
         self._bad.pop(topic, None)
         self._alerts.resolve(f"message:{topic}")
@@ -91,24 +91,26 @@ class Health:
             started: Names of the virtual robots that this Studio started and that are still running.
         """
         now = self._clock()
-        for topic in [t for t, bad in self._bad.items() if bad.is_well and now - bad.since >= RECOVERY_S]:
-            self.forget(topic)
+        for topic in [
+            t for t, bad in self._bad.items() if bad.has_recovered and now - bad.since >= RECOVERY_S
+        ]:
+            self.discard(topic)
         self._check_claims()
-        self._forget_robots()
+        self._discard_robots()
         for link in self._fleet.links:
             self._check_camera(link)
             self._check_motion(link)
             self._check_driver(link, now)
-            if link.connected:
+            if link.is_connected:
                 self._gone_since.pop(link.name, None)
                 self._alerts.resolve(f"robot:{link.name}")
             elif link.name in used:
-                self._alerts.put(
+                self._alerts.raise_alert(
                     f"robot:{link.name}",
                     "error",
                     _("{robot} is not responding.").format(robot=link.name),
                     _("The behaviour uses this robot. {next_step}").format(
-                        next_step=_(VIRTUAL if link.virtual else REAL)
+                        next_step=_(VIRTUAL_ROBOT_HINT if link.virtual else REAL_ROBOT_HINT)
                     ),
                     button=_("Stop"),
                     action="run.stop",
@@ -117,13 +119,13 @@ class Health:
             else:
                 self._check_presence(link, now, runs_here=link.name in started)
 
-    def journal(self, sentence: str | None) -> None:
+    def report_journal_problem(self, sentence: str | None) -> None:
         """Raise the alert that unsaved work can't be backed up, with the reason; None resolves the alert."""
         if sentence is None:
             self._alerts.resolve("journal")
-            self._alerts.resolve(GIVES_UP)
+            self._alerts.resolve(DISCARD_ALERT)
             return
-        self._alerts.put(
+        self._alerts.raise_alert(
             "journal",
             "error",
             _("Your unsaved work is not backed up."),
@@ -133,16 +135,16 @@ class Health:
             count=0,
         )
 
-    def gives_up(self, name: str, sentence: str) -> bool:
+    def confirm_discard(self, name: str, sentence: str) -> bool:
         """Return True if the user closes the window although the work of ``name`` can't be saved.
 
         The first call raises an alert with the reason ``sentence`` and returns False.
         """
-        if self._alerts.has(GIVES_UP):
+        if self._alerts.has(DISCARD_ALERT):
             return True
         self._alerts.resolve("journal")  # raised again after this alert
-        self._alerts.put(
-            GIVES_UP,
+        self._alerts.raise_alert(
+            DISCARD_ALERT,
             "error",
             _("Studio stays open: the unsaved work in {name} would be lost.").format(name=name),
             _("{why}. Close again to discard it.").format(why=f"{sentence[0].upper()}{sentence[1:]}"),
@@ -152,12 +154,12 @@ class Health:
         )
         return False
 
-    def settings(self, sentence: str | None) -> None:
+    def report_settings_problem(self, sentence: str | None) -> None:
         """Raise the alert that settings can't be saved, with the reason; None resolves the alert."""
         if sentence is None:
             self._alerts.resolve("settings")
             return
-        self._alerts.put(
+        self._alerts.raise_alert(
             "settings",
             "warn",
             _("Settings you change now are lost when Studio closes."),
@@ -165,28 +167,28 @@ class Health:
             count=0,
         )
 
-    def program(self, fate: Fate) -> None:
+    def program(self, fate: ExecutableState) -> None:
         """Raise the alert that Studio's installation was replaced or removed."""
         if fate == "replaced":
-            self._alerts.put(
-                INSTALLATION,
+            self._alerts.raise_alert(
+                INSTALLATION_ALERT,
                 "warn",
                 _("NEP Studio was updated while it was open."),
                 _("Save your behaviours and restart Studio: until then, parts of it may not open."),
                 count=0,
             )
         elif fate == "gone":
-            self._alerts.put(
-                INSTALLATION,
+            self._alerts.raise_alert(
+                INSTALLATION_ALERT,
                 "error",
                 _("NEP Studio was removed from this computer while it was open."),
                 _("Save your behaviours now: behaviours that aren't open can no longer be opened or run."),
                 count=0,
             )
         else:
-            self._alerts.resolve(INSTALLATION)
+            self._alerts.resolve(INSTALLATION_ALERT)
 
-    def graph_alerts(self, view: GraphView) -> None:
+    def update_graph_alerts(self, view: GraphView) -> None:
         """Raise alerts for problems that the master reports.
 
         These are duplicate names, conflicting types and ports in use.
@@ -196,9 +198,9 @@ class Health:
         for found in view.alerts:
             if found not in ports:
                 ids.add(found.id)
-                self._alerts.put(found.id, "warn", found.sentence, found.hint, count=0)
+                self._alerts.raise_alert(found.id, "warn", found.sentence, found.hint, count=0)
         if ports:
-            ids.add(PORTS)
+            ids.add(PORTS_ALERT)
             self._alert_ports(ports)
         for gone in self._from_graph - ids:
             self._alerts.resolve(gone)
@@ -211,14 +213,21 @@ class Health:
             numbers = sorted(
                 {found.id.removeprefix("port:") for found in taken}, key=lambda port: (len(port), port)
             )
-            title = _("Other programs are using ports {ports}.").format(ports=listed(numbers))
+            title = _("Other programs are using ports {ports}.").format(ports=format_list(numbers))
             detail = _("Programs of the original NEP can't connect. The connection doctor shows the cause.")
-        step = _(ASK_DOCTOR)
-        self._alerts.put(
-            PORTS, "warn", title, detail, button=step, action="help.doctor", count=0, for_developers=True
+        step = _(OPEN_DOCTOR_LABEL)
+        self._alerts.raise_alert(
+            PORTS_ALERT,
+            "warn",
+            title,
+            detail,
+            button=step,
+            action="help.doctor",
+            count=0,
+            for_developers=True,
         )
 
-    def _alert_bad_topic(self, topic: str, bad: _Bad, checked: Checked) -> None:
+    def _alert_bad_topic(self, topic: str, bad: _BadTopic, checked: CheckResult) -> None:
         title = ngettext(
             "{topic} sends messages that can't be decoded ({count} message).",
             "{topic} sends messages that can't be decoded ({count} messages).",
@@ -229,8 +238,8 @@ class Health:
             if bad.unchecked
             else _("{why} See the raw bytes in the Inspector.")
         )
-        why = f"{checked.sentence[:1].upper()}{checked.sentence[1:]}."
-        self._alerts.put(
+        why = f"{checked.error[:1].upper()}{checked.error[1:]}."
+        self._alerts.raise_alert(
             f"message:{topic}",
             "warn",
             title.format(topic=topic, count=bad.count),
@@ -246,19 +255,19 @@ class Health:
         if now - since < RESTART_TIMEOUT_S or (link.virtual and not runs_here):
             self._alerts.resolve(f"robot:{link.name}")
             return
-        self._alerts.put(
+        self._alerts.raise_alert(
             f"robot:{link.name}",
             "warn",
             (_("{robot} is not responding.") if link.virtual else _("{robot} disconnected.")).format(
                 robot=link.name
             ),
-            _(VIRTUAL if link.virtual else REAL),
-            button=_("Restart it") if link.virtual else _(ASK_DOCTOR),
+            _(VIRTUAL_ROBOT_HINT if link.virtual else REAL_ROBOT_HINT),
+            button=_("Restart it") if link.virtual else _(OPEN_DOCTOR_LABEL),
             action=f"connect:{link.name}" if link.virtual else "help.doctor",
             count=0,
         )
 
-    def _forget_robots(self) -> None:
+    def _discard_robots(self) -> None:
         # Resolves the alerts of robots that Studio has discarded.
         names = {link.name for link in self._fleet.links}
         for name in self._robots - names:
@@ -272,29 +281,29 @@ class Health:
         for id in self._claims - claims.keys():
             self._alerts.resolve(f"claim:{id}")
         for id, claim in claims.items():
-            self._alerts.put(f"claim:{id}", "error", claim.title, claim.detail, count=0)
+            self._alerts.raise_alert(f"claim:{id}", "error", claim.title, claim.detail, count=0)
         self._claims = set(claims)
 
-    def unreachable(self, problems: Mapping[str, str]) -> None:
+    def update_unreachable(self, problems: Mapping[str, str]) -> None:
         """Raise alerts for robots that a Stop can't reach; ``problems`` are the reasons by name."""
         for name in self._unreachable - problems.keys():
             self._alerts.resolve(f"stop:{name}")
         for name, why in problems.items():
             detail = _("{why}. Studio tries again every second.").format(why=f"{why[:1].upper()}{why[1:]}")
             title = _("Stop can't reach {robot}.").format(robot=name)
-            self._alerts.put(f"stop:{name}", "error", title, detail, count=0)
+            self._alerts.raise_alert(f"stop:{name}", "error", title, detail, count=0)
         self._unreachable = set(problems)
 
     def _check_motion(self, link: RobotLink) -> None:
         # A robot that reports an action it couldn't end, or that may move and doesn't answer.
-        wrong = link.goes_on if link.connected else ""
-        if not wrong and not link.not_stopped:  # otherwise covered by the alert of the Stop
-            wrong = link.may_move
+        wrong = link.unended_actions if link.is_connected else ""
+        if not wrong and not link.stop_problem:  # otherwise covered by the alert of the Stop
+            wrong = link.motion_warning
         if not wrong:
             self._alerts.resolve(f"moving:{link.name}")
             return
         said = _("Switch it off by hand if it is still moving.")
-        self._alerts.put(
+        self._alerts.raise_alert(
             f"moving:{link.name}",
             "error",
             f"{wrong}.",
@@ -326,9 +335,11 @@ class Health:
             ),
         }
         for kind, (count, title, detail) in said.items():
-            if link.connected and count.is_growing(now):
+            if link.is_connected and count.is_growing(now):
                 words = title.format(robot=link.name, count=count.value)
-                self._alerts.put(f"{kind}:{link.name}", "warn", words, detail, count=0, for_developers=True)
+                self._alerts.raise_alert(
+                    f"{kind}:{link.name}", "warn", words, detail, count=0, for_developers=True
+                )
             else:
                 self._alerts.resolve(f"{kind}:{link.name}")
 
@@ -337,7 +348,7 @@ class Health:
         camera = next((sensor for sensor in link.robot.sensors if sensor.is_image), None)
         topic = self._topics.get(camera.topic) if camera is not None else None
         silent = (
-            link.connected
+            link.is_connected
             and topic is not None
             and topic.gone_since is None
             and topic.silent_s is not None
@@ -348,14 +359,14 @@ class Health:
             self._alerts.resolve(id)
             return
         link.silent = _("camera silent")
-        self._alerts.put(
+        self._alerts.raise_alert(
             id,
             "error",
             _("The camera of {robot} has sent nothing for {seconds} s.").format(
                 robot=link.name, seconds=int(topic.silent_s)
             ),
             _("Blocks that need its images are waiting."),
-            button=_(ASK_DOCTOR),
+            button=_(OPEN_DOCTOR_LABEL),
             action="help.doctor",
             count=0,
         )

@@ -12,11 +12,11 @@ from app.core.network.topics import Topic, Topics
 from app.core.robots.reported_count import ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Sensor
-from app.robots.description.json_access import finite
+from app.robots.description.json_access import finite_float
 from nep.i18n import _, lazy, ngettext, number
 
 SILENT_S = 3.0
-MISSED = 5
+MAX_MISSED_MESSAGES = 5
 """Number of consecutive missing messages after which a sensor counts as silent."""
 LOW_PERCENT = 20
 WARM_C = 60
@@ -26,9 +26,9 @@ CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Te
 STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
 REJECTED, ERRORS = lazy("Rejected messages"), lazy("Driver exceptions")
 LEFT_ALONE, SIGN_OF_LIFE = lazy("Safety stop"), lazy("Last response")
-TOLD = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
+REPORTED_TITLES = frozenset({BATTERY, TEMPERATURE, CAMERA, SENSORS})
 
-AgeWords = Callable[[float], str]
+FormatAge = Callable[[float], str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,15 +43,15 @@ class HealthFact:
 
     title: str
     status: str
-    words: str
+    text: str
 
     @property
-    def to_look_at(self) -> bool:
+    def needs_attention(self) -> bool:
         """True if the fact needs attention."""
         return self.status in ("warn", "error")
 
 
-def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -> tuple[HealthFact, ...]:
+def facts_of(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) -> tuple[HealthFact, ...]:
     """Return all facts about a robot; those that need attention come first.
 
     Args:
@@ -59,24 +59,26 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: AgeWords) -
         age_words: Formats a duration, such as "14 s".
     """
     facts = [_connection(link, now, age_words)]
-    if link.connected:
+    if link.is_connected:
         facts += [*_battery(link), *_temperature(link)]
     facts.append(_stop(link))
-    if link.connected:
+    if link.is_connected:
         facts += [*_camera(link, topics, age_words), *_sensors(link, topics, age_words)]
-        facts += [*_count(REJECTED, link.rejected, now), *_count(ERRORS, link.errors, now)]
-    facts += [_left_alone(link), *_heartbeat_fact(link)]
-    return tuple(sorted(facts, key=lambda fact: not fact.to_look_at))
+        facts += [*_count_facts(REJECTED, link.rejected, now), *_count_facts(ERRORS, link.errors, now)]
+    facts += [_watchdog_fact(link), *_heartbeat_fact(link)]
+    return tuple(sorted(facts, key=lambda fact: not fact.needs_attention))
 
 
-def has_told(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
+def has_reported(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
     """Return True if the robot itself has sent anything; otherwise only its description is known."""
-    return link.answered_s is not None or any(fact.title in TOLD and fact.status == "ok" for fact in facts)
+    return link.replied_s is not None or any(
+        fact.title in REPORTED_TITLES and fact.status == "ok" for fact in facts
+    )
 
 
-def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
-    age = age_words(now - link.answered_s) if link.answered_s is not None else ""
-    if not link.connected:
+def _connection(link: RobotLink, now: float, age_words: FormatAge) -> HealthFact:
+    age = age_words(now - link.replied_s) if link.replied_s is not None else ""
+    if not link.is_connected:
         if link.gone_s is None:
             words = (
                 _("disconnected; restart it")
@@ -90,13 +92,13 @@ def _connection(link: RobotLink, now: float, age_words: AgeWords) -> HealthFact:
             else _("disconnected {age} ago; check that it is switched on")
         )
         return HealthFact(CONNECTION, "warn", words.format(age=age_words(now - link.gone_s)))
-    if link.mute:
-        return HealthFact(CONNECTION, "error", _unresponsive_words(link, age))
+    if link.is_unresponsive:
+        return HealthFact(CONNECTION, "error", _unresponsive_text(link, age))
     words = _("last response {age} ago").format(age=age) if age else _("connected; no request sent yet")
     return HealthFact(CONNECTION, "ok", words)
 
 
-def _unresponsive_words(link: RobotLink, age: str) -> str:
+def _unresponsive_text(link: RobotLink, age: str) -> str:
     if not age:
         return (
             _("not responding; restart it")
@@ -115,7 +117,7 @@ def _battery(link: RobotLink) -> Iterable[HealthFact]:
     for sensor in link.robot.sensors:
         if "battery" not in f"{sensor.name} {sensor.title}".casefold() or sensor.unit != "%":
             continue
-        value = finite(link.values.get(sensor.name))
+        value = finite_float(link.values.get(sensor.name))
         if value is None:
             yield HealthFact(BATTERY, "off", _("not reported yet"))
         elif value < LOW_PERCENT:
@@ -141,24 +143,24 @@ def _temperature(link: RobotLink) -> Iterable[HealthFact]:
 
 def _degrees(sensor: Sensor, values: Mapping[str, object]) -> Iterable[tuple[float, str]]:
     value = values.get(sensor.name)
-    degrees = finite(value)
+    degrees = finite_float(value)
     if sensor.unit == "°C" and degrees is not None:
         yield degrees, sensor.title
     for field in sensor.fields:
         inner = value.get(field.name) if isinstance(value, Mapping) else None
-        degrees = finite(inner)
+        degrees = finite_float(inner)
         if field.unit == "°C" and degrees is not None:
             yield degrees, field.title
 
 
 def _stop(link: RobotLink) -> HealthFact:
-    if link.goes_on:
-        return HealthFact(STOP, "error", link.goes_on)
-    if link.may_move:
-        return HealthFact(STOP, "error", link.may_move)
-    if link.connected and not link.is_reached:
+    if link.unended_actions:
+        return HealthFact(STOP, "error", link.unended_actions)
+    if link.motion_warning:
+        return HealthFact(STOP, "error", link.motion_warning)
+    if link.is_connected and not link.is_reachable:
         return HealthFact(STOP, "off", _("can't be sent yet: the robot is connecting"))
-    if link.stopping:
+    if link.is_stopping:
         return HealthFact(STOP, "off", _("Stop sent; waiting for confirmation"))
     if link.last_stop is not None:
         return HealthFact(STOP, link.last_stop_status, link.last_stop)
@@ -166,7 +168,7 @@ def _stop(link: RobotLink) -> HealthFact:
     return HealthFact(STOP, "off", text)
 
 
-def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
+def _camera(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthFact]:
     camera = next((sensor for sensor in link.robot.sensors if sensor.is_image), None)
     if camera is None:
         return
@@ -177,13 +179,13 @@ def _camera(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[He
         yield HealthFact(
             CAMERA, "ok", _("sends {rate} images per second").format(rate=f"{topic.rate_hz:.0f}")
         )
-    elif topic is not None and topic.gone_s is None and topic.heard_since is None:
+    elif topic is not None and topic.gone_s is None and topic.subscribed_since is None:
         yield HealthFact(CAMERA, "off", _("ready (not in use)"))
     else:
         yield HealthFact(CAMERA, "off", _("no image yet"))
 
 
-def _sensors(link: RobotLink, topics: Topics, age_words: AgeWords) -> Iterable[HealthFact]:
+def _sensors(link: RobotLink, topics: Topics, age_words: FormatAge) -> Iterable[HealthFact]:
     felt = [sensor for sensor in link.robot.sensors if not sensor.is_image]
     silent = [(sensor, topic) for sensor in felt if _is_silent(sensor, topic := topics.get(sensor.topic))]
     if not felt:
@@ -220,17 +222,17 @@ def _is_silent(sensor: Sensor, topic: Topic | None) -> bool:
     # Only sensors with a rate can be silent; others may have no change to report.
     if sensor.rate_hz is None or topic is None or topic.silent_s is None or topic.gone_s is not None:
         return False
-    return topic.silent_s > max(SILENT_S, MISSED / sensor.rate_hz)
+    return topic.silent_s > max(SILENT_S, MAX_MISSED_MESSAGES / sensor.rate_hz)
 
 
-def _count(title: str, count: ReportedCount, now: float) -> Iterable[HealthFact]:
+def _count_facts(title: str, count: ReportedCount, now: float) -> Iterable[HealthFact]:
     if count.is_growing(now):
         yield HealthFact(title, "warn", _("{count} so far; see its log").format(count=count.value))
     elif count.value:
         yield HealthFact(title, "off", _("{count} since it started").format(count=count.value))
 
 
-def _left_alone(link: RobotLink) -> HealthFact:
+def _watchdog_fact(link: RobotLink) -> HealthFact:
     after = link.robot.safe_stop.watchdog_s
     if after is None:
         return HealthFact(LEFT_ALONE, "off", _("keeps moving; stay near its power switch"))

@@ -12,9 +12,9 @@ from app.errors import SettingsError
 from app.robots.description.description import Robot
 
 KEY = "robots.known"
-LIMIT = 24
+MAX_ROBOTS = 24
 
-Told = Mapping[str, object]
+Entry = Mapping[str, object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +37,11 @@ class KnownRobots:
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
         """All known robots, the most recently connected first; invalid entries are skipped."""
-        entries: list[Told] = self._settings.get(KEY, []) if self._settings is not None else []
-        found = {robot.name: robot for robot in map(_robot, entries) if robot is not None}
+        entries: list[Entry] = self._settings.get(KEY, []) if self._settings is not None else []
+        found = {robot.name: robot for robot in map(_parse_robot, entries) if robot is not None}
         return tuple(sorted(found.values(), key=lambda robot: -robot.seen_s))
 
-    def saw(self, robots: Sequence[Robot]) -> None:
+    def record(self, robots: Sequence[Robot]) -> None:
         """Record that these robots are connected or were connected until now."""
         names = [robot.name for robot in robots if not robot.virtual]
         if names:
@@ -49,20 +49,20 @@ class KnownRobots:
             others = [robot for robot in self.robots if robot.name not in names]
             self._save([*(KnownRobot(name, now) for name in names), *others])
 
-    def forget(self, name: str) -> None:
+    def discard(self, name: str) -> None:
         """Remove a robot from the list. It is added again when it connects."""
         self._save([robot for robot in self.robots if robot.name != name])
 
     def _save(self, robots: Sequence[KnownRobot]) -> None:
         if self._settings is None:
             return
-        entries = [{"name": robot.name, "seen_s": robot.seen_s} for robot in robots[:LIMIT]]
+        entries = [{"name": robot.name, "seen_s": robot.seen_s} for robot in robots[:MAX_ROBOTS]]
         # Only an entry of a list is lost, and saving other settings alerts problems of the same file.
         with contextlib.suppress(SettingsError):
             self._settings.set(KEY, entries)
 
 
-def _robot(told: object) -> KnownRobot | None:
+def _parse_robot(told: object) -> KnownRobot | None:
     if not isinstance(told, Mapping):
         return None
     name, seen = told.get("name"), told.get("seen_s")

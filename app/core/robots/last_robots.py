@@ -14,7 +14,7 @@ KEPT, COME_BACK = "virtual_robots", "virtual_robots_come_back"
 MAX_ROBOTS = 8
 
 
-class StartsRobots(Protocol):
+class RobotStarter(Protocol):
     """Part of the interface of `app.core.robots.launcher.Launcher` that is used here."""
 
     wanted: dict[str, str]
@@ -31,24 +31,24 @@ class LastRobots:
         self._saved: dict[str, str] = {}
 
     @property
-    def come_back(self) -> bool:
+    def is_restart_enabled(self) -> bool:
         """True if the virtual robots are started again at the next start."""
         return self._settings.get(COME_BACK, True)
 
-    def set_come_back(self, wanted: bool) -> None:
+    def set_restart_enabled(self, wanted: bool) -> None:
         """Set `come_back`. Raises SettingsError."""
         self._settings.set(COME_BACK, wanted)
 
-    def start(self, launcher: StartsRobots) -> None:
+    def start(self, launcher: RobotStarter) -> None:
         """Start the robots of the last session. Returns immediately; no robot moves."""
-        if not self.come_back:
+        if not self.is_restart_enabled:
             return
         kept: Mapping[str, object] = self._settings.get(KEPT, {})
         for name, model in list(kept.items())[:MAX_ROBOTS]:
             if name and isinstance(model, str) and model in VIRTUAL_ROBOTS:
                 launcher.start_virtual_robot(name, model)
 
-    def save(self, launcher: StartsRobots) -> None:
+    def save(self, launcher: RobotStarter) -> None:
         """Save the names of the current robots if they have changed.
 
         Called during the session, so that they are known after a crash. The settings report errors.

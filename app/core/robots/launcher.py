@@ -14,10 +14,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import IO, Protocol
 
-from app.core.faults import IN_CONSOLE
+from app.core.faults import CONSOLE_EXTRA
 from app.core.network.master import MasterStart
 from app.core.own_process import module_command
-from app.core.reports.crash import crash_extra, end_words, is_crash, split_trace
+from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
 from app.robots.identity import Identity
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
@@ -34,7 +34,7 @@ STARTING_S = 30.0
 REQUEST_LIFETIME_S = 4.0
 """Lifetime of a start request while the robot is still listed; its end is noticed only within 3.3 s."""
 
-RUNS_MODULE = ("-m", "--module")
+MODULE_FLAGS = ("-m", "--module")
 MAX_KNOWN = 1000
 
 _log = logging.getLogger("studio.launcher")
@@ -45,8 +45,8 @@ class _StartRequest:
     """Request to start a virtual robot of this model, with its deadlines (monotonic seconds)."""
 
     model: str
-    known_until: float
-    until: float
+    known_deadline_s: float
+    deadline_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class LaunchFailed:
     """Event: a process could not be started or ended unexpectedly; ``detail`` is the end of its output."""
 
     what: str
-    sentence: str
+    message: str
     detail: str
     is_robot: bool = True
 
@@ -132,12 +132,12 @@ class Launcher:
             return tuple(name for name, (process, _log) in self._robots.items() if process.poll() is None)
 
     @property
-    def coming(self) -> tuple[str, ...]:
+    def starting_robots(self) -> tuple[str, ...]:
         """Virtual robots that are starting."""
         now = self._clock()
         return tuple(name for name, until in self._starting.items() if now < until)
 
-    def came(self, name: str) -> None:
+    def on_started(self, name: str) -> None:
         """Record that a robot has finished starting."""
         self._starting.pop(name, None)
 
@@ -148,15 +148,15 @@ class Launcher:
             return tuple(process.pid for process, _log in self._robots.values() if process.poll() is None)
 
     @property
-    def started_master(self) -> bool:
+    def has_started_master(self) -> bool:
         """True if this Studio started the running master."""
-        return self._master.runs
+        return self._master.has_started
 
     def ensure_master(self) -> None:
         """Start a master if none is running. Returns immediately; a failure is posted."""
         self._master.ensure()
 
-    def keep_master(self) -> None:
+    def ensure_master_running(self) -> None:
         """Call `ensure_master` with a back-off after failures. Call it repeatedly."""
         self._master.ensure_running()
 
@@ -171,21 +171,21 @@ class Launcher:
         self.wanted[name] = model
         self._starting[name] = now + STARTING_S
         self._requests[name] = _StartRequest(model, now + FIRST_GRAPH_TIMEOUT_S, now + REQUEST_LIFETIME_S)
-        self.follow()
+        self.start_requested()
 
-    def follow(self) -> None:
+    def start_requested(self) -> None:
         """Start requested robots that are not listed. Called at each tick of the session."""
         if not self._requests:
             return
         now = self._clock()
         for name, wish in list(self._requests.items()):
             there = self._is_there(name)
-            if there is None and (self._master.first or now >= wish.known_until):
+            if there is None and (self._master.first or now >= wish.known_deadline_s):
                 there = False
             if there is False:
                 del self._requests[name]
                 self._start_robot(name, wish.model)
-            elif now >= wish.until:
+            elif now >= wish.deadline_s:
                 del self._requests[name]
 
     def _start_robot(self, name: str, model: str) -> None:
@@ -232,9 +232,9 @@ class Launcher:
     def stop_virtual_robot(self, name: str) -> None:
         """Stop a virtual robot that was started here, and discard a pending request to start it."""
         self.wanted.pop(name, None)
-        self._end_robot(name)
+        self._stop_robot(name)
 
-    def _end_robot(self, name: str) -> None:
+    def _stop_robot(self, name: str) -> None:
         self._requests.pop(name, None)
         self._starting.pop(name, None)
         with self._lock:
@@ -255,15 +255,15 @@ class Launcher:
                 self._starting.pop(name, None)
                 output, trace = split_trace(_tail(log))
                 if is_crash(code):
-                    how = f"the process of a virtual robot {end_words(code)}"
+                    how = f"the process of a virtual robot {exit_text(code)}"
                     _log.error(
-                        "%s", how, extra={**IN_CONSOLE, **crash_extra("robot", how, f"{output}{trace}")}
+                        "%s", how, extra={**CONSOLE_EXTRA, **crash_extra("robot", how, f"{output}{trace}")}
                     )
                 self._post_event(
                     LaunchFailed(
                         name,
                         _("The virtual robot {robot} stopped unexpectedly.").format(robot=name),
-                        output.strip()[-TAIL_LETTERS:] or _end_without_output(code),
+                        output.strip()[-TAIL_LETTERS:] or _exit_reason(code),
                     )
                 )
                 log.close()
@@ -272,7 +272,7 @@ class Launcher:
         """Stop the virtual robots. The master keeps running while other programs are registered."""
         self._requests.clear()
         for name in list(self._robots):
-            self._end_robot(name)
+            self._stop_robot(name)
         self._master.close()
 
 
@@ -285,7 +285,7 @@ def _terminate(process: Process) -> None:
         process.wait()
 
 
-def _end_without_output(code: int) -> str:
+def _exit_reason(code: int) -> str:
     # A negative exit code is the number of a signal.
     if code < 0:
         return _("Another program on this computer stopped it.")
@@ -306,7 +306,7 @@ class VirtualProcesses:
         self._started = started
         self._known: dict[Identity, bool] = {}
 
-    def is_ours(self, identity: Identity) -> bool:
+    def is_started_by_studio(self, identity: Identity) -> bool:
         """Return True if a program is a virtual robot started by a Studio of this user.
 
         That is this process, a process that it started (or the child of one, as in a frozen build), or a
@@ -346,4 +346,4 @@ class VirtualProcesses:
 
     def _is_virtual(self, command: list[str]) -> bool:
         # Only the module option counts; later words of the command may be anything.
-        return len(command) > 2 and command[1] in RUNS_MODULE and command[2] in self._modules
+        return len(command) > 2 and command[1] in MODULE_FLAGS and command[2] in self._modules

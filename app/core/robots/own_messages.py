@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from app.core.network.mailbox import Batch
 from app.core.robots.robot_link import Payload, RobotLink, topics_of
 from app.robots.description.description import Robot
-from app.robots.identity import GATEWAY, Identity, Senders, hearing, identity_of, publishing
+from app.robots.identity import GATEWAY, Identity, Senders, identity_of, publisher_nodes, subscriber_nodes
 from nep.errors import NepError
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
@@ -32,19 +32,19 @@ class OwnMessages:
         """
         before, self.view = self.view, view
         for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
-            topic, serving = before.topics.get(link.robot.topics.command), self._serving(link, before)
+            topic, serving = before.topics.get(link.robot.topics.command), self._serving_nodes(link, before)
             for each in topic.subscribers if topic is not None and link.robot.dialect == "native" else ():
                 if each.node_id in serving and each.node_id not in view.nodes:
                     self._lapsed.setdefault(link.name, {})[each.id] = identity_of(before, each.node_id)
         for name, lapsed in list(self._lapsed.items()):
-            ended = lapsed.keys() - self._connected(self._links.get(name))
+            ended = lapsed.keys() - self._connected_ids(self._links.get(name))
             for id in ended | {id for id, each in lapsed.items() if each.node_id in view.nodes}:
                 del lapsed[id]
             if not lapsed:
                 del self._lapsed[name]
 
     @staticmethod
-    def _connected(link: RobotLink | None) -> frozenset[int]:
+    def _connected_ids(link: RobotLink | None) -> frozenset[int]:
         return frozenset() if link is None or link.publisher is None else link.publisher.subscriber_ids
 
     @staticmethod
@@ -62,26 +62,30 @@ class OwnMessages:
         if link is None or link.robot.dialect != "native":
             return []
         own = link.identity.node_id if link.identity is not None else ""
-        listed = [identity_of(self.view, node) for node in self._serving(link, self.view) if node != own]
-        connected = self._connected(link)
+        listed = [
+            identity_of(self.view, node) for node in self._serving_nodes(link, self.view) if node != own
+        ]
+        connected = self._connected_ids(link)
         return listed + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
 
-    def newcomers(self, link: RobotLink, before: GraphView) -> list[Identity]:
+    def new_programs(self, link: RobotLink, before: GraphView) -> list[Identity]:
         """Return the programs that serve the robot now but did not in ``before``.
 
         A program serves a robot if it receives the robot's commands and publishes replies.
         """
         if link.robot.dialect != "native":
             return []
-        earlier = self._serving(link, before)
+        earlier = self._serving_nodes(link, before)
         return [
-            identity_of(self.view, node) for node in self._serving(link, self.view) if node not in earlier
+            identity_of(self.view, node)
+            for node in self._serving_nodes(link, self.view)
+            if node not in earlier
         ]
 
     @staticmethod
-    def _serving(link: RobotLink, view: GraphView) -> list[str]:
-        answering = publishing(view, link.robot.topics.answer)
-        return [node for node in hearing(view, link.robot.topics.command) if node in answering]
+    def _serving_nodes(link: RobotLink, view: GraphView) -> list[str]:
+        answering = publisher_nodes(view, link.robot.topics.answer)
+        return [node for node in subscriber_nodes(view, link.robot.topics.command) if node in answering]
 
     def is_from(self, link: RobotLink, message: Message) -> bool | None:
         """Return True if the robot's own program sent a message; None while the sender is unknown.
@@ -95,7 +99,7 @@ class OwnMessages:
         if link.robot.dialect != "native":
             known = self.view.nodes.get(node or "")
             is_gateway = known is None or known.generation == GATEWAY
-            return is_gateway or node in hearing(self.view, link.robot.topics.command)
+            return is_gateway or node in subscriber_nodes(self.view, link.robot.topics.command)
         return None if node is None or link.identity is None else node == link.identity.node_id
 
     def newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
@@ -106,7 +110,7 @@ class OwnMessages:
         if batch is None or not batch.messages:
             return None
         own = link.identity.node_id if link.identity is not None else ""
-        if own not in publishing(self.view, topic):
+        if own not in publisher_nodes(self.view, topic):
             return mapping_of(batch.messages[-1])
         found = (message for message in reversed(batch.messages) if self._senders.node_of(message) == own)
         newest = next(found, None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-GROWING_S = 30.0
+GROWTH_WINDOW_S = 30.0
 """Time without an increase after which the problem counts as resolved. Heartbeats are sent only during
 actions.
 """
@@ -31,4 +31,4 @@ class ReportedCount:
 
     def is_growing(self, now_s: float) -> bool:
         """Return True if the counter increased within the last `GROWING_S` seconds."""
-        return self.value > 0 and self.grew_s is not None and now_s - self.grew_s < GROWING_S
+        return self.value > 0 and self.grew_s is not None and now_s - self.grew_s < GROWTH_WINDOW_S

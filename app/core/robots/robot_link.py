@@ -10,20 +10,20 @@ from dataclasses import dataclass, field
 from app.core.network.watches import Watch
 from app.core.robots.reported_count import ReportedCount
 from app.robots.description.description import Robot, RobotTopics
-from app.robots.identity import Identity, may_move
+from app.robots.identity import Identity, is_may_move_error
 from nep.i18n import _, lazy
 from nep.nodes.publisher import Publisher
 
 SENDER = "studio"
 """Sender id of manual commands."""
-TRIES_KEPT = 40
-MAX_AWAY = 200
+MAX_PAST_INVOCATIONS = 40
+MAX_DISCONNECTED = 200
 """Maximum number of disconnected robots in the list; all robots of a room may disconnect together."""
 NOT_STOPPED = "not stopped"
 CONNECTING = "connecting"
 STOPPING = "stopping"
 FINAL_STATES = frozenset({"succeeded", "failed", "canceled"})
-STATE_WORDS = {
+STATE_LABELS = {
     NOT_STOPPED: lazy("not stopped"),
     STOPPING: lazy("stopping"),
     "away": lazy("not running"),
@@ -60,20 +60,20 @@ class Invocation:
     clock: Callable[[], float] = time.monotonic
     given: Payload = field(default_factory=dict)
     timeout_s: float | None = None
-    begun_s: float | None = None
+    execution_start_s: float | None = None
     waits_for: tuple[str, ...] = ()
     replaces: tuple[str, ...] = ()
-    at_s: float = 0.0
+    sent_at_s: float = 0.0
 
     @property
-    def left_s(self) -> float | None:
+    def remaining_s(self) -> float | None:
         """Seconds until the time limit; None without a limit or before the start."""
-        if self.timeout_s is None or self.begun_s is None:
+        if self.timeout_s is None or self.execution_start_s is None:
             return None
-        return self.begun_s + self.timeout_s - self.clock()
+        return self.execution_start_s + self.timeout_s - self.clock()
 
     @property
-    def running(self) -> bool:
+    def is_running(self) -> bool:
         """True if the robot has not reported the end of the action."""
         return self.state not in FINAL_STATES
 
@@ -111,25 +111,25 @@ class RobotLink:
 
     name: str
     robot: Robot
-    connected: bool = True
+    is_connected: bool = True
     silent: str | None = None
     values: dict[str, object] = field(default_factory=dict)
     drawing: Payload | None = None
     invocations: dict[str, Invocation] = field(default_factory=dict)
-    tried: deque[Invocation] = field(default_factory=lambda: deque(maxlen=TRIES_KEPT))
-    mute: bool = False
-    heard_s: float = 0.0
-    answered_s: float | None = None
+    past_invocations: deque[Invocation] = field(default_factory=lambda: deque(maxlen=MAX_PAST_INVOCATIONS))
+    is_unresponsive: bool = False
+    last_contact_s: float = 0.0
+    replied_s: float | None = None
     gone_s: float | None = None
     last_stop: str | None = None
     last_stop_status: str = "error"
-    not_stopped: str = ""
-    goes_on: str = ""
-    may_move: str = ""
+    stop_problem: str = ""
+    unended_actions: str = ""
+    motion_warning: str = ""
     has_proven_stop: bool = False
     stop_began_s: float | None = None
-    stopping: bool = False
-    is_reached: bool = True
+    is_stopping: bool = False
+    is_reachable: bool = True
     identity: Identity | None = None
     topics_before: tuple[RobotTopics, ...] = ()
     is_opening: bool = False
@@ -157,46 +157,50 @@ class RobotLink:
         A disconnected robot whose Stop is not confirmed, or that stopped replying after a command, may still
         move.
         """
-        if self.not_stopped or self.may_move or (self.connected and self.goes_on):
+        if self.stop_problem or self.motion_warning or (self.is_connected and self.unended_actions):
             return NOT_STOPPED
-        if self.stopping:
+        if self.is_stopping:
             return STOPPING
-        if not self.connected:
+        if not self.is_connected:
             return "away"
-        if not self.is_reached:
+        if not self.is_reachable:
             return CONNECTING
-        if self.silent is not None or self.mute:
+        if self.silent is not None or self.is_unresponsive:
             return "silent"
         return "busy" if self.running else "ready"
 
     @property
     def running(self) -> tuple[Invocation, ...]:
         """Invocations that have not ended."""
-        known = {invocation.id: invocation for invocation in (*self.tried, *self.invocations.values())}
-        return tuple(invocation for invocation in known.values() if invocation.running)
+        known = {
+            invocation.id: invocation for invocation in (*self.past_invocations, *self.invocations.values())
+        }
+        return tuple(invocation for invocation in known.values() if invocation.is_running)
 
     @property
-    def state_words(self) -> str:
+    def state_label(self) -> str:
         """State in words, such as "ready" or "may still move"."""
         state = self.state
-        if self.connected and self.mute and state == NOT_STOPPED and not self.not_stopped:
+        if self.is_connected and self.is_unresponsive and state == NOT_STOPPED and not self.stop_problem:
             return _("not responding")
         if state == NOT_STOPPED and (
-            self.may_move or may_move(self.name, self.goes_on) or may_move(self.name, self.not_stopped)
+            self.motion_warning
+            or is_may_move_error(self.name, self.unended_actions)
+            or is_may_move_error(self.name, self.stop_problem)
         ):
             return _("may still move")
-        if self.connected and state == "silent":
-            return _("not responding") if self.mute else self.silent or _(STATE_WORDS[state])
-        return _(STATE_WORDS[state])
+        if self.is_connected and state == "silent":
+            return _("not responding") if self.is_unresponsive else self.silent or _(STATE_LABELS[state])
+        return _(STATE_LABELS[state])
 
     @property
-    def chip(self) -> str:
+    def chip_text(self) -> str:
         """Text of the robot's chip, such as "virtual, ready"."""
-        words = self.state_words
+        words = self.state_label
         return _("virtual, {state}").format(state=words) if self.virtual else words
 
 
-def excess_away(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
+def excess_disconnected(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
     """Return the robots to remove from the list: disconnected ones beyond `MAX_AWAY`.
 
     The limit is needed because any program can invent new names. Robots that never replied come first, then
@@ -206,11 +210,11 @@ def excess_away(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence
     away = [
         link
         for link in links
-        if not (link.connected or link.has_proven_stop or link.not_stopped or link.name in in_use)
+        if not (link.is_connected or link.has_proven_stop or link.stop_problem or link.name in in_use)
         and link.stop_began_s is None
     ]
-    excess = max(0, len(away) - MAX_AWAY)
-    return sorted(away, key=lambda link: (link.answered_s is not None, link.gone_s or 0.0))[:excess]
+    excess = max(0, len(away) - MAX_DISCONNECTED)
+    return sorted(away, key=lambda link: (link.replied_s is not None, link.gone_s or 0.0))[:excess]
 
 
 def topics_of(robot: Robot) -> list[str]:

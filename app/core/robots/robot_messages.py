@@ -8,10 +8,10 @@ from app.core.network.mailbox import Batch
 from app.core.robots.own_messages import OwnMessages, mapping_of
 from app.core.robots.robot_link import FINAL_STATES, Payload, RobotLink
 from app.core.robots.stop.moved_robots import MovedRobots
-from app.core.robots.tries import Tries
+from app.core.robots.tries import ManualInvocations
 from app.robots import rize
 from app.robots.held_messages import HeldMessages
-from app.robots.identity import may_move, said, said_of_stop
+from app.robots.identity import is_may_move_error, safe_error_text, stop_error_text
 from nep.i18n import _
 from nep.messages.message import Message
 
@@ -26,7 +26,7 @@ class RobotMessages:
     """
 
     def __init__(
-        self, own: OwnMessages, tries: Tries, moved: MovedRobots, clock: Callable[[], float]
+        self, own: OwnMessages, tries: ManualInvocations, moved: MovedRobots, clock: Callable[[], float]
     ) -> None:
         self._own, self._tries, self._moved, self._clock = own, tries, moved, clock
         self._held: dict[str, HeldMessages] = {}
@@ -38,9 +38,9 @@ class RobotMessages:
         for message in answers.messages if answers is not None else ():
             is_own = self._own.is_from(link, message)
             if is_own:
-                self._answer(link, message)
+                self._apply_reply(link, message)
             elif is_own is None:
-                self._held.setdefault(link.name, HeldMessages(per_publisher=MAX_HELD)).put(message)
+                self._held.setdefault(link.name, HeldMessages(per_publisher=MAX_HELD)).add(message)
         for sensor in link.robot.sensors:
             if sensor.is_image:
                 continue
@@ -50,16 +50,16 @@ class RobotMessages:
         topic = link.robot.topics.state or ""
         link.drawing = self._own.newest(link, batches.get(topic), topic) or link.drawing
 
-    def release_held(self, links: Mapping[str, RobotLink]) -> None:
+    def apply_held(self, links: Mapping[str, RobotLink]) -> None:
         """Apply the stored replies whose publishers the new graph lists; discard the others."""
         held, self._held = self._held, {}
         for name, messages in held.items():
             link = links.get(name)
             for message in messages.pop_all() if link is not None else ():
                 if link is not None and self._own.is_from(link, message):
-                    self._answer(link, message)
+                    self._apply_reply(link, message)
 
-    def forget(self, name: str) -> None:
+    def discard(self, name: str) -> None:
         """Discard the stored replies of a robot."""
         self._held.pop(name, None)
 
@@ -68,18 +68,18 @@ class RobotMessages:
         settled, self._settled = tuple(self._settled), {}
         return settled
 
-    def _answer(self, link: RobotLink, message: Message) -> None:
+    def _apply_reply(self, link: RobotLink, message: Message) -> None:
         answer = mapping_of(message)
         if answer is not None and link.robot.dialect == "rize":
-            answer = rize.from_answer(answer)
+            answer = rize.from_reply(answer)
         if answer is not None:
-            self._tries.answer(link, answer)
+            self._tries.apply_reply(link, answer)
             if answer.get("op") == "alive":
-                self._take_heartbeat(link, answer)
+                self._apply_heartbeat(link, answer)
             else:
-                self._take_final(link, answer)
+                self._apply_final_reply(link, answer)
 
-    def _take_final(self, link: RobotLink, answer: Payload) -> None:
+    def _apply_final_reply(self, link: RobotLink, answer: Payload) -> None:
         # A final reply ends the motion, unless its error reports that the robot may still move.
         state = answer.get("state")
         if not isinstance(state, str) or state not in FINAL_STATES:
@@ -87,18 +87,20 @@ class RobotMessages:
         if answer.get("op") not in (None, "invoke"):
             return
         id, error = answer.get("id"), answer.get("error")
-        if isinstance(id, str) and not may_move(link.name, said(error) if error else ""):
-            self._moved.ended(link.name, id, link.identity)
+        if isinstance(id, str) and not is_may_move_error(link.name, safe_error_text(error) if error else ""):
+            self._moved.end_motion(link.name, id, link.identity)
 
-    def _take_heartbeat(self, link: RobotLink, answer: Payload) -> None:
+    def _apply_heartbeat(self, link: RobotLink, answer: Payload) -> None:
         # Drivers omit counts that are zero.
         now_s = self._clock()
         link.rejected.update(answer.get("rejected", 0), now_s)
         link.errors.update(answer.get("errors", 0), now_s)
         if "not_ended" not in answer:
             return
-        before, link.goes_on = link.goes_on, ""
+        before, link.unended_actions = link.unended_actions, ""
         if answer["not_ended"]:
-            link.goes_on = said_of_stop(link.name, answer.get("error") or _("an action is still running"))
-        elif before and link.not_stopped:
+            link.unended_actions = stop_error_text(
+                link.name, answer.get("error") or _("an action is still running")
+            )
+        elif before and link.stop_problem:
             self._settled[link.name] = None

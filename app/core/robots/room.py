@@ -19,10 +19,10 @@ from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.protocol.graph_view import GraphView
 
-KEPT = "room"
-QUIET_S = 1.0
+SETTING_KEY = "room"
+SAVE_DELAY_S = 1.0
 """Time without changes after which the room is saved."""
-NO_ROOM = lazy("can't share the room of the virtual robots: {error}")
+SHARING_FAILED = lazy("can't share the room of the virtual robots: {error}")
 
 
 class SessionRoom:
@@ -41,7 +41,7 @@ class SessionRoom:
     ) -> None:
         self._settings, self._watches, self._submit, self._clock = settings, watches, submit, clock
         self._map = RoomMap(clock_ns=clock_ns)
-        self._map.merge(settings.get(KEPT, {}))
+        self._map.merge(settings.get(SETTING_KEY, {}))
         self._watch: Watch | None = None
         self._publisher: Publisher | None = None
         self._is_opening = False
@@ -65,7 +65,7 @@ class SessionRoom:
 
     def move(self, name: str, x: float, y: float, robots: Mapping[str, tuple[float, float, float]]) -> bool:
         """Move an object within the walls; return False if a robot (x, y, radius) is in the way."""
-        moved = self.room.moved(name, x, y).thing(name)
+        moved = self.room.with_moved(name, x, y).thing(name)
         for there in robots.values():
             if isinstance(moved, (Box, Person)) and _touches(moved, *there):
                 return False
@@ -81,9 +81,9 @@ class SessionRoom:
         """Remove an object; return False if it doesn't exist."""
         return self._publish() if self._map.remove(name) else False
 
-    def put_back(self) -> None:
+    def reset(self) -> None:
         """Reset the room to its initial state."""
-        self._map.put_back()
+        self._map.restore_start()
         self._publish()
 
     # -- input from the session -----------------------------------------------------------------------
@@ -97,7 +97,7 @@ class SessionRoom:
         def open_it(node: Node) -> None:
             self._publisher = node.new_pub(TOPIC, "json", latched=True)
 
-        self._submit(NO_ROOM, open_it)
+        self._submit(SHARING_FAILED, open_it)
         self._published_revision = -1  # the robots don't know the saved room
 
     def add_messages(self, batches: Mapping[str, Batch]) -> None:
@@ -118,7 +118,7 @@ class SessionRoom:
             self._publish()
         if revision != self._last_revision:
             self._last_revision, self._changed_s = revision, self._clock()
-        elif revision != self._saved_revision and self._clock() - self._changed_s >= QUIET_S:
+        elif revision != self._saved_revision and self._clock() - self._changed_s >= SAVE_DELAY_S:
             self.save()
             if revision != self._published_revision:
                 # later subscribers receive it from here, even if the program that changed it has ended
@@ -129,7 +129,7 @@ class SessionRoom:
         if self._map.revision != self._saved_revision:
             self._saved_revision = self._map.revision
             with suppress(SettingsError):
-                self._settings.set(KEPT, self._map.message())
+                self._settings.set(SETTING_KEY, self._map.message())
 
     def close(self) -> None:
         """Save the room and close the publisher."""

@@ -9,19 +9,19 @@ from collections.abc import Callable, Iterable, Mapping
 from app.core.robots.robot_link import FINAL_STATES, SENDER, Invocation, Payload, RobotLink
 from app.robots import rize
 from app.robots.description.description import Action, Robot
-from app.robots.identity import said
+from app.robots.identity import safe_error_text
 from nep.i18n import _, number
 from nep.text import bounded_str
 
-FIRST_ANSWER_S = 3.0
+FIRST_REPLY_TIMEOUT_S = 3.0
 """Time limit for the first reply to a command."""
 GRACE_S = 0.5
 """Time after an action's time limit, which the robot should enforce, until Studio ends the invocation."""
-BEATS_MISSED = 4
+MAX_MISSED_HEARTBEATS = 4
 MIN_SILENCE_S = 2.0
 
 
-class Tries:
+class ManualInvocations:
     """Manual invocations. Not thread-safe: use it from the window's thread."""
 
     def __init__(
@@ -34,7 +34,7 @@ class Tries:
         # `send` sends a command to a robot; `rest` is called with its name once it is idle.
         self._send, self._rest, self._clock, self._wall = send, rest, clock, wall
 
-    def begin(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
+    def start(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
         """Send an invocation. It fails immediately if the robot can't be reached."""
         invocation = Invocation(
             uuid.uuid4().hex,
@@ -43,11 +43,11 @@ class Tries:
             clock=self._clock,
             given=dict(input),
             timeout_s=action.timeout_s,
-            at_s=self._wall(),
+            sent_at_s=self._wall(),
         )
         link.invocations[action.name] = invocation
-        link.tried.append(invocation)
-        link.heard_s = self._clock()
+        link.past_invocations.append(invocation)
+        link.last_contact_s = self._clock()
         if not self._send(link, command_of(link.robot, invocation, input)):
             self._end(
                 link,
@@ -60,13 +60,13 @@ class Tries:
     def cancel(self, link: RobotLink, action: str) -> None:
         """Cancel the invocation of an action if it is still running."""
         invocation = link.invocations.get(action)
-        if invocation is not None and invocation.running:
+        if invocation is not None and invocation.is_running:
             self._send_cancel(link, invocation)
 
-    def answer(self, link: RobotLink, answer: Payload) -> None:
+    def apply_reply(self, link: RobotLink, answer: Payload) -> None:
         """Apply a reply of the robot. Replies to other programs only show that the robot responds."""
-        link.heard_s = link.answered_s = self._clock()
-        link.mute = False
+        link.last_contact_s = link.replied_s = self._clock()
+        link.is_unresponsive = False
         for invocation in link.running:
             if invocation.id != answer.get("id") or answer.get("op") not in (None, "invoke"):
                 continue
@@ -87,11 +87,11 @@ class Tries:
             made.replaces = _names(answer["replaces"]) or made.replaces
         error = answer.get("error")
         if state in FINAL_STATES:
-            self._end(link, made, state, said(error) if error else None)
+            self._end(link, made, state, safe_error_text(error) if error else None)
             return
         made.state = state
-        if state == "running" and made.begun_s is None:
-            made.begun_s = self._clock()
+        if state == "running" and made.execution_start_s is None:
+            made.execution_start_s = self._clock()
 
     def check_timeouts(self, links: Iterable[RobotLink]) -> None:
         """End invocations of robots that don't reply, and those that exceed their time limit."""
@@ -103,23 +103,23 @@ class Tries:
     def _check_invocation(self, link: RobotLink, made: Invocation, now: float) -> None:
         robot = link.robot
         if robot.dialect == "native" and made.state == "sent":
-            if now - made.started_s > FIRST_ANSWER_S:
+            if now - made.started_s > FIRST_REPLY_TIMEOUT_S:
                 self._mark_unresponsive(
                     link,
                     made,
                     _("{robot} is not responding. Check that it is switched on.").format(robot=link.name),
                 )
             return
-        silence = max(MIN_SILENCE_S, BEATS_MISSED * robot.beat_s) if robot.beat_s else None
-        if silence is not None and now - link.heard_s > silence:
+        silence = max(MIN_SILENCE_S, MAX_MISSED_HEARTBEATS * robot.beat_s) if robot.beat_s else None
+        if silence is not None and now - link.last_contact_s > silence:
             error = _(
                 "{robot} stopped responding. Check that it is switched on, or press Stop to stop it."
             ).format(robot=link.name)
             self._mark_unresponsive(link, made, error)
             return
-        left_s = made.left_s
+        left_s = made.remaining_s
         if left_s is not None and left_s < -GRACE_S:
-            link.mute = True  # until it replies
+            link.is_unresponsive = True  # until it replies
             self._send_cancel(link, made)
             self._end(
                 link,
@@ -131,7 +131,7 @@ class Tries:
             )
 
     def _mark_unresponsive(self, link: RobotLink, made: Invocation, sentence: str) -> None:
-        link.mute = True
+        link.is_unresponsive = True
         self._send_cancel(link, made)  # a robot that resumes must not continue
         self._end(link, made, "failed", sentence)
 

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
     from app.core.storage.settings import Settings
 
-SOUND = "robots_heard"
+SOUND_SETTING = "robots_heard"
 """Setting: True if robots are audible."""
-ENDED = 0.9
+FINISHED_RATIO = 0.9
 """Share of a text after which it counts as finished, because a voice may be slower than the speech bubble."""
 MAX_WAITING = 4
 PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
@@ -34,7 +34,7 @@ class Speaker(Protocol):
     """Sound output for robots. No method blocks or raises; a computer without sound stays silent."""
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """True if a voice is speaking."""
 
     @property
@@ -62,36 +62,36 @@ class Utterance:
     """Text to be spoken by a robot, pending or playing."""
 
     robot: str
-    words: str
+    text: str
     language: str
     volume: float
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class RobotSound:
     """Audible part of a robot's drawing. `played` and `spoken` are the progress from 0 to 1."""
 
     speech: str = ""
-    spoken: float = 0.0
+    spoken_fraction: float = 0.0
     language: str = "en"
     volume: float = 0.6
     sound: int = 0
-    played: float = 0.0
+    played_fraction: float = 0.0
     notes: Notes = ()
 
     @classmethod
-    def parse(cls, drawing: Mapping[str, object]) -> Heard:
+    def parse(cls, drawing: Mapping[str, object]) -> RobotSound:
         """Parse a drawing; missing and malformed parts become silence."""
         speech, sound = drawing.get("speech"), drawing.get("sound")
         played = sound if isinstance(sound, Mapping) else {}
         number = played.get("number")
         return cls(
             speech=speech.strip() if isinstance(speech, str) else "",
-            spoken=_share(drawing.get("spoken")),
+            spoken_fraction=_fraction(drawing.get("spoken")),
             language=str(drawing.get("language") or "en"),
-            volume=_share(drawing.get("volume"), 60.0, 100.0),
+            volume=_fraction(drawing.get("volume"), 60.0, 100.0),
             sound=number if isinstance(number, int) else 0,
-            played=_share(played.get("played")),
+            played_fraction=_fraction(played.get("played")),
             notes=_notes(played.get("notes")),
         )
 
@@ -116,7 +116,7 @@ class RobotVoices:
         self._clock = clock
         self.speaker: Speaker | None = None
         self._watches: dict[str, Watch] = {}
-        self._last_drawings: dict[str, tuple[object, Heard]] = {}
+        self._last_drawings: dict[str, tuple[object, RobotSound]] = {}
         self._waiting: deque[Utterance] = deque()
         self._current: Utterance | None = None
         self._until_s = 0.0
@@ -124,14 +124,14 @@ class RobotVoices:
         self._stops = fleet.stops
 
     @property
-    def on(self) -> bool:
+    def is_on(self) -> bool:
         """True if robots are audible."""
-        return bool(self._settings.get(SOUND, True))
+        return bool(self._settings.get(SOUND_SETTING, True))
 
-    def switch(self, *, on: bool) -> None:
+    def set_on(self, *, on: bool) -> None:
         """Make robots audible or silent. Raises SettingsError if the choice can't be saved."""
         try:
-            self._settings.set(SOUND, on)
+            self._settings.set(SOUND_SETTING, on)
         finally:
             if not on:
                 self.silence()
@@ -142,18 +142,18 @@ class RobotVoices:
         return self.speaker.problem if self.speaker is not None else ""
 
     @property
-    def saying(self) -> Utterance | None:
+    def current(self) -> Utterance | None:
         """Text that is being spoken."""
         return self._current
 
-    def follow(self) -> None:
+    def update(self) -> None:
         """Play new speech and sounds of the connected robots. Called at each tick."""
         if self.speaker is None:
             return
-        there = {link.name: link for link in self._fleet.connected if _is_heard(link)} if self.on else {}
+        there = {link.name: link for link in self._fleet.connected if _is_audible(link)} if self.is_on else {}
         for name in self._watches.keys() - there.keys():
             self._watches.pop(name).close()
-            self._stop_interrupted(name, self._last_drawings.pop(name, (None, Heard()))[1], Heard())
+            self._stop_interrupted(name, self._last_drawings.pop(name, (None, RobotSound()))[1], RobotSound())
         stopped = self._fleet.stops != self._stops
         if stopped:
             self._stops = self._fleet.stops
@@ -165,48 +165,57 @@ class RobotVoices:
         self._speak_next(self.speaker)
 
     def _process(self, name: str, drawing: Mapping[str, object] | None, *, is_heard: bool) -> None:
-        last_drawing, before = self._last_drawings.get(name, (None, Heard()))
+        last_drawing, before = self._last_drawings.get(name, (None, RobotSound()))
         if drawing is None or drawing is last_drawing:
             return
-        now = Heard.parse(drawing)
+        now = RobotSound.parse(drawing)
         first = name not in self._last_drawings
         self._last_drawings[name] = (drawing, now)
         self._stop_interrupted(name, before, now)
-        if now.speech and is_heard and (now.speech != before.speech or now.spoken < before.spoken):
-            self._queue(Utterance(name, now.speech, now.language, now.volume))
+        if (
+            now.speech
+            and is_heard
+            and (now.speech != before.speech or now.spoken_fraction < before.spoken_fraction)
+        ):
+            self._enqueue(Utterance(name, now.speech, now.language, now.volume))
         if now.notes and is_heard and not first and now.sound != before.sound and self.speaker is not None:
             self._playing_robot = name
             self.speaker.play(now.notes, now.volume)
 
-    def _stop_interrupted(self, name: str, before: Heard, now: Heard) -> None:
+    def _stop_interrupted(self, name: str, before: RobotSound, now: RobotSound) -> None:
         if self.speaker is None:
             return
-        if before.speech and before.spoken < ENDED and now.speech != before.speech:
+        if before.speech and before.spoken_fraction < FINISHED_RATIO and now.speech != before.speech:
             self._waiting = deque(each for each in self._waiting if each.robot != name)
             if self._current is not None and self._current.robot == name:
                 self._current = None
                 self.speaker.stop_voice()
-        if before.notes and before.played < ENDED and not now.notes and self._playing_robot == name:
+        if (
+            before.notes
+            and before.played_fraction < FINISHED_RATIO
+            and not now.notes
+            and self._playing_robot == name
+        ):
             self._playing_robot = ""
             self.speaker.play((), 0.0)
 
-    def _queue(self, said: Utterance) -> None:
+    def _enqueue(self, said: Utterance) -> None:
         if len(self._waiting) >= MAX_WAITING:
             lost = self._waiting.popleft()
-            words = _("“{words}” was shown but not spoken: others were speaking").format(words=lost.words)
+            words = _("“{words}” was shown but not spoken: others were speaking").format(words=lost.text)
             self._tell("info", lost.robot, words)
         self._waiting.append(said)
 
     def _speak_next(self, speaker: Speaker) -> None:
-        if self._current is not None and speaker.busy:
+        if self._current is not None and speaker.is_busy:
             if self._clock() < self._until_s:
                 return
             speaker.stop_voice()
         self._current = None
         if self._waiting:
             utterance = self._current = self._waiting.popleft()
-            self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(utterance.words)
-            speaker.speak(utterance.words, utterance.language, utterance.volume)
+            self._until_s = self._clock() + PATIENCE_S + PATIENCE_PER_LETTER_S * len(utterance.text)
+            speaker.speak(utterance.text, utterance.language, utterance.volume)
 
     def silence(self) -> None:
         """Stop and discard all speech and sounds."""
@@ -223,11 +232,11 @@ class RobotVoices:
         self._watches.clear()
 
 
-def _is_heard(link: RobotLink) -> bool:
-    return link.virtual and not link.mute
+def _is_audible(link: RobotLink) -> bool:
+    return link.virtual and not link.is_unresponsive
 
 
-def _share(value: object, default: float = 0.0, whole: float = 1.0) -> float:
+def _fraction(value: object, default: float = 0.0, whole: float = 1.0) -> float:
     if not isinstance(value, (int, float)) or isinstance(value, bool):
         value = default
     # The bounds first: JSON has integers that don't fit a float.

@@ -13,18 +13,18 @@ class AskedQuestion:
 
     run: int
     number: int
-    words: str
+    text: str
     choices: tuple[str, ...] = ()
 
 
-class Asking:
+class OpenQuestion:
     """Stores the open question of the program; there is at most one."""
 
     def __init__(self) -> None:
         self.question: AskedQuestion | None = None
         self._runner: Runner | None = None
 
-    def begin(self, runner: Runner) -> None:
+    def reset(self, runner: Runner) -> None:
         """Reset for a new program."""
         self.question, self._runner = None, runner
 

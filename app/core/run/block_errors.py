@@ -9,7 +9,7 @@ from app.blocks.model.workspace import saved_blocks
 from app.core.run.wanted import RequestedRun
 from app.core.storage import deep_json
 
-_CONTENT = ("type", "fields", "inputs", "extraState", "enabled", "disabledReasons")
+_CONTENT_KEYS = ("type", "fields", "inputs", "extraState", "enabled", "disabledReasons")
 
 
 class BlockErrors:
@@ -26,28 +26,28 @@ class BlockErrors:
         self._ran: Mapping[str, object] = {}
         self._checked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
-    def begin(self, wanted: RequestedRun) -> None:
+    def start_run(self, wanted: RequestedRun) -> None:
         """Clear the errors of the previous run."""
         self.by_block, self._wanted, self._ran = {}, wanted, wanted.document.workspace
 
-    def put(self, errors: Mapping[str, str], *, not_started: bool) -> None:
+    def set_errors(self, errors: Mapping[str, str], *, not_started: bool) -> None:
         """Set the errors that prevented the start or stopped the program."""
         self.by_block, self._not_started, self._checked = errors, not_started, None
 
-    def forget_repaired(self) -> bool:
+    def discard_fixed(self) -> bool:
         """Remove the errors of fixed blocks; return True if any were removed."""
         if not self.by_block or self._wanted is None:
             return False
         count = len(self.by_block)
         if self._not_started:
-            self.by_block = self._unsolved(self._wanted)
+            self.by_block = self._unsolved_errors(self._wanted)
         elif self._checked != (edits := self._wanted.document.edits):
             self._checked = edits
-            self.by_block = self._unchanged(self._wanted.document.workspace)
+            self.by_block = self._unchanged_errors(self._wanted.document.workspace)
         return len(self.by_block) < count
 
-    def _unsolved(self, wanted: RequestedRun) -> Mapping[str, str]:
-        newest = wanted.document.newest()
+    def _unsolved_errors(self, wanted: RequestedRun) -> Mapping[str, str]:
+        newest = wanted.document.newest_program()
         if newest is None or newest is self._checked:
             return self.by_block
         self._checked = newest
@@ -55,18 +55,18 @@ class BlockErrors:
         wrong = {} if program is None else wanted.problems(program)
         return {block: words for block, words in self.by_block.items() if wrong.get(block) == words}
 
-    def _unchanged(self, workspace: Mapping[str, object]) -> Mapping[str, str]:
+    def _unchanged_errors(self, workspace: Mapping[str, object]) -> Mapping[str, str]:
         before, now = (_contents(each, self.by_block) for each in (self._ran, workspace))
         return {
             block: words
             for block, words in self.by_block.items()
-            if block in now and deep_json.same(before.get(block), now[block])
+            if block in now and deep_json.are_equal(before.get(block), now[block])
         }
 
 
 def _contents(workspace: Mapping[str, object], ids: Mapping[str, str]) -> dict[str, object]:
     return {
-        str(block["id"]): {name: block[name] for name in _CONTENT if name in block}
+        str(block["id"]): {name: block[name] for name in _CONTENT_KEYS if name in block}
         for block in saved_blocks(workspace)
         if block.get("id") in ids
     }

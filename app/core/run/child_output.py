@@ -9,7 +9,7 @@ from typing import IO
 
 MAX_LINE_LENGTH = 1_000_000
 CHUNK = 65_536
-MARK = b'{"is"'
+PROTOCOL_PREFIX = b'{"is"'
 """First bytes of each line of the protocol; all other output is counted but not parsed."""
 LINES_PER_S = 1_000
 BYTES_PER_S = 20_000_000
@@ -34,19 +34,19 @@ class Output:
         held = b""
         while chunk := self._read():
             whole, end, held = (held + chunk).rpartition(b"\n")
-            yield from self._protocol(whole + end)
+            yield from self._protocol_lines(whole + end)
             if len(held) > MAX_LINE_LENGTH:  # a line that is too long isn't a protocol line
                 self.strange_bytes += len(held) - 1
                 held = b"-"  # placeholder, so that the rest of the line isn't parsed either
             self._throttle(read=len(chunk))
         self.strange_bytes += len(held)
 
-    def _protocol(self, whole: bytes) -> Iterator[bytes]:
+    def _protocol_lines(self, whole: bytes) -> Iterator[bytes]:
         # Other lines are skipped in one piece: a loop over a flood of short lines would keep the interpreter
         # from the thread that stops the program.
         at = 0
         while at < len(whole):
-            if whole.startswith(MARK, at):
+            if whole.startswith(PROTOCOL_PREFIX, at):
                 end = whole.index(b"\n", at)
                 if end - at <= MAX_LINE_LENGTH:
                     self._throttle(lines=1)
@@ -55,7 +55,7 @@ class Output:
                     self.strange_bytes += end + 1 - at
                 at = end + 1
                 continue
-            found = whole.find(b"\n" + MARK, at)
+            found = whole.find(b"\n" + PROTOCOL_PREFIX, at)
             end = len(whole) if found < 0 else found + 1
             strange = whole[at:end]
             while b"\n\n" in strange:  # skip empty lines
@@ -80,7 +80,7 @@ class Output:
             self._stopped.wait(PAUSE_S)
 
 
-class Gate:
+class RateLimiter:
     """Rate limiter that counts rejected items."""
 
     def __init__(self, per_second: int, clock: Callable[[], float] = time.monotonic) -> None:
@@ -99,7 +99,7 @@ class Gate:
         self._passed += 1
         return True
 
-    def take_kept_back(self) -> int:
+    def take_rejected_count(self) -> int:
         """Return and clear the number of rejected items; 0 until items can pass again."""
         if self._clock() - self._second < 1.0 and self._passed >= self._per_second:
             return 0

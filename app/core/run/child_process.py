@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 else:
     psutil = lazy_module("psutil")
 
-MAX_BYTES = 1_000_000_000
+MAX_MEMORY_BYTES = 1_000_000_000
 """Maximum memory of a program and its child processes in bytes."""
 CHILD_CHECK_INTERVAL_S = 1.0
 """Interval of checks for new child processes; the memory of the program is checked more often."""
@@ -36,7 +36,7 @@ class ChildProcess:
         command: Sequence[str],
         cwd: Path | None,
         *,
-        most_bytes: int = MAX_BYTES,
+        most_bytes: int = MAX_MEMORY_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # Raises RunnerError if the process can't be started.
@@ -62,7 +62,7 @@ class ChildProcess:
         self._process = _process(self.popen.pid)
 
     @property
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         """True if the process has ended."""
         return self.popen.poll() is not None
 
@@ -73,7 +73,7 @@ class ChildProcess:
         if self._clock() >= self._next_family_s:
             self._next_family_s = self._clock() + CHILD_CHECK_INTERVAL_S
             self._family = _descendants(self._process)
-        if sum(map(_used, (self._process, *self._family))) > self._most_bytes:
+        if sum(map(_memory_bytes, (self._process, *self._family))) > self._most_bytes:
             self.too_large = True
             self.kill()
 
@@ -87,12 +87,12 @@ class ChildProcess:
 
     def kill(self) -> None:
         """Kill the process and its children."""
-        if self._process is not None and not self.ended:
+        if self._process is not None and not self.has_ended:
             self._family = [*self._family, *_descendants(self._process)]
         self.popen.kill()
-        self.end_family()
+        self.kill_descendants()
 
-    def end_family(self) -> None:
+    def kill_descendants(self) -> None:
         """Kill remaining child processes: the process group, and processes that left the group."""
         if os.name == "posix":
             with contextlib.suppress(ProcessLookupError, PermissionError):  # the group is empty
@@ -130,7 +130,7 @@ def _descendants(process: psutil.Process) -> list[psutil.Process]:
         return []
 
 
-def _used(process: psutil.Process) -> int:
+def _memory_bytes(process: psutil.Process) -> int:
     try:
         return int(process.memory_info().rss)
     except psutil.Error:

@@ -17,24 +17,24 @@ from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.documents.document import Document
 from app.core.robots.fleet import Fleet
-from app.core.robots.motion.permission import wanted_by
-from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, StopDone, StopReport
+from app.core.robots.motion.permission import actions_by_robot
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStopped, StopDone, StopReport
 from app.core.robots.stop.stopper import STOP_TIMEOUT_S as STOP_TIMEOUT_S
 from app.core.robots.stop.stopper import RobotStopper
-from app.core.run.asking import Asking
+from app.core.run.asking import OpenQuestion
 from app.core.run.block_errors import BlockErrors
 from app.core.run.edits_since_run import EditsSinceRun
 from app.core.run.program_robots import ProgramRobots, owners_of
 from app.core.run.run_warnings import RunWarnings
 from app.core.run.runner import Runner, RunnerEvent
 from app.core.run.stop_job import stop_program, stop_robot
-from app.core.run.stop_news import StopNews
+from app.core.run.stop_news import StopReporter
 from app.core.run.trial import Trial, TriedValue
 from app.core.run.view import (
     RunState,
     RunView,
-    place_of,
-    result_words,
+    block_label,
+    result_text,
     view_of,
 )
 from app.core.run.wanted import OpenBehaviours, RequestedRun
@@ -87,7 +87,7 @@ class Runs:
         self._runner: Runner | None = None
         self._current_request: RequestedRun | None = None  # the current run, else the last
         self._trial = Trial()
-        self.asking = Asking()
+        self.asking = OpenQuestion()
         self._pending_request: RequestedRun | None = (
             None  # begins once the current run is proven to be stopped
         )
@@ -97,8 +97,8 @@ class Runs:
         self._program_key: str | None = None  # robots reject later commands of the last program by its key
         self._labels: Mapping[str, str] = {}
         self._robots = ProgramRobots(fleet)
-        fleet.used = lambda: self.used
-        self._news = StopNews(fleet, alerts, console)
+        fleet.used = lambda: self.used_robots
+        self._news = StopReporter(fleet, alerts, console)
         self._run = RunState()
         self._view: tuple[RunState, Document, RunView] | None = None
         self._stop_number = self._stop_mark = 0
@@ -126,7 +126,7 @@ class Runs:
         return self._run
 
     @property
-    def used(self) -> tuple[str, ...]:
+    def used_robots(self) -> tuple[str, ...]:
         """Names of the robots that the running or paused program uses."""
         return self._used if self.active else ()
 
@@ -148,21 +148,24 @@ class Runs:
     def tick(self) -> None:
         """Check for edits, changed robots and breakpoints, and refresh `view`. Called at each tick."""
         self._view = None
-        if self._run.nothing_in is not None and self._run.nothing_in is not self._documents.current.newest():
-            self._run = replace(self._run, nothing_in=None)  # another tab, or an edit
+        if (
+            self._run.unrunnable_program is not None
+            and self._run.unrunnable_program is not self._documents.current.newest_program()
+        ):
+            self._run = replace(self._run, unrunnable_program=None)  # another tab, or an edit
         self._settle()
         edits = 0 if self.document is None else self.document.edits
-        if self._warnings.clear_if_edited(edits) | self._errors.forget_repaired():
+        if self._warnings.clear_if_edited(edits) | self._errors.discard_fixed():
             self.blocks_revision += 1
         if self.active:
-            self._follow_breakpoints()
+            self._update_breakpoints()
         edited = self.active and self._edits.has_edits()
-        if edited != self._run.edited:
-            self._run = replace(self._run, edited=edited)
+        if edited != self._run.is_edited:
+            self._run = replace(self._run, is_edited=edited)
 
-    def _follow_breakpoints(self) -> None:
+    def _update_breakpoints(self) -> None:
         # Sends changed breakpoints to the running program.
-        newest = self.document.newest() if self.document is not None else None
+        newest = self.document.newest_program() if self.document is not None else None
         if newest is None or self._runner is None or newest.breakpoints == self._breakpoints:
             return
         self._breakpoints = newest.breakpoints
@@ -187,7 +190,7 @@ class Runs:
         """
         run = self._run
         if run.state == "paused":
-            self.go_on()
+            self.resume()
         elif run.state != "running" or self._clock() - run.started_s >= DOUBLE_CLICK_S:
             self._request(RequestedRun(self._documents.current))
 
@@ -198,7 +201,7 @@ class Runs:
 
     def try_stack(self, stack: Stack) -> None:
         """Run one stack of the current behaviour, after stopping a running program."""
-        variable = stack.variable_in(self._documents.current.workspace)
+        variable = stack.variable_id(self._documents.current.workspace)
         if variable is not None:
             self._show_variable(stack, variable)
             return
@@ -213,7 +216,7 @@ class Runs:
         value = self.values.get(id) if self.document is document else None
         self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
 
-    def concerns(self, document: Document) -> bool:
+    def is_running_or_pending(self, document: Document) -> bool:
         """Return True if this behaviour is running, or will run once another program has stopped."""
         return (self.active and self.document is document) or (
             self._pending_request is not None and self._pending_request.document is document
@@ -222,18 +225,18 @@ class Runs:
     def _request(self, wanted: RequestedRun) -> None:
         # Runs once the running program has stopped and its robots are proven to have stopped.
         if self._run.state in {"ready", "proven"}:
-            self._begin(wanted)
+            self._start(wanted)
             return
         if self.active:
             self._stop(self._used)
         if self._run.state == "stopping":
             self._pending_request = wanted
-            self._run = replace(self._run, restarts=True)
+            self._run = replace(self._run, is_restarting=True)
 
     def step(self) -> None:
         """Run the next block of a paused program or the first of a new one; pause a running program."""
         if self._run.state in {"ready", "proven"}:
-            self._begin(RequestedRun(self._documents.current, paused=True))
+            self._start(RequestedRun(self._documents.current, paused=True))
         elif self._run.state == "running":
             self.pause()
         elif self._run.state == "paused" and self._runner is not None:
@@ -245,12 +248,12 @@ class Runs:
         if self._runner is not None:
             self._runner.set_pace(seconds)
 
-    def put_variable(self, id: str, value: str | float | bool) -> bool:
+    def set_variable(self, id: str, value: str | float | bool) -> bool:
         """Set a variable of the running program; return False if the program has no such variable."""
         variable = self._variables.get(id)
         if self._runner is None or not self.active or variable is None or not variable.python:
             return False
-        self._runner.put_variable(variable.python, value)
+        self._runner.set_variable(variable.python, value)
         return True
 
     def pause(self) -> None:
@@ -258,14 +261,16 @@ class Runs:
         if self._run.state == "running" and self._runner is not None:
             self._runner.pause()
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """Resume a paused program."""
         run = self._run
         if run.state == "paused" and self._runner is not None:
-            self._runner.go_on()
+            self._runner.resume()
             held_s = 0.0 if run.pause_began_s is None else self._clock() - run.pause_began_s
-            self._run = replace(self._run, state="running", held_s=run.held_s + held_s, pause_began_s=None)
-            self._mark(stopped=())
+            self._run = replace(
+                self._run, state="running", paused_s=run.paused_s + held_s, pause_began_s=None
+            )
+            self._mark_blocks(stopped=())
 
     def stop(self) -> None:
         """Stop the program and every robot; the run bar shows their replies."""
@@ -285,10 +290,10 @@ class Runs:
             return
         self.also_stops()
         self._stopped_again.discard(name)
-        self._stop_one(name)
+        self._stop_in_thread(name)
 
-    def _stop_one(self, name: str) -> None:
-        self._fleet.told_to_stop([name])
+    def _stop_in_thread(self, name: str) -> None:
+        self._fleet.mark_stopping([name])
         mark = self._fleet.moved.mark
         work = partial(stop_robot, self._post_event, self._network.stopper, name, mark)
         threading.Thread(target=work, name="studio-stop-one", daemon=True).start()
@@ -302,31 +307,31 @@ class Runs:
         report, state = self._run.report, self._run.state
         if name in self._stopped_again:
             return
-        if state == "unanswered" and report is not None and name in report.silent:
+        if state == "unanswered" and report is not None and name in report.unconfirmed_names:
             self._stopped_again.add(name)
-            self._stop(self._run.asked)
+            self._stop(self._run.robots_to_stop)
         elif state in {"ready", "proven"}:
             self._stopped_again.add(name)
-            self._stop_one(name)
+            self._stop_in_thread(name)
 
-    def follow_robots(self) -> None:
+    def update_robots(self) -> None:
         """Report new and restarted robots that are allowed to move to the running program."""
         if self.active:
-            self._robots.follow()
+            self._robots.update()
 
-    def confirm_still(self) -> None:
+    def confirm_stopped(self) -> None:
         """Apply the user's confirmation that the robots without a reply are not moving."""
         if self._run.state == "unanswered" and self._run.report is not None:
-            silent = self._run.report.silent
-            self._fleet.stands_still(silent)
+            silent = self._run.report.unconfirmed_names
+            self._fleet.confirm_stopped(silent)
             if self._network.stopper is not None:
-                self._network.stopper.forget_late(silent)
+                self._network.stopper.discard_late(silent)
             self._settle()
 
     def _settle(self) -> None:
         # Enables Run once every robot of the last Stop is proven or confirmed to have stopped.
         report = self._run.report if self._run.state == "unanswered" else None
-        if report is not None and not any(name in self._fleet.moved for name in report.silent):
+        if report is not None and not any(name in self._fleet.moved for name in report.unconfirmed_names):
             self._run = replace(self._run, state="ready", report=None)
             self._alerts.resolve("stop")
 
@@ -343,23 +348,23 @@ class Runs:
         """Apply an event of the program's process; events of earlier runs are ignored."""
         if self._runner is None or event.run != self._runner.run:
             return
-        run = self._begun(event)
+        run = self._mark_started(event)
         self.asking.apply(event)
         match event.kind:
             case "running" if run.state in {"running", "paused"}:
-                if event.says and event.says != run.says:
-                    self._run = replace(self._run, says=event.says)
-                    self._console.add("info", run.name, event.says)
-                self._mark(running=event.blocks, stopped=self.stopped_blocks)
+                if event.description and event.description != run.description:
+                    self._run = replace(self._run, description=event.description)
+                    self._console.add("info", run.name, event.description)
+                self._mark_blocks(running=event.blocks, stopped=self.stopped_blocks)
             case "paused" if run.state in {"running", "paused"}:
                 self._run = replace(
                     self._run,
                     state="paused",
-                    paused_at=place_of(event.says, event.blocks, self._labels),
+                    paused_at=block_label(event.description, event.blocks, self._labels),
                     pause_began_s=run.pause_began_s or self._clock(),
                     warning=event.text,
                 )
-                self._mark(stopped=event.blocks)
+                self._mark_blocks(stopped=event.blocks)
             case "error" if self.active:  # blocks interrupted by Stop fail; that is expected
                 self._on_error(event)
             case "warning" if self.active and self.document is not None:
@@ -372,86 +377,89 @@ class Runs:
             case "ended":
                 self._on_end(event)
 
-    def _begun(self, event: RunnerEvent) -> RunState:
+    def _mark_started(self, event: RunnerEvent) -> RunState:
         # The run's clock starts with the first event of its scripts.
-        if event.kind in {"running", "paused"} and self.active and not self._run.begun:
-            self._run = replace(self._run, begun=True, started_s=self._clock())
+        if event.kind in {"running", "paused"} and self.active and not self._run.is_started:
+            self._run = replace(self._run, is_started=True, started_s=self._clock())
         return self._run
 
-    def on_stop(self, event: StopDone | RobotAnswered | OneStopped | LateAnswer) -> None:
+    def on_stop(self, event: StopDone | RobotReplied | RobotStopped | LateReply) -> None:
         """Apply robots' replies to the newest Stop."""
-        if isinstance(event, OneStopped):
-            self._news.tell_fleet(event.report, event.mark)
-            self._news.tell_person(event.report, "stop")
-        elif isinstance(event, LateAnswer):
-            self._on_late(event)
+        if isinstance(event, RobotStopped):
+            self._news.update_fleet(event.report, event.mark)
+            self._news.notify_user(event.report, "stop")
+        elif isinstance(event, LateReply):
+            self._on_late_reply(event)
         elif event.number == self._stop_number:
-            if isinstance(event, RobotAnswered):
-                answered = (*self._run.answered, event.robot)
-                self._run = replace(self._run, answered=answered)
-                if event.robot.wrong or not event.robot.waits:
+            if isinstance(event, RobotReplied):
+                answered = (*self._run.replies, event.robot)
+                self._run = replace(self._run, replies=answered)
+                if event.robot.problem or not event.robot.is_waiting:
                     same = [robot for robot in answered if robot.name == event.robot.name]
-                    self._news.tell_fleet(StopReport(tuple(same), 0.0), self._stop_mark)
+                    self._news.update_fleet(StopReport(tuple(same), 0.0), self._stop_mark)
             else:
-                self._run = replace(self._run, dashed=bool(self.stopped_blocks))
-                self._take_report(event.report)
+                self._run = replace(self._run, has_stopped_blocks=bool(self.stopped_blocks))
+                self._apply_report(event.report)
 
-    def _take_report(self, report: StopReport) -> None:
+    def _apply_report(self, report: StopReport) -> None:
         # State first, sentences later: an error in formatting must not leave it "stopping".
-        state = "unanswered" if report.unproven else "proven" if report.proven else "ready"
+        state = "unanswered" if report.unproven else "proven" if report.is_proven else "ready"
         self._run = replace(self._run, state=state, report=report, last_status=report.status)
-        self._news.tell_fleet(report, self._stop_mark)
+        self._news.update_fleet(report, self._stop_mark)
         self._run = replace(
-            self._run, last_words=result_words(report), restarts=False, doubts=self._news.doubts(report)
+            self._run,
+            last_stop_text=result_text(report),
+            is_restarting=False,
+            motion_warnings=self._news.motion_warnings(report),
         )
-        self._news.tell_person(report, self._run.name or "stop")
+        self._news.notify_user(report, self._run.name or "stop")
         wanted, self._pending_request = self._pending_request, None
         if wanted is not None and not report.unproven:
-            self._begin(wanted)
+            self._start(wanted)
 
-    def _on_late(self, event: LateAnswer) -> None:
+    def _on_late_reply(self, event: LateReply) -> None:
         # A late reply counts unless the state has changed since.
         run = self._run
         if event.number is None:
-            self.on_stop(OneStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0), event.mark))
+            self.on_stop(RobotStopped(StopReport((event.robot,), event.robot.elapsed_ms or 0.0), event.mark))
         elif event.number == self._stop_number and run.state == "unanswered" and run.report is not None:
-            self._take_report(run.report.with_late(event.robot))
+            self._apply_report(run.report.with_late(event.robot))
 
     # -- private -----------------------------------------------------------------------------------------
 
-    def _begin(self, wanted: RequestedRun) -> None:
+    def _start(self, wanted: RequestedRun) -> None:
         document, self._current_request = wanted.document, wanted
         is_same, self.document = self.document is document, document
-        self._trial.begin(wanted)
+        self._trial.prepare(wanted)
         self._alerts.resolve("program")
-        self._warnings.begin()
-        self._errors.begin(wanted)
+        self._warnings.reset()
+        self._errors.start_run(wanted)
         self._set_errors({})
-        self._mark()
+        self._mark_blocks()
         try:
             program = self._runnable_program(wanted)
             if program is None:
                 return
             used = [link.robot for link in self._fleet.connected if link.name in program.robots]
-            asked = wanted_by(program, used)
-            if not self._fleet.permission.permits(asked, partial(self._begin_now, wanted)):
+            asked = actions_by_robot(program, used)
+            if not self._fleet.permission.request_permission(asked, partial(self._start_if_ready, wanted)):
                 return  # the window asks the user first
-            self._fleet.to_start(program.robots if wanted.stack is None else ())
+            self._fleet.return_to_start(program.robots if wanted.stack is None else ())
             owners = owners_of(self._fleet)
             runner = self._start_runner(program, document.name, wanted, owners)
         except AppError as error:
-            self._alerts.put("program", "error", _("The behaviour can't be started."), str(error))
+            self._alerts.raise_alert("program", "error", _("The behaviour can't be started."), str(error))
             return
-        self.asking.begin(runner)
+        self.asking.reset(runner)
         self._runner, self._used, self._labels = runner, program.robots, program.labels
-        self._robots.begin(runner, asked, owners)
+        self._robots.start(runner, asked, owners)
         self._breakpoints, self._program_key = program.breakpoints, runner.program_key
-        self._fleet.moved.note((robot.name for robot in used), "behaviour")
+        self._fleet.moved.record_command((robot.name for robot in used), "behaviour")
         self._variables = {variable.id: variable for variable in program.variables}
         if wanted.stack is None or not is_same:
             self._show_values({})  # trying a block keeps the values of other variables
-        self._console.leave_out(runner.pid)
-        self._edits.ran(document if wanted.stack is None else None, program)
+        self._console.ignore_process(runner.pid)
+        self._edits.set_program(document if wanted.stack is None else None, program)
         self._show_start(self._documents.title(document), self._trial.start(program, used))
 
     def _start_runner(
@@ -470,9 +478,9 @@ class Runs:
         return runner
 
     def _show_start(self, title: str, trying: str) -> None:
-        run, before = RunState("running", title, begun=False, trying=trying), self._run
+        run, before = RunState("running", title, is_started=False, tried_label=trying), self._run
         self._run = replace(
-            run, started_s=self._clock(), last_words=before.last_words, last_status=before.last_status
+            run, started_s=self._clock(), last_stop_text=before.last_stop_text, last_status=before.last_status
         )
         text = _("trying “{block}”").format(block=trying) if trying else _("started")
         self._console.add("info", self._run.name, text)
@@ -486,15 +494,17 @@ class Runs:
         if wanted.stack is None or not wrong:  # problems of a tried block are shown at the block
             before = self._run
             self._run = RunState(
-                nothing_in=program, last_words=before.last_words, last_status=before.last_status
+                unrunnable_program=program,
+                last_stop_text=before.last_stop_text,
+                last_status=before.last_status,
             )
         self._set_errors(wrong, not_started=True)
         return None
 
-    def _begin_now(self, wanted: RequestedRun) -> None:
+    def _start_if_ready(self, wanted: RequestedRun) -> None:
         # After the user's permission, unless another run has begun meanwhile.
         if self._run.state in {"ready", "proven"}:
-            self._begin(wanted)
+            self._start(wanted)
 
     def _on_print(self, event: RunnerEvent) -> None:
         # Shown in the Console, or as the value of a tried block.
@@ -509,21 +519,21 @@ class Runs:
         if event.blocks:
             self._set_errors({event.blocks[0]: event.text})
         else:
-            self._alerts.put("program", "error", _("The behaviour was stopped."), event.text)
+            self._alerts.raise_alert("program", "error", _("The behaviour was stopped."), event.text)
 
     def _on_end(self, event: RunnerEvent) -> None:
         self._runner = None
-        self._robots.end()
+        self._robots.stop()
         if not self.active:
             return  # Stop was first
-        finished = event.ok and not self._run.errors
+        finished = event.is_ok and not self._run.errors
         if finished:
-            self._mark()
+            self._mark_blocks()
         # the end of a program is a Stop like any other: every robot that it used must reply
-        self._stop(tuple(dict.fromkeys((*self._used, *event.silent))))
+        self._stop(tuple(dict.fromkeys((*self._used, *event.unresponsive_robots))))
         self._run = replace(self._run, finished=finished)
-        if not event.ok and not self._run.errors:
-            self._alerts.put("program", "error", _("The behaviour stopped unexpectedly."), event.text)
+        if not event.is_ok and not self._run.errors:
+            self._alerts.raise_alert("program", "error", _("The behaviour stopped unexpectedly."), event.text)
 
     def _stop(self, names: tuple[str, ...] | None) -> None:
         self.asking.clear()
@@ -535,24 +545,24 @@ class Runs:
         elif run.state not in {"stopping", "unanswered"}:
             elapsed_s = None
         # includes robots that have not replied to an earlier Stop, whose report is discarded
-        wanted = self._fleet.stoppable if names is None else (*names, *self._fleet.unheard)
-        asked = tuple(dict.fromkeys((*wanted, *self._fleet.stopping)))
+        wanted = self._fleet.stoppable if names is None else (*names, *self._fleet.unresponsive)
+        asked = tuple(dict.fromkeys((*wanted, *self._fleet.stopping_robots)))
         self._run = replace(
             self._run,
             state="stopping",
             pressed_s=now,
-            again=run.state == "unanswered" or (run.state == "stopping" and run.again),
+            is_stop_repeated=run.state == "unanswered" or (run.state == "stopping" and run.is_stop_repeated),
             elapsed_s=elapsed_s,
             report=None,
-            answered=(),
+            replies=(),
             finished=False,
-            edited=False,
-            restarts=False,
-            asked=asked,
+            is_edited=False,
+            is_restarting=False,
+            robots_to_stop=asked,
         )
-        self._fleet.told_to_stop(asked)
+        self._fleet.mark_stopping(asked)
         self._stop_mark = self._fleet.moved.mark
-        self._mark(stopped=self.running_blocks or self.stopped_blocks)
+        self._mark_blocks(stopped=self.running_blocks or self.stopped_blocks)
         self._stop_number += 1
         work = partial(
             stop_program,
@@ -568,7 +578,7 @@ class Runs:
         self._stop_thread.start()
 
     def _set_errors(self, errors: Mapping[str, str], *, not_started: bool = False) -> None:
-        self._errors.put(errors, not_started=not_started)
+        self._errors.set_errors(errors, not_started=not_started)
         self._run = replace(self._run, errors=errors)
         self.blocks_revision += 1
 
@@ -576,7 +586,7 @@ class Runs:
         self.values = values
         self.values_revision += 1
 
-    def _mark(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
+    def _mark_blocks(self, running: tuple[str, ...] = (), stopped: tuple[str, ...] = ()) -> None:
         self.running_blocks, self.stopped_blocks = running, stopped
         self.ran_blocks |= set(running)
         self.blocks_revision += 1

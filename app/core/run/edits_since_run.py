@@ -12,7 +12,7 @@ class RunDocument(Protocol):
 
     edits: int
 
-    def newest(self) -> Program | None:
+    def newest_program(self) -> Program | None:
         """Return the program of the newest compiled edit."""
 
 
@@ -30,7 +30,7 @@ class EditsSinceRun:
         self._compared: Program | None = None
         self._differs = False
 
-    def ran(self, document: RunDocument | None, program: Program) -> None:
+    def set_program(self, document: RunDocument | None, program: Program) -> None:
         """Set the running program and its behaviour; with None, edits are ignored."""
         self._document, self._ran = document, program.runnable
         self._edits = 0 if document is None else document.edits
@@ -40,7 +40,7 @@ class EditsSinceRun:
         """Return True if the blocks now differ from the running program."""
         if self._document is None:
             return False
-        newest = self._document.newest()
+        newest = self._document.newest_program()
         if newest is None or newest is self._compared:
             return self._differs
         self._compared = newest

@@ -30,7 +30,7 @@ class ProgramRobots:
         self._moving = MovingTopics()
         self._topics: Mapping[str, Sequence[str]] = {}
 
-    def begin(
+    def start(
         self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
     ) -> None:
         """Start with a running program.
@@ -41,17 +41,17 @@ class ProgramRobots:
             owners: Node ids of the robots that the program knows, by name.
         """
         self._runner, self._known_owners, self._revision = runner, owners, self._fleet.revision
-        moving, connected = self._fleet.moving, {link.name for link in self._fleet.connected}
+        moving, connected = self._fleet.moving_topics, {link.name for link in self._fleet.connected}
         # the program was started with the connected robots; unreadable ones are reported at the next tick
         self._moving = moving if connected.issuperset(moving.robots) else MovingTopics()
         self._topics = self._moving.topics
         self._requested_actions = {robot.name: actions for robot, actions in asked}
 
-    def end(self) -> None:
+    def stop(self) -> None:
         """Stop reporting, because the program has ended."""
         self._runner = None
 
-    def follow(self) -> None:
+    def update(self) -> None:
         """Report the connected robots to the program if they have changed."""
         if self._runner is None or not self._has_changed():
             return
@@ -65,16 +65,16 @@ class ProgramRobots:
             and owners[link.name] != self._known_owners.get(link.name)
         ]
         moving = [(link.robot, self._requested_actions[link.name]) for link in anew]
-        if self._fleet.permission.permits(moving, self._send):
+        if self._fleet.permission.request_permission(moving, self._send):
             self._send()
         else:
             self._send(without=[link.name for link in anew])
 
     def _has_changed(self) -> bool:
         is_same = self._fleet.revision == self._revision
-        if is_same and self._fleet.moving is self._moving:
+        if is_same and self._fleet.moving_topics is self._moving:
             return False
-        self._moving = self._fleet.moving
+        self._moving = self._fleet.moving_topics
         return not is_same or self._moving.topics != self._topics
 
     def _send(self, without: Collection[str] = ()) -> None:
@@ -86,7 +86,7 @@ class ProgramRobots:
             for name, id in owners.items()
             if name in self._requested_actions and self._known_owners.get(name) != id
         ]
-        self._fleet.moved.note(anew, "behaviour")  # of the robot's current program
+        self._fleet.moved.record_command(anew, "behaviour")  # of the robot's current program
         self._known_owners = {**self._known_owners, **owners}
-        self._topics = self._fleet.moving.topics
+        self._topics = self._fleet.moving_topics.topics
         self._runner.set_robots(owners, self._topics)

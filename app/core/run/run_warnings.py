@@ -17,7 +17,7 @@ class RunWarnings:
         self._logged_counts: dict[tuple[str, str], int] = {}
         self._edits = 0
 
-    def begin(self) -> None:
+    def reset(self) -> None:
         """Clear all warnings for a new run."""
         self.by_block = {}
         self._counts, self._logged_counts = {}, {}
@@ -41,7 +41,7 @@ class RunWarnings:
         self._edits = edits
         key = (block, sentence)
         self._counts[key] = count
-        self.by_block = {**self.by_block, block: counted(sentence, count)}
+        self.by_block = {**self.by_block, block: with_count(sentence, count)}
         if count >= 10 * self._logged_counts.get(key, 0) or key not in self._logged_counts:
             self._log_count(key)
 
@@ -53,10 +53,10 @@ class RunWarnings:
 
     def _log_count(self, key: tuple[str, str]) -> None:
         self._logged_counts[key] = self._counts[key]
-        self._log(counted(key[1], self._counts[key]))
+        self._log(with_count(key[1], self._counts[key]))
 
 
-def counted(sentence: str, count: int) -> str:
+def with_count(sentence: str, count: int) -> str:
     """Append the number of occurrences to a sentence if it is greater than one."""
     if count == 1:
         return sentence

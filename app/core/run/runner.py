@@ -16,16 +16,16 @@ from typing import Literal
 
 from app.blocks.model.program import Program
 from app.blocks.runtime.variables import VariableValue
-from app.core.faults import IN_CONSOLE
-from app.core.reports.crash import crash_extra, end_words, is_crash, split_trace
-from app.core.run.child_output import Gate, Output, text_of, texts
-from app.core.run.child_process import MAX_BYTES, ChildProcess, home
+from app.core.faults import CONSOLE_EXTRA
+from app.core.reports.crash import crash_extra, exit_text, is_crash, split_trace
+from app.core.run.child_output import Output, RateLimiter, text_of, texts
+from app.core.run.child_process import MAX_MEMORY_BYTES, ChildProcess, home
 from app.core.run.child_process import child_command as child_command
 from app.errors import RunnerError
 from app.robots.identity import program_of
 from nep.i18n import _, ngettext, number
 
-Kind = Literal[
+EventKind = Literal[
     "ready", "running", "paused", "error", "warning", "print", "variables", "ask", "ended"
 ]  # fmt: skip
 
@@ -42,9 +42,9 @@ PIPE_TIMEOUT_S = 0.5
 EVENTS_PER_S = 300
 MAX_BLOCKS = 100
 MAX_CHOICES, MAX_CHOICE_LENGTH = 12, 200
-WORTH_TELLING = 10_000
+MIN_REPORTED_BYTES = 10_000
 MAX_ERROR_LENGTH = 100_000
-ERRORS_KEPT = 200
+MAX_ERROR_LINES = 200
 """Number of stored lines of error output; a crash in native code writes the stack of each thread."""
 
 _runs = itertools.count(1)
@@ -71,14 +71,14 @@ class RunnerEvent:
         choices: Possible answers to a question; empty if any answer is allowed.
     """
 
-    kind: Kind
+    kind: EventKind
     run: int
     blocks: tuple[str, ...] = ()
-    says: str = ""
+    description: str = ""
     text: str = ""
-    ok: bool = True
+    is_ok: bool = True
     elapsed_s: float | None = None
-    silent: tuple[str, ...] = ()
+    unresponsive_robots: tuple[str, ...] = ()
     values: tuple[VariableValue, ...] = ()
     count: int = 1
     question: int = 0
@@ -97,7 +97,7 @@ class Runner:
         on_event: Callable[[RunnerEvent], object],
         *,
         command: Sequence[str] | None = None,
-        most_bytes: int = MAX_BYTES,
+        most_bytes: int = MAX_MEMORY_BYTES,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         # `command` starts the child; the default is this Python or this frozen Studio.
@@ -114,7 +114,7 @@ class Runner:
         self._clock, self._most_bytes = clock, most_bytes
         self._child: ChildProcess | None = None
         self._threads: list[threading.Thread] = []
-        self._errors: deque[str] = deque(maxlen=ERRORS_KEPT)
+        self._errors: deque[str] = deque(maxlen=MAX_ERROR_LINES)
         self._commands: queue.SimpleQueue[Mapping[str, object] | None] = queue.SimpleQueue()
         self._began_s = 0.0
         self._ended, self._output_over = threading.Event(), threading.Event()
@@ -167,13 +167,13 @@ class Runner:
                 "pace_s": pace_s,
             }
         )
-        self._thread(self._write, "input")
-        errors = self._thread(lambda: self._read_errors(child), "errors")
-        reader = self._thread(lambda: self._read(child), "output")
+        self._start_thread(self._write, "input")
+        errors = self._start_thread(lambda: self._read_errors(child), "errors")
+        reader = self._start_thread(lambda: self._read(child), "output")
         # last, because it waits for the others
-        self._thread(lambda: self._watch(child, reader, errors), "watch")
+        self._start_thread(lambda: self._watch(child, reader, errors), "watch")
 
-    def _thread(self, work: Callable[[], None], label: str) -> threading.Thread:
+    def _start_thread(self, work: Callable[[], None], label: str) -> threading.Thread:
         thread = threading.Thread(target=work, name=f"runner {label}", daemon=True)
         self._threads.append(thread)
         thread.start()
@@ -188,7 +188,7 @@ class Runner:
         topics = {topic: list(names) for topic, names in guarded.items()}
         self._commands.put({"do": "robots", "owners": dict(owners), "guarded": topics})
 
-    def put_variable(self, python: str, value: str | float | bool) -> None:
+    def set_variable(self, python: str, value: str | float | bool) -> None:
         """Set a variable of the running program; ``python`` is the name of the variable in the program."""
         self._commands.put({"do": "variable", "python": python, "value": value})
 
@@ -200,7 +200,7 @@ class Runner:
         """Pause the program and its robots. The event "paused" is sent when all of them have paused."""
         self._commands.put({"do": "pause"})
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """Resume a paused program."""
         if self.state == "paused":
             self.state = "running"
@@ -259,9 +259,12 @@ class Runner:
     def _read(self, child: ChildProcess) -> None:
         if child.popen.stdout is None:
             return
-        output, gate = Output(child.popen.stdout, self._ended, self._clock), Gate(EVENTS_PER_S, self._clock)
+        output, gate = (
+            Output(child.popen.stdout, self._ended, self._clock),
+            RateLimiter(EVENTS_PER_S, self._clock),
+        )
         for line in output:
-            event = self._event(line)
+            event = self._parse_event(line)
             if event is None:
                 output.strange_bytes += len(line)
             elif event.kind == "ended":
@@ -273,10 +276,10 @@ class Runner:
         child.popen.stdout.close()
         self._output_over.set()
 
-    def _deliver(self, event: RunnerEvent, gate: Gate) -> None:
+    def _deliver(self, event: RunnerEvent, gate: RateLimiter) -> None:
         if event.kind in ("running", "paused") and self.state in ("running", "paused"):
             self.state = "paused" if event.kind == "paused" else "running"
-        missed = gate.take_kept_back()
+        missed = gate.take_rejected_count()
         if missed:
             self._report_dropped(missed, 0)
         self._on_event(event)
@@ -289,21 +292,21 @@ class Runner:
                 events,
             ).format(count=events)
             self._on_event(RunnerEvent("print", self.run, text=text))
-        if strange_bytes >= WORTH_TELLING:
+        if strange_bytes >= MIN_REPORTED_BYTES:
             text = _("{size} MB of unexpected output were discarded").format(
                 size=number(strange_bytes / 1e6, ".1f")
             )
             self._on_event(RunnerEvent("print", self.run, text=text))
 
     def _watch(self, child: ChildProcess, reader: threading.Thread, errors: threading.Thread) -> None:
-        while not child.ended and not self._output_over.wait(MEMORY_CHECK_INTERVAL_S):
+        while not child.has_ended and not self._output_over.wait(MEMORY_CHECK_INTERVAL_S):
             child.check()
         self._commands.put(None)  # closes its input, which ends a child that still waits for commands
         hung = not child.wait(END_TIMEOUT_S)
         if hung:
             child.kill()
             child.wait(END_TIMEOUT_S)
-        child.end_family()  # remaining children would hold its pipes open
+        child.kill_descendants()  # remaining children would hold its pipes open
         reader.join(timeout=PIPE_TIMEOUT_S)
         errors.join(timeout=PIPE_TIMEOUT_S)  # its last output
         was_stopped = self.state == "stopping"
@@ -311,7 +314,7 @@ class Runner:
         last = self._last
         if last is None:
             text = "" if was_stopped else self._failure_reason(child, hung=hung)
-            last = RunnerEvent("ended", self.run, text=text, ok=was_stopped, elapsed_s=self._elapsed())
+            last = RunnerEvent("ended", self.run, text=text, is_ok=was_stopped, elapsed_s=self._elapsed())
         self._on_event(last)
         self._ended.set()
 
@@ -328,8 +331,8 @@ class Runner:
         code = child.popen.returncode
         output, trace = split_trace("".join(f"{line}\n" for line in self._errors))
         if is_crash(code):
-            how = f"the program's process {end_words(code)}"
-            extra = {**IN_CONSOLE, **crash_extra("behaviour", how, f"{output}{trace}")}
+            how = f"the program's process {exit_text(code)}"
+            extra = {**CONSOLE_EXTRA, **crash_extra("behaviour", how, f"{output}{trace}")}
             _log.error("%s", how, extra=extra)
         words = next((line for line in reversed(output.splitlines()) if line.strip()), "")
         if code < 0:
@@ -349,7 +352,7 @@ class Runner:
         finally:
             stream.close()
 
-    def _event(self, line: bytes) -> RunnerEvent | None:
+    def _parse_event(self, line: bytes) -> RunnerEvent | None:
         try:
             event = json.loads(line)
         except (ValueError, RecursionError):
@@ -364,9 +367,9 @@ class Runner:
             return RunnerEvent("ready", self.run)
         if kind in ("running", "paused"):
             says, text = text_of(event, "says"), text_of(event, "warning")
-            return RunnerEvent(kind, self.run, blocks=blocks, says=says, text=text)
+            return RunnerEvent(kind, self.run, blocks=blocks, description=says, text=text)
         if kind == "error":
-            return RunnerEvent("error", self.run, blocks=first, text=text_of(event, "sentence"), ok=False)
+            return RunnerEvent("error", self.run, blocks=first, text=text_of(event, "sentence"), is_ok=False)
         if kind == "warning" and first:
             count = event.get("count")
             text = text_of(event, "sentence")
@@ -389,8 +392,8 @@ class Runner:
             return RunnerEvent(
                 "ended",
                 self.run,
-                ok=event.get("ok") is True,
+                is_ok=event.get("ok") is True,
                 elapsed_s=float(elapsed_s) if isinstance(elapsed_s, (int, float)) else self._elapsed(),
-                silent=texts(event.get("silent")),
+                unresponsive_robots=texts(event.get("silent")),
             )
         return None

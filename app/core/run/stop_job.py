@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.core.faults import log_errors
-from app.core.robots.stop.report import LateAnswer, OneStopped, RobotAnswered, RobotStop, StopDone
-from app.core.robots.stop.stopper import RobotStopper, report_of
+from app.core.robots.stop.report import LateReply, RobotReplied, RobotStop, RobotStopped, StopDone
+from app.core.robots.stop.stopper import RobotStopper, stop_and_report
 from app.core.run.runner import Runner
 
 PostEvent = Callable[[object], None]
@@ -33,11 +33,11 @@ def stop_program(
         is_for_all: As in `app.core.robots.stop.stopper.RobotStopper.stop_all`.
     """
 
-    def answered(robot: RobotStop) -> None:
-        post_event(RobotAnswered(number, robot))
+    def on_reply(robot: RobotStop) -> None:
+        post_event(RobotReplied(number, robot))
 
-    def late(robot: RobotStop) -> None:
-        post_event(LateAnswer(number, robot))
+    def on_late_reply(robot: RobotStop) -> None:
+        post_event(LateReply(number, robot))
 
     if runner is not None:
         if stopper is not None:
@@ -47,7 +47,9 @@ def stop_program(
                 stopper.send_stop(ends=ends)
         with log_errors("stop the program"):
             runner.stop()
-    report = report_of(stopper, names, on_answer=answered, ends=ends, on_late=late, is_for_all=is_for_all)
+    report = stop_and_report(
+        stopper, names, on_answer=on_reply, ends=ends, on_late=on_late_reply, is_for_all=is_for_all
+    )
     post_event(StopDone(number, report))
 
 
@@ -57,7 +59,7 @@ def stop_robot(post_event: PostEvent, stopper: RobotStopper | None, name: str, m
     ``mark`` is the value of `MovedRobots.mark` when the Stop started.
     """
 
-    def late(robot: RobotStop) -> None:
-        post_event(LateAnswer(None, robot, mark))
+    def on_late_reply(robot: RobotStop) -> None:
+        post_event(LateReply(None, robot, mark))
 
-    post_event(OneStopped(report_of(stopper, (name,), on_late=late), mark))
+    post_event(RobotStopped(stop_and_report(stopper, (name,), on_late=on_late_reply), mark))

@@ -8,36 +8,36 @@ from app.core.alerts import Alerts
 from app.core.console import Console
 from app.core.robots.fleet import Fleet
 from app.core.robots.stop.report import StopReport
-from app.core.run.view import STOP_AGAIN, clock_words, result_words, stop_words, unanswered_words
+from app.core.run.view import STOP_AGAIN, clock_text, result_text, stop_text, unanswered_texts
 from nep.i18n import _
 
 
-class StopNews:
+class StopReporter:
     """Reports the results of stops. Not thread-safe: use it from the window's thread."""
 
     def __init__(self, fleet: Fleet, alerts: Alerts, console: Console) -> None:
         self._fleet, self._alerts, self._console = fleet, alerts, console
 
-    def tell_fleet(self, report: StopReport, mark: int) -> None:
+    def update_fleet(self, report: StopReport, mark: int) -> None:
         """Apply the result of a Stop that started at ``mark`` (`MovedRobots.mark`) to the fleet."""
         self._fleet.moved.apply_report(report, mark)
-        clock = clock_words(time.localtime())
-        words = {name: (stop_words(each, clock), each.status) for name, each in report.by_name.items()}
-        self._fleet.stopped(words, report)
+        clock = clock_text(time.localtime())
+        words = {name: (stop_text(each, clock), each.status) for name, each in report.by_name.items()}
+        self._fleet.apply_stop(words, report)
 
-    def doubts(self, report: StopReport) -> tuple[str, ...]:
+    def motion_warnings(self, report: StopReport) -> tuple[str, ...]:
         """Return why robots without a confirmation may be moving, and which get the Stop later."""
         pending = [name for name, robot in report.by_name.items() if robot.is_pending]
-        motions = (self._fleet.moved.motion(name) for name in report.silent)
+        motions = (self._fleet.moved.motion(name) for name in report.unconfirmed_names)
         return (
-            *(motion.sentence for motion in motions if motion is not None and motion.is_known),
+            *(motion.reason for motion in motions if motion is not None and motion.is_known),
             *(
                 _("Stop will be sent to {robot} as soon as it is connected").format(robot=name)
                 for name in pending
             ),
         )
 
-    def tell_person(self, report: StopReport, origin: str) -> None:
+    def notify_user(self, report: StopReport, origin: str) -> None:
         """Report a Stop in the Console as ``origin``, and with an alert while a robot may be moving."""
         for name, program in report.strangers:
             sentence = _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored").format(
@@ -45,12 +45,14 @@ class StopNews:
             )
             self._console.add("error", origin, sentence)
             detail = _("Find out what this program is, and close it.")
-            self._alerts.put(f"stranger:{name}", "error", f"{sentence}.", detail)
-        words = result_words(report)
+            self._alerts.raise_alert(f"stranger:{name}", "error", f"{sentence}.", detail)
+        words = result_text(report)
         if not report.unproven:
             self._console.add("info", origin, words)
             self._alerts.resolve("stop")
         else:
-            title, detail, _compact, _confirm = unanswered_words(report, self.doubts(report))
+            title, detail, _compact, _confirm = unanswered_texts(report, self.motion_warnings(report))
             self._console.add("error", origin, f"{words}: {title}")
-            self._alerts.put("stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop")
+            self._alerts.raise_alert(
+                "stop", "error", f"{title}.", detail, button=_(STOP_AGAIN), action="run.stop"
+            )

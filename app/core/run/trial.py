@@ -20,7 +20,7 @@ class TriedValue:
 
     document: Document
     block: str
-    words: str
+    text: str
     number: int
 
 
@@ -33,7 +33,7 @@ class Trial:
         self._request: RequestedRun | None = None
         self._unit = ""
 
-    def begin(self, wanted: RequestedRun) -> None:
+    def prepare(self, wanted: RequestedRun) -> None:
         """Start a request, discarding the value of the previous trial."""
         self._request, self._unit, self.value = wanted, "", None
 
@@ -47,7 +47,7 @@ class Trial:
     def parse_line(self, line: str) -> str | None:
         """Format a printed line as the tried value; None if the tried block has no value."""
         wanted = self._request
-        if wanted is None or wanted.stack is None or not wanted.gives_value:
+        if wanted is None or wanted.stack is None or not wanted.has_value:
             return None
         words = f"{line} {self._unit}".strip() if line else _("not known yet")
         self.show(wanted.document, wanted.stack, words)

@@ -6,14 +6,14 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from app.core.robots.stop.report import STOPPING_SHOWN_AFTER_S, RobotStop, StopReport, StopStatus
-from nep.i18n import _, lazy, listed, ngettext, number
+from app.core.robots.stop.report import STOPPING_DISPLAY_DELAY_S, RobotStop, StopReport, StopStatus
+from nep.i18n import _, format_list, lazy, ngettext, number
 
 MAX_NAMED = 4
-WIDEST_NAMES = 24
+MAX_NAMES_LENGTH = 24
 """Maximum length of robot names on the button; longer ones are shown only next to it."""
 APPLIES_LATER = lazy("Your changes take effect at the next run")
-NOTHING = lazy("Drag “when started” from Events and put blocks below it")
+NOTHING_TO_RUN_HINT = lazy("Drag “when started” from Events and put blocks below it")
 RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
 STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
@@ -41,34 +41,36 @@ class RunState:
 
     state: str = "ready"
     name: str = ""
-    says: str = ""
+    description: str = ""
     paused_at: str = ""
     warning: str = ""
-    begun: bool = True
+    is_started: bool = True
     started_s: float = 0.0
-    held_s: float = 0.0
+    paused_s: float = 0.0
     pause_began_s: float | None = None
     elapsed_s: float | None = None
     pressed_s: float = 0.0
-    again: bool = False
-    restarts: bool = False
-    edited: bool = False
-    trying: str = ""
+    is_stop_repeated: bool = False
+    is_restarting: bool = False
+    is_edited: bool = False
+    tried_label: str = ""
     value: str | None = None
-    asked: tuple[str, ...] = ()
-    answered: tuple[RobotStop, ...] = ()
+    robots_to_stop: tuple[str, ...] = ()
+    replies: tuple[RobotStop, ...] = ()
     report: StopReport | None = None
     finished: bool = False
-    dashed: bool = False
+    has_stopped_blocks: bool = False
     errors: Mapping[str, str] = field(default_factory=dict)
-    nothing_in: object = None  # the program that Run was pressed for, which had nothing to run, or `errors`
-    last_words: str = ""
+    unrunnable_program: object = (
+        None  # the program that Run was pressed for, which had nothing to run, or `errors`
+    )
+    last_stop_text: str = ""
     last_status: StopStatus = "off"
-    doubts: tuple[str, ...] = ()
+    motion_warnings: tuple[str, ...] = ()
 
     def elapsed(self, now: float) -> float:
         """Return the running time in seconds, without pauses."""
-        held = self.held_s
+        held = self.paused_s
         if self.pause_began_s is not None:
             held += now - self.pause_began_s
         return max(0.0, now - self.started_s - held)
@@ -96,19 +98,19 @@ class RunView:
     can_pause: bool = False
     can_step: bool = False
     can_restart: bool = False
-    edited: bool = False
-    run_word: str = RUN
-    stop_word: str = STOP
+    is_edited: bool = False
+    run_label: str = RUN
+    stop_label: str = STOP
     result: str | None = None
     result_status: StopStatus = "off"
     last_stop: str | None = None
     last_stop_status: StopStatus = "off"
-    confirm: str | None = None
-    stop_filled: bool = True
-    slow: bool = False
+    confirm_label: str | None = None
+    is_stop_filled: bool = True
+    is_slow: bool = False
 
 
-def place_of(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
+def block_label(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
     """Return the label of the block at which a program is held.
 
     The label is the text of the block, or its name if the text contains a quotation.
@@ -138,46 +140,46 @@ def view_of(
             and Run applies to the current one.
         slow: True if blocks run with a delay.
     """
-    view = replace(_view(run, connected, coming, now), slow=slow)
-    if run.trying:
-        return _tried(view, run)
+    view = replace(_view(run, connected, coming, now), is_slow=slow)
+    if run.tried_label:
+        return _tried_view(view, run)
     is_named = elsewhere and run.name and (run.state != "ready" or _ended_without_robots(run))
-    return _named(view, run, now) if is_named else view
+    return _named_view(view, run, now) if is_named else view
 
 
-def _tried(view: RunView, run: RunState) -> RunView:
+def _tried_view(view: RunView, run: RunState) -> RunView:
     # Of a tried block; Run is for the whole behaviour.
     if view.state == "running":
-        title = _("Trying “{block}”").format(block=run.trying)
-        return replace(view, title=title, compact=title, run_word=RUN, edited=False)
+        title = _("Trying “{block}”").format(block=run.tried_label)
+        return replace(view, title=title, compact=title, run_label=RUN, is_edited=False)
     if view.state == "proven" or _ended_without_robots(run):
         words = _("“{block}” stopped because of an error") if run.errors else _("“{block}” was stopped")
         detail = view.detail
         if run.finished:
             words = _("Tried “{block}”")
             detail = _("Finished") if run.value is None else run.value
-        title = words.format(block=run.trying)
+        title = words.format(block=run.tried_label)
         compact = view.compact if view.result else title
         return replace(view, title=title, detail=detail, compact=compact)
     return view
 
 
-def _named(view: RunView, run: RunState, now: float) -> RunView:
+def _named_view(view: RunView, run: RunState, now: float) -> RunView:
     # With the behaviour's name, because another tab is shown.
     if view.state in {"running", "paused"}:
         runs = view.state == "running"
-        if view.edited:
-            view = replace(view, edited=False, detail=run.says if runs else _paused_detail(run))
-        view = replace(view, run_word=RUN if runs else view.run_word)
+        if view.is_edited:
+            view = replace(view, is_edited=False, detail=run.description if runs else _paused_detail(run))
+        view = replace(view, run_label=RUN if runs else view.run_label)
     if view.state == "running":
         # just pressed: the previous text and the time of the run remain
         if run.state == "stopping" and run.elapsed_s is None:
             return replace(view, title=_("{name} is ready").format(name=run.name))
-        if not run.begun:
+        if not run.is_started:
             return replace(view, title=_("{name} is starting").format(name=run.name))
         elapsed = run.elapsed_s if run.state == "stopping" and run.elapsed_s is not None else run.elapsed(now)
         return replace(
-            view, title=_("{name} is running, {time}").format(name=run.name, time=seconds(elapsed))
+            view, title=_("{name} is running, {time}").format(name=run.name, time=duration_text(elapsed))
         )
     if view.state == "paused":
         if run.paused_at:
@@ -187,29 +189,33 @@ def _named(view: RunView, run: RunState, now: float) -> RunView:
     if view.state == "stopping":
         return replace(view, title=_("Stopping {name}").format(name=run.name))
     if view.state == "proven" or _ended_without_robots(run):
-        detail = "" if run.dashed and not run.errors else view.detail
+        detail = "" if run.has_stopped_blocks and not run.errors else view.detail
         return replace(view, title=_ended_title(run, run.name), detail=detail)
     return view
 
 
 def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: float) -> RunView:
-    early = run.state == "stopping" and not run.again and now - run.pressed_s < STOPPING_SHOWN_AFTER_S
+    early = (
+        run.state == "stopping"
+        and not run.is_stop_repeated
+        and now - run.pressed_s < STOPPING_DISPLAY_DELAY_S
+    )
     views: dict[str, Callable[[RunState, float], RunView]] = {
-        "running": _running,
-        "paused": _paused,
-        "stopping": _stopping_early if early else _stopping,
-        "proven": _proven,
-        "unanswered": _unanswered,
+        "running": _running_view,
+        "paused": _paused_view,
+        "stopping": _early_stopping_view if early else _stopping_view,
+        "proven": _proven_view,
+        "unanswered": _unanswered_view,
     }
     if run.state in views:
         return views[run.state](run, now)
     if _ended_without_robots(run):
-        return replace(_proven(run, now), state="ready", stop_filled=bool(connected))
-    title, detail = _("Ready"), connected_words(connected, coming)
-    if run.nothing_in and run.errors:
+        return replace(_proven_view(run, now), state="ready", is_stop_filled=bool(connected))
+    title, detail = _("Ready"), connected_text(connected, coming)
+    if run.unrunnable_program and run.errors:
         title, detail = _("Not started"), next(iter(run.errors.values()))
-    elif run.nothing_in:
-        title, detail = _("Nothing to run yet"), _(NOTHING)
+    elif run.unrunnable_program:
+        title, detail = _("Nothing to run yet"), _(NOTHING_TO_RUN_HINT)
     return RunView(
         "ready",
         title,
@@ -217,8 +223,8 @@ def _view(run: RunState, connected: Sequence[str], coming: Sequence[str], now: f
         title,
         can_run=True,
         can_step=True,
-        result=run.last_words if run.report is not None else None,
-        stop_filled=bool(connected),
+        result=run.last_stop_text if run.report is not None else None,
+        is_stop_filled=bool(connected),
     )
 
 
@@ -228,38 +234,38 @@ def _ended_without_robots(run: RunState) -> bool:
     return run.state == "ready" and run.report is not None and ran
 
 
-def _running(run: RunState, now: float) -> RunView:
+def _running_view(run: RunState, now: float) -> RunView:
     title, compact = _("Starting"), _("{name} is starting")
-    if run.begun:
+    if run.is_started:
         title, compact = _("Running, {time}"), _("{name} is running, {time}")
-    time_words = seconds(run.elapsed(now))
+    time_words = duration_text(run.elapsed(now))
     return RunView(
         "running",
         title.format(time=time_words),
-        _(APPLIES_LATER) if run.edited else run.says,
+        _(APPLIES_LATER) if run.is_edited else run.description,
         compact.format(name=run.name, time=time_words),
         can_pause=True,
         can_step=True,
         can_restart=True,
-        edited=run.edited,
-        run_word=RESTART,
-        last_stop=run.last_words or None,
+        is_edited=run.is_edited,
+        run_label=RESTART,
+        last_stop=run.last_stop_text or None,
         last_stop_status=run.last_status,
     )
 
 
-def _paused(run: RunState, _now: float) -> RunView:
+def _paused_view(run: RunState, _now: float) -> RunView:
     return RunView(
         "paused",
         _("Paused at “{block}”").format(block=run.paused_at) if run.paused_at else _("Paused"),
-        _(APPLIES_LATER) if run.edited and not run.warning else _paused_detail(run),
+        _(APPLIES_LATER) if run.is_edited and not run.warning else _paused_detail(run),
         _("{name} is paused").format(name=run.name),
         can_run=True,
         can_step=True,
         can_restart=True,
-        edited=run.edited,
-        run_word=GO_ON,
-        last_stop=run.last_words or None,
+        is_edited=run.is_edited,
+        run_label=GO_ON,
+        last_stop=run.last_stop_text or None,
         last_stop_status=run.last_status,
     )
 
@@ -268,37 +274,42 @@ def _paused_detail(run: RunState) -> str:
     return run.warning or _("Robots and timers are paused")
 
 
-def _stopping_early(run: RunState, now: float) -> RunView:
+def _early_stopping_view(run: RunState, now: float) -> RunView:
     # replies within 100 ms: the text does not change, only Run is disabled
     title = _("Ready")
     if run.elapsed_s is not None:
-        title = _("Running, {time}").format(time=seconds(run.elapsed_s))
+        title = _("Running, {time}").format(time=duration_text(run.elapsed_s))
     view = replace(
-        _stopping(run, now), state="running", title=title, detail=run.says, stop_word=STOP, result=None
+        _stopping_view(run, now),
+        state="running",
+        title=title,
+        detail=run.description,
+        stop_label=STOP,
+        result=None,
     )
-    if run.restarts:  # the buttons stay as they were, so that nothing flashes
-        view = replace(view, can_pause=True, can_step=True, can_restart=True, run_word=RESTART)
+    if run.is_restarting:  # the buttons stay as they were, so that nothing flashes
+        view = replace(view, can_pause=True, can_step=True, can_restart=True, run_label=RESTART)
     return view
 
 
-def _stopping(run: RunState, now: float) -> RunView:
+def _stopping_view(run: RunState, now: float) -> RunView:
     # a robot that refuses, or that other programs serve too, is done only when all of it has stopped
-    newest = {robot.name: robot for robot in run.answered}
-    done = {robot.name for robot in run.answered if robot.answered and not newest[robot.name].waits}
-    done -= {robot.name for robot in run.answered if robot.wrong}
-    waiting = [name for name in run.asked if name not in done]
+    newest = {robot.name: robot for robot in run.replies}
+    done = {robot.name for robot in run.replies if robot.is_confirmed and not newest[robot.name].is_waiting}
+    done -= {robot.name for robot in run.replies if robot.problem}
+    waiting = [name for name in run.robots_to_stop if name not in done]
     detail = result = ""
     if waiting:
         detail = _("Waiting for {robots}, {seconds} s").format(
-            robots=listed(waiting), seconds=number(now - run.pressed_s, ".1f")
+            robots=format_list(waiting), seconds=number(now - run.pressed_s, ".1f")
         )
-    if run.asked:
-        result = _some_stopped(len(done), len(run.asked))
-    title = _("Restarting") if run.restarts else _(STOPPING)
-    return RunView("stopping", title, detail, title, stop_word=STOPPING, result=result or None)
+    if run.robots_to_stop:
+        result = _stopped_count_text(len(done), len(run.robots_to_stop))
+    title = _("Restarting") if run.is_restarting else _(STOPPING)
+    return RunView("stopping", title, detail, title, stop_label=STOPPING, result=result or None)
 
 
-_ENDED = {
+_END_TITLES = {
     ("stopped", False, True): lazy("Stopped after {time}"),
     ("stopped", False, False): lazy("Stopped"),
     ("stopped", True, True): lazy("{name} stopped after {time}"),
@@ -315,10 +326,10 @@ _ENDED = {
 """Titles by (result of the run, True if the behaviour is named, True if it ran)."""
 
 
-def _proven(run: RunState, _now: float) -> RunView:
+def _proven_view(run: RunState, _now: float) -> RunView:
     report = run.report if run.report is not None and run.report.robots else None
-    words = result_words(report) if report is not None else ""
-    title, detail = _ended_title(run), _("It stopped at the dashed block") if run.dashed else ""
+    words = result_text(report) if report is not None else ""
+    title, detail = _ended_title(run), _("It stopped at the dashed block") if run.has_stopped_blocks else ""
     if run.errors:
         detail = next(iter(run.errors.values()))
     elif run.finished:
@@ -337,111 +348,111 @@ def _proven(run: RunState, _now: float) -> RunView:
 
 def _ended_title(run: RunState, name: str = "") -> str:
     kind = "problem" if run.errors else "finished" if run.finished else "stopped"
-    words = _ENDED[kind, bool(name), run.elapsed_s is not None]
-    return _(words).format(name=name, time=seconds(run.elapsed_s or 0.0))
+    words = _END_TITLES[kind, bool(name), run.elapsed_s is not None]
+    return _(words).format(name=name, time=duration_text(run.elapsed_s or 0.0))
 
 
-def _unanswered(run: RunState, now: float) -> RunView:
+def _unanswered_view(run: RunState, now: float) -> RunView:
     if run.report is None:
-        return _proven(run, now)
-    title, detail, compact, confirm = unanswered_words(run.report, run.doubts)
+        return _proven_view(run, now)
+    title, detail, compact, confirm = unanswered_texts(run.report, run.motion_warnings)
     return RunView(
         "unanswered",
         title,
         detail,
         compact,
-        stop_word=STOP_AGAIN,
-        result=result_words(run.report),
+        stop_label=STOP_AGAIN,
+        result=result_text(run.report),
         result_status=run.report.status,
-        confirm=confirm,
+        confirm_label=confirm,
     )
 
 
-def seconds(value: float) -> str:
+def duration_text(value: float) -> str:
     """Format a duration in whole seconds: ``14 s``, ``2 min 5 s``."""
     whole = int(value)
     return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
 
 
-def connected_words(names: Sequence[str], coming: Sequence[str] = ()) -> str:
+def connected_text(names: Sequence[str], coming: Sequence[str] = ()) -> str:
     """Return the line below "Ready": the connected robots, or else those that are starting."""
     if not names and coming:
         words = ngettext("{robots} is starting", "{robots} are starting", len(coming))
-        return words.format(robots=listed(coming))
+        return words.format(robots=format_list(coming))
     if not names:
         return _("No robot is connected")
     words = ngettext("{robots} is connected", "{robots} are connected", len(names))
-    return words.format(robots=listed(names))
+    return words.format(robots=format_list(names))
 
 
-def result_words(report: StopReport) -> str:
+def result_text(report: StopReport) -> str:
     """Format the result of a Stop: ``all 2 robots stopped (41 ms)``.
 
     `StopReport.status` determines the icon.
     """
-    names, still = report.names, report.still
-    unsure = [robot.who for robot in report.robots if not robot.can_confirm]
+    names, still = report.names, report.stopped_names
+    unsure = [robot.full_name for robot in report.robots if not robot.can_confirm]
     if report.unproven:
-        return _some_stopped(len(still), len(names))
+        return _stopped_count_text(len(still), len(names))
     if not names:
         return _("nothing to stop")
     if not still:
-        return _("stop sent; {robots} can't confirm").format(robots=listed(unsure))
+        return _("stop sent; {robots} can't confirm").format(robots=format_list(unsure))
     time_ms = max(1, round(report.elapsed_ms))
     if unsure:
         words = _("{robots} stopped ({elapsed} ms); {others} can't confirm")
-        return words.format(robots=listed(still), elapsed=time_ms, others=listed(unsure))
+        return words.format(robots=format_list(still), elapsed=time_ms, others=format_list(unsure))
     if len(names) == 1:
         return _("{robot} stopped ({elapsed} ms)").format(robot=still[0], elapsed=time_ms)
     return _("all {count} robots stopped ({elapsed} ms)").format(count=len(names), elapsed=time_ms)
 
 
-def _some_stopped(stopped: int, count: int) -> str:
+def _stopped_count_text(stopped: int, count: int) -> str:
     if count == 1:
         return _("1 robot stopped") if stopped else _("Stop not confirmed")
     return _("{stopped} of {count} robots stopped").format(stopped=stopped, count=count)
 
 
-def unanswered_words(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
+def unanswered_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
     """Return title, detail, compact text and button label for robots that have not confirmed a Stop.
 
     A report of a robot itself ("Arm may still move: the brake is stuck") comes first, unchanged. ``doubts``
     are the reasons why robots may be moving (`RunState`).
     """
-    still = report.still
-    names = listed(report.silent)
-    them = listed(report.silent) if len(report.silent) <= 2 else _("them")
+    still = report.stopped_names
+    names = format_list(report.unconfirmed_names)
+    them = format_list(report.unconfirmed_names) if len(report.unconfirmed_names) <= 2 else _("them")
     detail = _("Switch {robots} off by hand.").format(robots=them)
     if doubts:
         detail = ngettext(
             "{why}. Switch {robots} off by hand if it still moves.",
             "{why}. Switch {robots} off by hand if they still move.",
-            len(report.silent),
+            len(report.unconfirmed_names),
         ).format(why="; ".join(doubts[:MAX_NAMED]), robots=them)
     if still:
         slowest = max(robot.elapsed_ms or 0 for robot in report.robots if robot.name in still)
         detail = _("{robots} stopped ({elapsed} ms). {next_step}").format(
-            robots=listed(still), elapsed=max(1, round(slowest)), next_step=detail
+            robots=format_list(still), elapsed=max(1, round(slowest)), next_step=detail
         )
-    count, title = len(report.silent), _wrong_words(report)
+    count, title = len(report.unconfirmed_names), _problem_text(report)
     switch = ngettext("{wrong}; switch it off by hand", "{wrong}; switch them off by hand", count)
     still_words = ngettext("{robots} isn't moving", "{robots} aren't moving", count).format(robots=names)
-    if len(names) > WIDEST_NAMES:  # leave room for the sentence next to the button
+    if len(names) > MAX_NAMES_LENGTH:  # leave room for the sentence next to the button
         still_words = ngettext("It isn't moving", "They aren't moving", count)
     return title, detail, switch.format(wrong=title), still_words
 
 
-def _wrong_words(report: StopReport) -> str:
+def _problem_text(report: StopReport) -> str:
     # First robots' own reports, then robots to which the Stop could not be sent, then silent robots.
-    refusals = [robot.wrong for robot in report.unproven if robot.refused]
-    untold = [robot.wrong for robot in report.unproven if robot.error and not robot.refused]
-    silent = [robot.who for robot in report.unproven if not robot.error]
+    refusals = [robot.problem for robot in report.unproven if robot.is_refused]
+    untold = [robot.problem for robot in report.unproven if robot.error and not robot.is_refused]
+    silent = [robot.full_name for robot in report.unproven if not robot.error]
     if len(silent) > MAX_NAMED:
         silent = [*silent[:MAX_NAMED], _("{count} more").format(count=len(silent) - MAX_NAMED)]
     wrong = [*refusals, *untold]
     if silent:
         words = ngettext("{robots} did not reply", "{robots} did not reply", len(silent))
-        wrong.append(words.format(robots=listed(silent)))
+        wrong.append(words.format(robots=format_list(silent)))
     left = len(wrong) - MAX_NAMED
     if left > 0:
         words = ngettext("{count} more may still move", "{count} more may still move", left)
@@ -449,20 +460,20 @@ def _wrong_words(report: StopReport) -> str:
     return "; ".join(wrong)
 
 
-def stop_words(robot: RobotStop, clock: str) -> str:
+def stop_text(robot: RobotStop, clock: str) -> str:
     """Format the reply of a robot to a Stop for its health panel."""
     if not robot.can_confirm:
         return _("sent at {time}; this robot can't confirm").format(time=clock)
-    if robot.answered:
+    if robot.is_confirmed:
         elapsed = max(1, round(robot.elapsed_ms or 0))
         return _("confirmed in {elapsed} ms, at {time}").format(elapsed=elapsed, time=clock)
     if robot.error:
-        return _("{wrong}, at {time}").format(wrong=robot.wrong, time=clock)
+        return _("{wrong}, at {time}").format(wrong=robot.problem, time=clock)
     if robot.program:
         return _("no reply from “{program}”, at {time}").format(program=robot.program, time=clock)
     return _("not confirmed, at {time}").format(time=clock)
 
 
-def clock_words(now: time.struct_time) -> str:
+def clock_text(now: time.struct_time) -> str:
     """Format a time of day: ``8:41``."""
     return f"{now.tm_hour}:{now.tm_min:02d}"

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.blocks.compiler.stack import SHOW, Stack
+from app.blocks.compiler.stack import SHOW_BLOCK_ID, Stack
 from app.blocks.model.program import Program
 from app.core.documents.document import Document
-from app.core.documents.problems import CONNECT
+from app.core.documents.problems import CONNECT_PREFIX
 from app.robots.description.description import Robot
-from app.robots.description.inputs import pretty_unit
+from app.robots.description.inputs import display_unit
 from nep.i18n import _
 
 
@@ -36,10 +36,10 @@ class RequestedRun:
 
     def program(self) -> Program | None:
         """Return the program to run; None if the stack no longer exists."""
-        return self.document.program() if self.stack is None else self.document.try_program(self.stack)
+        return self.document.program() if self.stack is None else self.document.trial_program(self.stack)
 
     @property
-    def gives_value(self) -> bool:
+    def has_value(self) -> bool:
         """True if the stack is a value block, whose value the program prints."""
         return self.stack is not None and self.stack.is_value
 
@@ -48,7 +48,7 @@ class RequestedRun:
         if (
             self.stack is None
             or len(program.sensors) != 1
-            or "_get_" not in self.stack.type_in(self.document.workspace)
+            or "_get_" not in self.stack.first_block_type(self.document.workspace)
         ):
             return ""
         name, part = program.sensors[0]
@@ -56,15 +56,15 @@ class RequestedRun:
         sensor = next((each for each in sensors if each is not None), None)
         if sensor is None or sensor.kind == "object":
             return ""
-        return pretty_unit(sensor.unit) or ""
+        return display_unit(sensor.unit) or ""
 
     def problems(self, program: Program) -> dict[str, str]:
         """Return the errors by block. Missing robots don't prevent a whole behaviour from running."""
-        wrong = {each.block_id: each.sentence for each in program.problems if each.severity == "error"}
+        wrong = {each.block_id: each.message for each in program.problems if each.severity == "error"}
         found = {block: sentence for block, sentence in wrong.items() if block}
         if self.stack is None or found:
-            return {block: sentence for block, sentence in found.items() if block != SHOW}
-        return _absent(program, self.stack)
+            return {block: sentence for block, sentence in found.items() if block != SHOW_BLOCK_ID}
+        return _missing_robot_errors(program, self.stack)
 
     def label(self, program: Program) -> str:
         """Return the label of the tried block; "" for a whole behaviour."""
@@ -72,16 +72,16 @@ class RequestedRun:
             return ""
         labels: Mapping[str, str] = program.labels
         return labels.get(self.stack.id) or next(
-            (words for block, words in labels.items() if block != SHOW), program.name
+            (words for block, words in labels.items() if block != SHOW_BLOCK_ID), program.name
         )
 
 
-def _absent(program: Program, stack: Stack) -> dict[str, str]:
+def _missing_robot_errors(program: Program, stack: Stack) -> dict[str, str]:
     # A block whose robot is missing would do nothing.
     if stack.id not in program.absent:
         return {}
     fixes = (each.fix_action or "" for each in program.problems if each.block_id == stack.id)
-    robot = next((fix.removeprefix(CONNECT) for fix in fixes if fix.startswith(CONNECT)), "")
+    robot = next((fix.removeprefix(CONNECT_PREFIX) for fix in fixes if fix.startswith(CONNECT_PREFIX)), "")
     if not robot:
         return {stack.id: _("The robot is not connected, so these blocks can't be tried.")}
     return {stack.id: _("{robot} is not connected, so these blocks can't be tried.").format(robot=robot)}

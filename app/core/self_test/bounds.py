@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-STEP_S: dict[str, float] = {
+STEP_TIMEOUTS_S: dict[str, float] = {
     "program": 120.0,
     "window": 60.0,
     "master": 60.0,
@@ -17,12 +17,12 @@ STEP_S: dict[str, float] = {
     "processes": 20.0,
 }
 """Time limit of each step by its name in the report, in order."""
-ALL_S = 480.0
+TOTAL_TIMEOUT_S = 480.0
 """Time limit of all steps together."""
 GRACE_S = 10.0
 """Time between a time limit and the moment when the watchdog kills the process.
 
 A window that still responds reports the failure itself within this time.
 """
-END_S = 30.0
+EXIT_TIMEOUT_S = 30.0
 """Time that the process has to exit after the report was completed successfully."""

@@ -17,7 +17,7 @@ from nep.i18n import _
 from nep.version import __version__
 
 FORMAT, FORMAT_VERSION = "nep-studio-selftest", 1
-OLDEST_S = 24 * 3600.0
+MAX_AGE_S = 24 * 3600.0
 """Maximum age of the process when the self-test starts; a greater one means that the clock was changed."""
 
 
@@ -26,23 +26,23 @@ class StepReport:
     """One step: the expectation and the result. Times are milliseconds since the start of the process."""
 
     name: str
-    words: str
-    bound_s: float
+    description: str
+    timeout_s: float
     began_ms: int
-    ms: int | None = None
+    ended_ms: int | None = None
     ok: bool = False
-    said: str = ""
+    details: str = ""
 
     def to_json(self) -> dict[str, object]:
         """Return the step as a JSON object for the report."""
         return {
             "name": self.name,
             "ok": self.ok,
-            "ms": self.ms,
+            "ms": self.ended_ms,
             "began_ms": self.began_ms,
-            "bound_s": self.bound_s,
-            "words": self.words,
-            "said": self.said,
+            "bound_s": self.timeout_s,
+            "words": self.description,
+            "said": self.details,
         }
 
 
@@ -52,7 +52,7 @@ def seconds_since_start() -> float:
         age = time.time() - psutil.Process().create_time()
     except psutil.Error:
         return 0.0
-    return age if 0.0 <= age < OLDEST_S else 0.0
+    return age if 0.0 <= age < MAX_AGE_S else 0.0
 
 
 class Report:
@@ -82,16 +82,16 @@ class Report:
         return round((time.monotonic() + self._offset_s) * 1000)
 
     @property
-    def why(self) -> str:
+    def failure(self) -> str:
         """Reason why the test failed, or ""."""
         return self._why
 
     @property
-    def step(self) -> StepReport | None:
+    def current_step(self) -> StepReport | None:
         """Step in progress, or None."""
         with self._lock:
             newest = self._steps[-1] if self._steps else None
-            return newest if newest is not None and newest.ms is None else None
+            return newest if newest is not None and newest.ended_ms is None else None
 
     def add_computer(self, **facts: object) -> None:
         """Add facts about this computer."""
@@ -103,7 +103,7 @@ class Report:
         with self._lock:
             self._marks.setdefault(f"{name}_ms", self.now_ms())
 
-    def begin(self, name: str, words: str, bound_s: float) -> None:
+    def start_step(self, name: str, words: str, bound_s: float) -> None:
         """Start a step."""
         with self._lock:
             self._steps.append(StepReport(name, words, bound_s, self.now_ms()))
@@ -112,21 +112,21 @@ class Report:
     def record_success(self, said: str = "") -> None:
         """Record that the current step succeeded."""
         with self._lock:
-            step = self.step
+            step = self.current_step
             if step is not None:
-                step.ms, step.ok, step.said = self.now_ms(), True, said
+                step.ended_ms, step.ok, step.details = self.now_ms(), True, said
                 self._write()
 
     def fail(self, why: str) -> None:
         """Record that the test failed; only the first reason is stored."""
         with self._lock:
-            step = self.step
+            step = self.current_step
             if step is not None:
-                step.ms, step.said = self.now_ms(), why
+                step.ended_ms, step.details = self.now_ms(), why
             self._why = self._why or why
             self._write()
 
-    def end(self) -> bool:
+    def finish(self) -> bool:
         """Complete the report; return True if the test succeeded."""
         with self._lock:
             self._over = True
@@ -135,7 +135,7 @@ class Report:
             return not self._why
 
     def _write(self) -> None:
-        step, why = self.step, self._why
+        step, why = self.current_step, self._why
         if not why and not self._over:
             name = step.name if step is not None else (self._steps[-1].name if self._steps else "")
             why = _("Studio exited during the self-test; its last step was “{step}”.").format(step=name)

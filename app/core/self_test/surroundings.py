@@ -17,7 +17,7 @@ from nep.i18n import _
 from nep.system.addresses import MASTER_VARIABLE
 
 REPORT, PICTURE, CRASH = "report.json", "window.png", "crash.txt"
-BEGUN = b"{}\n"
+EMPTY_REPORT = b"{}\n"
 """Initial content of the report, so that no reader mistakes an old report for the new one."""
 
 
@@ -34,7 +34,7 @@ class UnwritableFolderError(AppError):
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class TestEnvironment:
     """Folder with the results, which also contains the home folder (settings, journal, log) of the test."""
 
     folder: Path
@@ -46,7 +46,7 @@ class Surroundings:
         return self.folder / name
 
 
-def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -> Surroundings:
+def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -> TestEnvironment:
     """Create the folder with a home folder in it; set both and a free master port in ``environ``.
 
     Result files of an earlier test are removed, nothing else. The web engine can't use its sandbox as root;
@@ -55,14 +55,14 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - links are not resolved, so that the name stays as given
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_atomically(folder / REPORT, BEGUN, durable=False)
+        write_atomically(folder / REPORT, EMPTY_REPORT, durable=False)
         for name in (PICTURE, CRASH):
             (folder / name).unlink(missing_ok=True)
         home = Path(tempfile.mkdtemp(prefix="home-", dir=folder))
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise UnwritableFolderError(folder, str(reason).lower()) from error
-    surroundings = Surroundings(folder, home, f"127.0.0.1:{_free_port()}")
+    surroundings = TestEnvironment(folder, home, f"127.0.0.1:{_free_port()}")
     environ["NEP_STUDIO_HOME"] = str(home)
     environ["NEP_STATE_DIR"] = str(home / "state")
     environ["NEP_GATEWAY"] = "0"  # its ports are fixed, and another instance or test may use them
@@ -72,7 +72,7 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
     return surroundings
 
 
-def remove_home(made: Surroundings) -> None:
+def remove_home(made: TestEnvironment) -> None:
     """Remove the home folder of the test as far as possible; ending processes may still use files in it."""
     for path in sorted(made.home.rglob("*"), reverse=True):
         with suppress(OSError):

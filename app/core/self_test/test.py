@@ -17,8 +17,8 @@ import psutil
 
 from app.core.self_test import bounds
 from app.core.self_test.report import Report
-from app.core.self_test.surroundings import CRASH, REPORT, Surroundings, remove_home
-from nep.i18n import _, listed
+from app.core.self_test.surroundings import CRASH, REPORT, TestEnvironment, remove_home
+from nep.i18n import _, format_list
 
 FAILED = 1
 WEB_PROCESS = "qtwebengineprocess"
@@ -28,27 +28,27 @@ KILL_S = 5.0
 class SelfTest:
     """Progress of the steps, and the watchdog. Thread-safe."""
 
-    def __init__(self, place: Surroundings, facts: dict[str, object]) -> None:
+    def __init__(self, place: TestEnvironment, facts: dict[str, object]) -> None:
         # Starts the watchdog: from now on the process ends in time, whatever its threads do.
         self.place = place
-        self.report = Report(place.path(REPORT), {**facts, "bound_s": bounds.ALL_S})
+        self.report = Report(place.path(REPORT), {**facts, "bound_s": bounds.TOTAL_TIMEOUT_S})
         self._changed = threading.Condition()
-        self._all_until = time.monotonic() + bounds.ALL_S
+        self._all_until = time.monotonic() + bounds.TOTAL_TIMEOUT_S
         self._step_until = self._all_until
         self._awaited = ""
         self._crash: TextIO = place.path(CRASH).open("w", encoding="utf-8")
         faulthandler.enable(self._crash)
         # This second watchdog needs neither Python code nor the GIL; it writes the stack of all threads.
-        last_s = bounds.ALL_S + 2 * bounds.GRACE_S
+        last_s = bounds.TOTAL_TIMEOUT_S + 2 * bounds.GRACE_S
         faulthandler.dump_traceback_later(last_s, exit=True, file=self._crash)
         threading.Thread(target=self._watch, name="self-test watch", daemon=True).start()
 
     # -- steps --------------------------------------------------------------------------------------------
 
-    def begin(self, name: str, words: str) -> None:
+    def start_step(self, name: str, words: str) -> None:
         """Start the step with this name (in `bounds.STEP_S`); ``words`` describes the expectation."""
-        bound_s = bounds.STEP_S[name]
-        self.report.begin(name, words, bound_s)
+        bound_s = bounds.STEP_TIMEOUTS_S[name]
+        self.report.start_step(name, words, bound_s)
         self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, words)
 
     def record_success(self, said: str = "") -> None:
@@ -76,10 +76,10 @@ class SelfTest:
         else:
             if code != 0:
                 self.fail(_("Studio exited with exit code {code}").format(code=code))
-        if not self.report.why:
+        if not self.report.failure:
             self.record_success()  # it has closed
         self._end_processes()
-        well = self.report.end()
+        well = self.report.finish()
         self._finish()
         return 0 if well else FAILED
 
@@ -92,29 +92,29 @@ class SelfTest:
         with suppress(OSError):
             if crash.stat().st_size == 0:
                 crash.unlink()
-        if not self.report.why:
+        if not self.report.failure:
             logging.shutdown()  # the log file is in the folder too, and Windows can't delete an open file
             remove_home(self.place)
-        self._wait_until(time.monotonic() + bounds.END_S, _("the end of the process"))
+        self._wait_until(time.monotonic() + bounds.EXIT_TIMEOUT_S, _("the end of the process"))
 
     # -- processes ----------------------------------------------------------------------------------------
 
     def _end_processes(self) -> None:
         # Only the master may remain, which waits for this process; it is ended here.
-        if self.report.why:
-            end_family()
+        if self.report.failure:
+            kill_children()
             return
-        self.begin("processes", _("every process of the test exits"))
-        family = [each for each in children() if not is_web(each) and not is_of_windows(each)]
+        self.start_step("processes", _("every process of the test exits"))
+        family = [each for each in children() if not is_web(each) and not is_windows_program(each)]
         masters = [each for each in family if is_master(each)]
         for each in masters:
             with suppress(psutil.Error):
                 each.terminate()
-        _gone, left = psutil.wait_procs(family, timeout=bounds.STEP_S["processes"])
+        _gone, left = psutil.wait_procs(family, timeout=bounds.STEP_TIMEOUTS_S["processes"])
         if left:
-            names = listed([f"{each.pid} ({' '.join(command(each)[:4])})" for each in left])
+            names = format_list([f"{each.pid} ({' '.join(command(each)[:4])})" for each in left])
             self.fail(_("These processes did not exit: {names}").format(names=names))
-            end_family()
+            kill_children()
         else:
             self.record_success()
 
@@ -133,10 +133,10 @@ class SelfTest:
         self.fail(
             _("Studio did not respond in time and was stopped. It was waiting for: {what}").format(what=what)
         )
-        self.report.end()
+        self.report.finish()
         with suppress(OSError, ValueError):  # closed at the very end
             faulthandler.dump_traceback(self._crash, all_threads=True)
-        end_family()
+        kill_children()
         os._exit(FAILED)
 
 
@@ -170,7 +170,7 @@ def is_web(process: psutil.Process) -> bool:
         return False
 
 
-def is_of_windows(process: psutil.Process, root: str = os.environ.get("SYSTEMROOT", "")) -> bool:
+def is_windows_program(process: psutil.Process, root: str = os.environ.get("SYSTEMROOT", "")) -> bool:
     """Return True if a process is a program of Windows, in the folder ``root``.
 
     Windows starts some of its programs as child processes, such as console hosts, and ends them at any time.
@@ -182,7 +182,7 @@ def is_of_windows(process: psutil.Process, root: str = os.environ.get("SYSTEMROO
     return bool(root) and PureWindowsPath(program).is_relative_to(PureWindowsPath(root))
 
 
-def end_family() -> None:
+def kill_children() -> None:
     """Kill all child processes."""
     family = children()
     for each in family:

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from app.core.series.formula import Calculation, Windowed
+from app.core.series.formula import Calculation, WindowFunction
 from app.core.series.samples import Floats, Samples
 
 MAX_WAIT_S = 0.5
 """Maximum time (by time stamps) that the newest sample of one input waits for the other inputs."""
 HOLDS_S, HOLDS = 1.0, 8.0
 """Maximum validity of a sample of another input: seconds, and number of usual intervals."""
-AT_ONCE = 200_000
+BATCH_SIZE = 200_000
 """Maximum number of samples calculated in one tick."""
 
 
@@ -40,7 +40,7 @@ class Calculated:
         if self._next < base.begun:
             self.samples.break_line()
         first = max(self._next, base.begun) - base.begun
-        end = min(self._ready(base), first + AT_ONCE)
+        end = min(self._ready(base), first + BATCH_SIZE)
         if end > first:
             with np.errstate(all="ignore"):  # undefined results become gaps
                 self.samples.extend(*self._calculated(base, first, end))
@@ -57,7 +57,7 @@ class Calculated:
 class WindowCurve(Calculated):
     """Difference, derivative, integral or moving average of another curve."""
 
-    def __init__(self, kind: Windowed, of: Samples, window_s: float) -> None:
+    def __init__(self, kind: WindowFunction, of: Samples, window_s: float) -> None:
         # `window_s` applies only to "mean".
         super().__init__([of])
         self._kind, self._window_s = kind, window_s

@@ -11,9 +11,9 @@ import numpy as np
 
 from app.core.series.curves import Curve
 from app.core.series.samples import Floats
-from app.core.storage.csv_text import csv_text, harmless
+from app.core.storage.csv_text import csv_text, escape_formula
 
-ROWS_AT_ONCE = 5000
+ROWS_PER_CHUNK = 5000
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,12 @@ def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = in
     """Return a snapshot of the curves in a time range, which another thread can write."""
     columns = []
     for curve in curves:
-        first, end = curve.samples.places(begin_s, end_s)
+        first, end = curve.samples.index_range(begin_s, end_s)
         runs = curve.states.runs(begin_s, end_s) if curve.states is not None else ()
         states = tuple(
-            (run.begin_s, run.word)
+            (run.begin_s, run.value)
             for run in runs
-            if run.word is not None and begin_s <= run.begin_s <= end_s
+            if run.value is not None and begin_s <= run.begin_s <= end_s
         )
         times, values = curve.samples.times[first:end].copy(), curve.samples.values[first:end].copy()
         columns.append(CsvColumn(curve.text, times, values, states))
@@ -47,11 +47,11 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
 
     Times are given in nanoseconds since 1970 and as ISO 8601 in UTC. A state is in the row of its start.
     """
-    yield csv_text([["stamp_ns", "time_utc", *(harmless(column.name) for column in columns)]])
+    yield csv_text([["stamp_ns", "time_utc", *(escape_formula(column.name) for column in columns)]])
     states = [np.array([time_s for time_s, _word in column.states]) for column in columns]
     times = np.unique(np.concatenate([np.empty(0), *states, *(column.times for column in columns)]))
-    for begin in range(0, len(times), ROWS_AT_ONCE):
-        part = times[begin : begin + ROWS_AT_ONCE]
+    for begin in range(0, len(times), ROWS_PER_CHUNK):
+        part = times[begin : begin + ROWS_PER_CHUNK]
         cells = [
             _cells_of(column, begins, float(part[0]), float(part[-1]))
             for column, begins in zip(columns, states, strict=True)
@@ -65,14 +65,14 @@ def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
 
 def _cells_of(column: CsvColumn, states: Floats, begin_s: float, end_s: float) -> dict[float, str]:
     # Of several values at the same time the newest counts.
-    first, last = _places(column.times, begin_s, end_s)
+    first, last = _index_range(column.times, begin_s, end_s)
     numbers = zip(column.times[first:last].tolist(), column.values[first:last].tolist(), strict=True)
     cells = {time_s: repr(value) for time_s, value in numbers}
-    first, last = _places(states, begin_s, end_s)
-    return cells | {time_s: harmless(word) for time_s, word in column.states[first:last]}
+    first, last = _index_range(states, begin_s, end_s)
+    return cells | {time_s: escape_formula(word) for time_s, word in column.states[first:last]}
 
 
-def _places(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]:
+def _index_range(times: Floats, begin_s: float, end_s: float) -> tuple[int, int]:
     first, last = np.searchsorted(times, begin_s, "left"), np.searchsorted(times, end_s, "right")
     return int(first), int(last)
 

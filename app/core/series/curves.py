@@ -9,11 +9,11 @@ from app.core.series.calculated import Calculated, ExpressionCurve, WindowCurve
 from app.core.series.feed import SeriesFeed
 from app.core.series.field_path import (
     MISSING,
-    FieldFound,
     FieldPath,
+    PlottableField,
     fields_of,
     kind_of_value,
-    meant_field,
+    nearest_field,
 )
 from app.core.series.field_series import FieldSeries, TopicSeries
 from app.core.series.formula import (
@@ -29,7 +29,7 @@ from app.errors import CurveError
 from nep.i18n import _
 
 MAX_CURVES = 64
-MAX_SAMPLES_TOGETHER = 8 * MAX_SAMPLES
+MAX_TOTAL_SAMPLES = 8 * MAX_SAMPLES
 """Maximum number of samples of all curves of a plot (about 150 MB), which the curves share."""
 MIN_SAMPLES = 8192
 
@@ -48,25 +48,25 @@ class Curve:
     text: str
     source: Source
     samples: Samples
-    of: FieldSeries | None = None
+    series: FieldSeries | None = None
 
     @property
     def states(self) -> States | None:
         """States of a field with text or boolean values."""
-        return self.of.states if self.of is not None and len(self.of.states) else None
+        return self.series.states if self.series is not None and len(self.series.states) else None
 
     @property
     def is_state(self) -> bool:
         """True if the curve is shown as a lane of states."""
-        return self.of is not None and (
-            self.of.is_state or (not len(self.samples) and len(self.of.states) > 0)
+        return self.series is not None and (
+            self.series.is_state or (not len(self.samples) and len(self.series.states) > 0)
         )
 
     @property
     def last(self) -> object:
         """Newest value as received; `MISSING` before the first."""
-        if self.of is not None:
-            return self.of.last
+        if self.series is not None:
+            return self.series.last
         return float(self.samples.values[-1]) if len(self.samples) else MISSING
 
 
@@ -75,18 +75,18 @@ def topics_of(source: Source) -> set[str]:
     if isinstance(source, FieldSource):
         return {source.topic}
     if isinstance(source, WindowSource):
-        return topics_of(source.of)
+        return topics_of(source.source)
     return {topic for each in source.inputs for topic in topics_of(each)}
 
 
 @dataclass(slots=True, eq=False)
-class _Shared:
+class _SharedSamples:
     """Samples used by one or several curves, with the number of users."""
 
     samples: Samples
-    users: int = 0
-    needs: list[str] = field(default_factory=list)
-    of: FieldSeries | None = None
+    user_count: int = 0
+    dependencies: list[str] = field(default_factory=list)
+    series: FieldSeries | None = None
     calculated: Calculated | None = None
 
 
@@ -97,7 +97,7 @@ class Curves:
         # `topics` returns the names of existing topics.
         self._feed, self._existing_topics = feed, topics
         self._topics: dict[str, TopicSeries] = {}
-        self._shared: dict[str, _Shared] = {}  # in order of dependency
+        self._shared: dict[str, _SharedSamples] = {}  # in order of dependency
         self.all: list[Curve] = []
 
     # -- commands of the user ----------------------------------------------------------------------
@@ -117,14 +117,14 @@ class Curves:
         """
         source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]
-        if isinstance(source, FieldSource) and source.path.has_every:
+        if isinstance(source, FieldSource) and source.path.has_wildcard:
             payload = self.payload_of(source.topic)
             sources = [FieldSource(source.topic, path) for path in source.path.expanded(payload)]
         return self.add_sources(sources, text)
 
     def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
         """Add the curves of a field, even if its topic doesn't exist."""
-        paths = path.expanded(self.payload_of(topic)) if path.has_every else [path]
+        paths = path.expanded(self.payload_of(topic)) if path.has_wildcard else [path]
         return self.add_sources([FieldSource(topic, each) for each in paths], str(FieldSource(topic, path)))
 
     def add_sources(self, sources: Sequence[Source], text: str) -> list[Curve]:
@@ -138,7 +138,7 @@ class Curves:
         curves = []
         for source in new:
             shared = self._acquire(source)
-            curves.append(Curve(str(source), source, shared.samples, shared.of))
+            curves.append(Curve(str(source), source, shared.samples, shared.series))
         self.all += curves
         self._distribute_capacity()
         return curves
@@ -168,7 +168,7 @@ class Curves:
         known = self._topics.get(topic)
         return known.payload if known is not None else MISSING
 
-    def fields(self, topic: str) -> list[FieldFound]:
+    def fields(self, topic: str) -> list[PlottableField]:
         """Return the fields of a plotted topic that can be shown in a plot."""
         payload = self.payload_of(topic)
         return [] if payload is MISSING else list(fields_of(payload))
@@ -179,18 +179,18 @@ class Curves:
         return sum(each.lost for each in self._topics.values())
 
     @property
-    def unread(self) -> int:
+    def unread_count(self) -> int:
         """Number of messages that can't be decoded, are too large, or have an invalid time stamp."""
         return sum(each.unread + each.unplaced for each in self._topics.values())
 
     @property
-    def undone(self) -> int:
+    def discarded_count(self) -> int:
         """Number of samples and states that were removed because a clock was set back."""
         fields = [field for topic in self._topics.values() for field in topic.fields]
         return sum(field.numbers.undone + field.states.undone for field in fields)
 
     @property
-    def forgotten(self) -> int:
+    def evicted_count(self) -> int:
         """Number of old samples and states that were evicted."""
         states = [each.states for each in self.all if each.states is not None]
         return sum(each.samples.begun for each in self.all) + sum(each.forgotten for each in states)
@@ -206,21 +206,21 @@ class Curves:
         ]
         return max(found, default=None)
 
-    def advice(self, curve: Curve) -> str:
+    def no_values_reason(self, curve: Curve) -> str:
         """Return why a curve has no values; "" if it has some or may get some."""
-        if curve.of is None or len(curve.samples) or len(curve.of.states):
+        if curve.series is None or len(curve.samples) or len(curve.series.states):
             return ""
-        payload = self.payload_of(curve.of.topic)
+        payload = self.payload_of(curve.series.topic)
         if payload is MISSING:
             return ""
-        found = curve.of.path.value_in(payload)
+        found = curve.series.path.value_in(payload)
         if kind_of_value(found) in {"number", "state"}:
             return ""
         if found is MISSING:
-            near = meant_field(curve.of.path, payload)
+            near = nearest_field(curve.series.path, payload)
             if near is None:
                 return _("{field} does not exist.").format(field=curve.text)
-            meant = FieldSource(curve.of.topic, FieldPath.parse(near))
+            meant = FieldSource(curve.series.topic, FieldPath.parse(near))
             return _("{field} does not exist. Did you mean {near}?").format(field=curve.text, near=meant)
         return _("{field} is not a number, text or boolean. Choose one of its fields.").format(
             field=curve.text
@@ -231,53 +231,57 @@ class Curves:
     def _known_topics(self) -> list[str]:
         return list(dict.fromkeys([*self._topics, *self._existing_topics()]))
 
-    def _acquire(self, source: Source) -> _Shared:
+    def _acquire(self, source: Source) -> _SharedSamples:
         # Creates it at the first use; counts the users.
         name = str(source)
         shared = self._shared.get(name)
         if shared is None:
             shared = self._make(source)
             self._shared[name] = shared
-        shared.users += 1
+        shared.user_count += 1
         return shared
 
-    def _make(self, source: Source) -> _Shared:
+    def _make(self, source: Source) -> _SharedSamples:
         if isinstance(source, FieldSource):
             return self._make_field(source)
         if isinstance(source, WindowSource):
-            of = self._acquire(source.of)
+            of = self._acquire(source.source)
             calculated: Calculated = WindowCurve(source.kind, of.samples, source.window_s)
-            return _Shared(calculated.samples, needs=[str(source.of)], calculated=calculated)
+            return _SharedSamples(
+                calculated.samples, dependencies=[str(source.source)], calculated=calculated
+            )
         assert isinstance(source, ExpressionSource)  # noqa: S101  the only other type
         inputs = [self._acquire(each).samples for each in source.inputs]
         calculated = ExpressionCurve(source.calculate, inputs)
-        return _Shared(calculated.samples, needs=[str(each) for each in source.inputs], calculated=calculated)
+        return _SharedSamples(
+            calculated.samples, dependencies=[str(each) for each in source.inputs], calculated=calculated
+        )
 
-    def _make_field(self, source: FieldSource) -> _Shared:
+    def _make_field(self, source: FieldSource) -> _SharedSamples:
         topic = self._topics.get(source.topic)
         if topic is None:
             topic = self._topics[source.topic] = TopicSeries(source.topic, self._feed.origin_ns)
-            self._feed.join(source.topic, topic)
+            self._feed.register(source.topic, topic)
         series = FieldSeries(source.topic, source.path)
-        topic.join(series)
-        return _Shared(series.numbers, of=series)
+        topic.add_field(series)
+        return _SharedSamples(series.numbers, series=series)
 
     def _release(self, name: str) -> None:
         shared = self._shared[name]
-        shared.users -= 1
-        if shared.users > 0:
+        shared.user_count -= 1
+        if shared.user_count > 0:
             return
         del self._shared[name]
-        for each in shared.needs:
+        for each in shared.dependencies:
             self._release(each)
-        if shared.of is not None:
-            topic = self._topics[shared.of.topic]
-            topic.fields.remove(shared.of)
+        if shared.series is not None:
+            topic = self._topics[shared.series.topic]
+            topic.fields.remove(shared.series)
             if not topic.fields:
                 del self._topics[topic.topic]
-                self._feed.leave(topic.topic, topic)
+                self._feed.unregister(topic.topic, topic)
 
     def _distribute_capacity(self) -> None:
-        each = max(MIN_SAMPLES, min(MAX_SAMPLES, MAX_SAMPLES_TOGETHER // max(1, len(self._shared))))
+        each = max(MIN_SAMPLES, min(MAX_SAMPLES, MAX_TOTAL_SAMPLES // max(1, len(self._shared))))
         for shared in self._shared.values():
             shared.samples.limit = each

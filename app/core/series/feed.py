@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol
 
 from app.core.network.mailbox import Batch
-from app.core.network.watches import Watching
+from app.core.network.watches import WatchHandle
 
-BETWEEN_TICKS = 8192
+DEEP_CAPACITY = 8192
 """Maximum number of messages of a plotted topic between ticks; enough for 8 s at 1 kHz."""
 
 
-class SeriesTaker(Protocol):
+class SeriesReceiver(Protocol):
     """Receiver of the messages of a topic."""
 
     def process(self, batch: Batch, now_ns: int) -> None:
@@ -31,16 +31,16 @@ class SeriesFeed:
 
     def __init__(
         self,
-        watch: Callable[[str], Watching],
+        watch: Callable[[str], WatchHandle],
         clock_ns: Callable[[], int],
         set_room: Callable[[str, int | None], None] = lambda _topic, _messages: None,
     ) -> None:
         # `watch` opens a watch by topic key; `set_room` sets the number of messages kept between ticks
         # (`Mailbox.set_room`).
         self._watch, self._clock_ns, self._set_room = watch, clock_ns, set_room
-        self._takers: dict[str, list[SeriesTaker]] = {}
-        self._deep: dict[str, list[SeriesTaker]] = {}
-        self._watching: dict[str, Watching] = {}
+        self._takers: dict[str, list[SeriesReceiver]] = {}
+        self._deep: dict[str, list[SeriesReceiver]] = {}
+        self._watching: dict[str, WatchHandle] = {}
         self.origin_ns = clock_ns()
 
     @property
@@ -52,7 +52,7 @@ class SeriesFeed:
         """Return this computer's current time in seconds since ``origin_ns``."""
         return (self._clock_ns() - self.origin_ns) / 1e9
 
-    def join(self, topic: str, taker: SeriesTaker, *, deep: bool = True) -> None:
+    def register(self, topic: str, taker: SeriesReceiver, *, deep: bool = True) -> None:
         """Pass the messages of a topic to ``taker``.
 
         Without ``deep``, messages may be dropped while the window is busy, and a recording provides no
@@ -63,11 +63,11 @@ class SeriesFeed:
             deep_ones = self._deep.setdefault(topic, [])
             deep_ones.append(taker)
             if len(deep_ones) == 1:
-                self._set_room(topic, BETWEEN_TICKS)
+                self._set_room(topic, DEEP_CAPACITY)
         if topic not in self._watching:
             self._watching[topic] = self._watch(topic)
 
-    def leave(self, topic: str, taker: SeriesTaker) -> None:
+    def unregister(self, topic: str, taker: SeriesReceiver) -> None:
         """Remove a receiver. Idempotent."""
         takers, deep = self._takers.get(topic, []), self._deep.get(topic, [])
         if taker in takers:

@@ -18,11 +18,11 @@ from app.errors import CurveError
 from nep.errors import nearest
 from nep.i18n import _
 
-EVERY: Final = "*"
+WILDCARD: Final = "*"
 """Step that stands for every element of an array. As a key, it would be quoted in brackets."""
 MAX_STEPS, MAX_EVERY, MAX_FIELDS = 32, 65, 2000
 MAX_LENGTH = 400
-ALONE = "value"
+BARE_VALUE_KEY = "value"
 _STEP = re.compile(
     r"""\.?(?P<name>[^.\[\]"\s]+)|\[(?P<index>-?\d{1,9})\]"""
     r"""|\[(?P<every>\*)\]|\[(?P<key>"(?:[^"\\]|\\.)*")\]"""
@@ -45,15 +45,15 @@ class Missing:
 MISSING: Final = Missing()
 
 
-class Every:
+class Wildcard:
     """Type of `ALL`, the step ``[*]``."""
 
     def __repr__(self) -> str:
         return "[*]"
 
 
-ALL: Final = Every()
-Step = str | int | Every
+ALL: Final = Wildcard()
+Step = str | int | Wildcard
 
 
 def is_list(value: object) -> bool:
@@ -81,20 +81,20 @@ class FieldPath:
                         path=text[:80]
                     )
                 )
-            steps.append(_step_of(found))
+            steps.append(_parse_step(found))
             at = found.end()
         if not steps:
             raise CurveError(_("the field after the topic is missing"))
         return cls(tuple(steps))
 
     @property
-    def has_every(self) -> bool:
+    def has_wildcard(self) -> bool:
         """True if the path contains a wildcard and so may match several values."""
         return ALL in self.steps
 
     def __str__(self) -> str:
         # Can be parsed again.
-        written = "".join(_written(step) for step in self.steps)
+        written = "".join(_format_step(step) for step in self.steps)
         return written.removeprefix(".")
 
     def value_in(self, payload: object) -> object:
@@ -107,7 +107,7 @@ class FieldPath:
             elif isinstance(step, int) and is_list(here):
                 few: Sequence[object] = here  # type: ignore[assignment]
                 here = few[step] if -len(few) <= step < len(few) else MISSING
-            elif self.steps == (ALONE,) and not is_list(here):
+            elif self.steps == (BARE_VALUE_KEY,) and not is_list(here):
                 return here
             else:
                 return MISSING
@@ -121,7 +121,7 @@ class FieldPath:
         At most 65, one more than the curves of a plot, so that too many are reported and not silently cut
         off.
         """
-        if not self.has_every:
+        if not self.has_wildcard:
             return [self]
         place = self.steps.index(ALL)
         above = FieldPath(self.steps[:place]).value_in(payload) if place else payload
@@ -133,7 +133,7 @@ class FieldPath:
         return found[:MAX_EVERY]
 
 
-def _step_of(found: re.Match[str]) -> Step:
+def _parse_step(found: re.Match[str]) -> Step:
     if found["name"] is not None:
         return found["name"]
     if found["index"] is not None:
@@ -151,8 +151,8 @@ def _step_of(found: re.Match[str]) -> Step:
     return str(key)
 
 
-def _written(step: Step) -> str:
-    if isinstance(step, Every):
+def _format_step(step: Step) -> str:
+    if isinstance(step, Wildcard):
         return "[*]"
     if isinstance(step, int):
         return f"[{step}]"
@@ -160,7 +160,7 @@ def _written(step: Step) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class FieldFound:
+class PlottableField:
     """Plottable value of a message: a number, a state (text, boolean), or an array of numbers."""
 
     path: FieldPath
@@ -169,14 +169,14 @@ class FieldFound:
     count: int = 1
 
 
-def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[FieldFound]:
+def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[PlottableField]:
     """Yield the plottable values of a message, upper levels first.
 
     For an array, the first elements and ``[*]`` are included.
     """
     waiting: list[tuple[tuple[Step, ...], object]] = [((), payload)]
     if not isinstance(payload, Mapping) and not is_list(payload):
-        waiting = [((ALONE,), payload)]
+        waiting = [((BARE_VALUE_KEY,), payload)]
     produced = 0
     while waiting and produced < most:
         steps, here = waiting.pop(0)
@@ -184,7 +184,7 @@ def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[FieldFound]:
         if kind is not None:
             produced += 1
             count = len(here) if kind == "list" else 1  # type: ignore[arg-type]
-            yield FieldFound(FieldPath((*steps, ALL) if kind == "list" else steps), kind, here, count)
+            yield PlottableField(FieldPath((*steps, ALL) if kind == "list" else steps), kind, here, count)
         if len(steps) >= MAX_STEPS or len(waiting) > most:
             continue
         if isinstance(here, Mapping):
@@ -210,7 +210,7 @@ def kind_of_value(value: object) -> FieldKind | None:
     return None
 
 
-def completed(text: str, known: Sequence[str]) -> str:
+def complete(text: str, known: Sequence[str]) -> str:
     """Complete ``text`` up to the next dot, bracket or end that all matching entries of ``known`` share."""
     fitting = [each for each in known if each.startswith(text)]
     if not fitting:
@@ -223,6 +223,6 @@ def completed(text: str, known: Sequence[str]) -> str:
     return common[: ends[0] + 1] if ends else common
 
 
-def meant_field(path: FieldPath, payload: object) -> str | None:
+def nearest_field(path: FieldPath, payload: object) -> str | None:
     """Return the path of the most similar field in a message; None if none is similar."""
     return nearest(str(path), [str(each.path) for each in fields_of(payload)])

@@ -18,14 +18,14 @@ from nep.errors import NepError
 if TYPE_CHECKING:
     from nep.messages.message import Message
 
-LATEST_STAMP_NS = 1 << 63
+MAX_STAMP_NS = 1 << 63
 """Latest valid time stamp (in the year 2262); later ones are counted and their messages skipped."""
 SILENCE_S, SILENCES = 1.0, 8.0
 """Minimum silence that counts as a gap: seconds, and number of usual intervals."""
-SILENCES_IN_A_ROW = 3
+MIN_SILENCES = 3
 """Number of consecutive gaps after which their length becomes the usual interval."""
 MAX_PUBLISHERS = 64
-UNREAD = object()
+UNREADABLE = object()
 """Placeholder for a message that can't be read."""
 
 
@@ -62,7 +62,7 @@ class FieldSeries:
         for time_s, payload, gap in zip(times_s, payloads, gaps, strict=True):
             if gap:
                 number_gap = state_gap = True
-            value = MISSING if payload is UNREAD else find(payload)
+            value = MISSING if payload is UNREADABLE else find(payload)
             kind = type(value)
             if kind is float or kind is int:
                 times.append(time_s)
@@ -80,7 +80,7 @@ class FieldSeries:
                 if has_states:
                     self.states.add(time_s, None)
                 number_gap = True
-            if payload is not UNREAD:
+            if payload is not UNREADABLE:
                 self.last = value
         if times:
             self.numbers.extend(np.array(times), np.array(values), np.array(marks, dtype=bool))
@@ -125,7 +125,7 @@ class TopicSeries:
         self._usual_s: float | None = None
         self._silences = 0  # consecutive
 
-    def join(self, field: FieldSeries) -> None:
+    def add_field(self, field: FieldSeries) -> None:
         """Add a field, which is read from the newest message and from all later ones."""
         self.fields.append(field)
         if self.payload is not MISSING and self._last_s is not None:
@@ -189,20 +189,20 @@ class TopicSeries:
         stamp_ns = message.stamp_ns
         if stamp_ns is None:
             stamp_ns = now_ns
-        if not 0 <= stamp_ns < LATEST_STAMP_NS:
+        if not 0 <= stamp_ns < MAX_STAMP_NS:
             return None
         known = message.kind.clock.difference
-        return (stamp_ns + (0 if known is None else known.add_ns) - self._origin_ns) / 1e9
+        return (stamp_ns + (0 if known is None else known.offset_ns) - self._origin_ns) / 1e9
 
     def _read(self, message: Message) -> object:
         if message.size_bytes > LARGE_BYTES or message.codec == "image":
             self.unread += 1
-            return UNREAD
+            return UNREADABLE
         try:
             self.payload = payload = message.payload
         except (NepError, ValueError, RecursionError):
             self.unread += 1
-            return UNREAD
+            return UNREADABLE
         return payload
 
     def _is_silence(self, time_s: float) -> bool:
@@ -217,7 +217,7 @@ class TopicSeries:
             return False
         if usual_s is not None and pause_s > max(SILENCE_S, SILENCES * usual_s):
             self._silences += 1
-            if self._silences < SILENCES_IN_A_ROW:
+            if self._silences < MIN_SILENCES:
                 return True
             usual_s = None
         self._silences = 0

@@ -28,8 +28,8 @@ from nep.system.syntax import parse_expression
 
 MAX_LENGTH, MAX_NODES = 400, 120
 MAX_WINDOW_S = 600.0
-Windowed = Literal["difference", "derivative", "integral", "mean"]
-WINDOWED: tuple[Windowed, ...] = ("difference", "derivative", "integral", "mean")
+WindowFunction = Literal["difference", "derivative", "integral", "mean"]
+WINDOW_FUNCTIONS: tuple[WindowFunction, ...] = ("difference", "derivative", "integral", "mean")
 Calculation = Callable[[Sequence[Floats]], Floats]
 
 FUNCTIONS: dict[str, tuple[int, Callable[..., Floats]]] = {
@@ -67,12 +67,16 @@ class FieldSource:
 class WindowSource:
     """Change of a source over time, or its mean over the last ``window_s`` seconds."""
 
-    kind: Windowed
-    of: Source
+    kind: WindowFunction
+    source: Source
     window_s: float = 0.0
 
     def __str__(self) -> str:
-        return f"mean({self.of}, {self.window_s:g} s)" if self.kind == "mean" else f"{self.kind}({self.of})"
+        return (
+            f"mean({self.source}, {self.window_s:g} s)"
+            if self.kind == "mean"
+            else f"{self.kind}({self.source})"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +100,7 @@ class ExpressionSource:
 Source = FieldSource | WindowSource | ExpressionSource
 
 
-def address(text: str, topics: Sequence[str]) -> FieldSource | None:
+def parse_field(text: str, topics: Sequence[str]) -> FieldSource | None:
     """Return the field if the text is a single field; otherwise None.
 
     Raises `CurveError` if the text consists of a topic and an invalid path.
@@ -123,17 +127,17 @@ def parse(text: str, topics: Sequence[str]) -> Source:
     text = text.strip()
     if not text or len(text) > MAX_LENGTH:
         raise CurveError(_("enter a field, such as /odom.speed, or a formula with fields"))
-    found = address(text, topics)
+    found = parse_field(text, topics)
     return found if found is not None else _Parser(text, topics).read()
 
 
 def _topic_at(text: str, topics: Sequence[str]) -> str | None:
     # Longest topic at the start of the text.
-    fitting = [name for name in topics if text.startswith(name) and _ends(text, len(name))]
+    fitting = [name for name in topics if text.startswith(name) and _ends_at(text, len(name))]
     return max(fitting, key=len, default=None)
 
 
-def _ends(text: str, place: int) -> bool:
+def _ends_at(text: str, place: int) -> bool:
     return place == len(text) or not (text[place].isalnum() or text[place] in "_/")
 
 
@@ -145,7 +149,7 @@ class _Parser:
         self._fields: list[FieldSource] = []
 
     def read(self) -> Source:
-        python = self._without_fields()
+        python = self._to_python()
         try:
             tree = parse_expression(python)
         except (SyntaxError, ValueError, MemoryError, RecursionError):
@@ -157,7 +161,7 @@ class _Parser:
             raise CurveError(_("the formula has no field, so its value never changes"))
         return source
 
-    def _without_fields(self) -> str:
+    def _to_python(self) -> str:
         # As Python source: a name for each field, seconds for each duration.
         out: list[str] = []
         place, wants_value = 0, True
@@ -192,7 +196,7 @@ class _Parser:
         if path is None:
             raise CurveError(_("the field after {topic} is missing").format(topic=topic))
         found = FieldSource(topic, FieldPath.parse(path[0].removeprefix(".")))
-        if found.path.has_every:
+        if found.path.has_wildcard:
             raise CurveError(_("a formula can't use [*]; choose one element, such as [0]"))
         self._fields.append(found)
         return place + path.end()
@@ -201,13 +205,17 @@ class _Parser:
         # None for a number.
         if isinstance(node, ast.Name) and node.id[1:].isdigit() and node.id.startswith("_"):
             return self._fields[int(node.id[1:])]
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in WINDOWED:
-            return self._windowed(node, node.func.id)
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id in WINDOW_FUNCTIONS
+        ):
+            return self._parse_window(node, node.func.id)
         inputs: list[Source] = []
         calculate = self._calculation(node, inputs)
-        return ExpressionSource(self._as_typed(node), tuple(inputs), calculate) if inputs else None
+        return ExpressionSource(self._source_text(node), tuple(inputs), calculate) if inputs else None
 
-    def _windowed(self, node: ast.Call, kind: str) -> WindowSource:
+    def _parse_window(self, node: ast.Call, kind: str) -> WindowSource:
         wanted = 2 if kind == "mean" else 1
         if len(node.args) != wanted or node.keywords:
             example = "mean(/odom.speed, 2 s)" if kind == "mean" else f"{kind}(/odom.speed)"
@@ -224,7 +232,7 @@ class _Parser:
                 window_s = float(window.value)  # type: ignore[arg-type]
             if not 0 < window_s <= MAX_WINDOW_S:
                 raise CurveError(_("the duration of a mean must be greater than 0 and at most 600 s"))
-        return WindowSource(next(each for each in WINDOWED if each == kind), of, window_s)
+        return WindowSource(next(each for each in WINDOW_FUNCTIONS if each == kind), of, window_s)
 
     def _calculation(self, node: ast.expr, inputs: list[Source]) -> Calculation:
         # Adds the needed sources to `inputs`.
@@ -246,7 +254,7 @@ class _Parser:
             return self._call(node, node.func.id, inputs)
         if isinstance(node, (ast.Name, ast.Call)):
             return self._input(node, inputs)
-        raise CurveError(_("'{text}' can't be evaluated").format(text=self._as_typed(node)[:80]))
+        raise CurveError(_("'{text}' can't be evaluated").format(text=self._source_text(node)[:80]))
 
     def _call(self, node: ast.Call, name: str, inputs: list[Source]) -> Calculation:
         wanted, function = FUNCTIONS[name]
@@ -258,10 +266,10 @@ class _Parser:
     def _input(self, node: ast.Name | ast.Call, inputs: list[Source]) -> Calculation:
         # A field, or a function that needs more than the samples of one time.
         called = node.func if isinstance(node, ast.Call) else node
-        name = called.id if isinstance(called, ast.Name) else self._as_typed(called)
+        name = called.id if isinstance(called, ast.Name) else self._source_text(called)
         is_field = isinstance(node, ast.Name) and re.fullmatch(r"_\d+", name)
-        if not is_field and not (isinstance(node, ast.Call) and name in WINDOWED):
-            near = nearest(name, [*FUNCTIONS, *WINDOWED])
+        if not is_field and not (isinstance(node, ast.Call) and name in WINDOW_FUNCTIONS):
+            near = nearest(name, [*FUNCTIONS, *WINDOW_FUNCTIONS])
             template = _("'{name}' does not exist; {hint}")
             hint = (
                 _("did you mean '{near}'?").format(near=near)
@@ -276,7 +284,7 @@ class _Parser:
         place = inputs.index(source)
         return lambda arrays: arrays[place]
 
-    def _as_typed(self, node: ast.expr) -> str:
+    def _source_text(self, node: ast.expr) -> str:
         written = ast.unparse(node).replace("**", "^")
         return re.sub(r"\b_(\d+)\b", lambda found: str(self._fields[int(found[1])]), written)
 

@@ -26,18 +26,18 @@ RAW_PER_COLUMN = 4
 """Number of samples per pixel up to which each sample is drawn."""
 FEW_RANGES, FEW_NUMBERS = 8, 4096
 """Numbers of ranges and samples up to which a Python loop is faster than a vectorized reduction."""
-_FIRST_ROOM = 1024
-_GRAIN = 1 << SHIFTS[-1]
-_REWRITES_KEPT = 256
+_INITIAL_CAPACITY = 1024
+_EVICTION_UNIT = 1 << SHIFTS[-1]
+_MAX_REWRITES = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Figures:
+class RangeStats:
     """Statistics of a range; minimum, maximum and mean are None without samples."""
 
     count: int = 0
-    least: float | None = None
-    most: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
     mean: float | None = None
 
 
@@ -51,7 +51,7 @@ class Line:
     times: Floats
     values: Floats
     points: int
-    is_whole: bool
+    is_complete: bool
 
 
 class _Level:
@@ -78,7 +78,7 @@ class _Level:
             self.total[new] = part.sum(axis=1)
         self.built = whole
 
-    def forget(self, buckets: int) -> None:
+    def discard(self, buckets: int) -> None:
         kept = max(0, self.built - buckets)
         for each in (self.low, self.high, self.total):
             each[:kept] = each[buckets : buckets + kept].copy()
@@ -113,7 +113,7 @@ class _Pixels:
         )
 
     @classmethod
-    def joined(cls, parts: Sequence[_Pixels]) -> _Pixels:
+    def join(cls, parts: Sequence[_Pixels]) -> _Pixels:
         # The parts must be adjacent.
         names = ("keys", "times", "values", "broken")
         arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
@@ -121,7 +121,7 @@ class _Pixels:
 
 
 @dataclass(slots=True)
-class _Drawn:
+class _PixelCache:
     """Cache of the last drawn pixels that later samples can't change.
 
     A scrolling plot draws almost the same pixels again.
@@ -147,11 +147,11 @@ class Samples:
         self.limit = limit
         self.begun = self.undone = 0
         self._count = 0
-        self._times, self._values = np.empty(_FIRST_ROOM), np.empty(_FIRST_ROOM)
-        self._gaps = np.zeros(_FIRST_ROOM, dtype=bool)
+        self._times, self._values = np.empty(_INITIAL_CAPACITY), np.empty(_INITIAL_CAPACITY)
+        self._gaps = np.zeros(_INITIAL_CAPACITY, dtype=bool)
         self._levels = tuple(_Level(shift) for shift in SHIFTS)
-        self._render_cache = _Drawn()
-        self._rewrites: deque[tuple[int, float]] = deque(maxlen=_REWRITES_KEPT)
+        self._render_cache = _PixelCache()
+        self._rewrites: deque[tuple[int, float]] = deque(maxlen=_MAX_REWRITES)
         self.rewritten = 0
         self._gap_pending = False
 
@@ -199,7 +199,7 @@ class Samples:
         """Append samples in order of arrival; samples that aren't finite become gaps."""
         good = np.isfinite(times) & np.isfinite(values)
         if not good.all():
-            gaps = _gaps_carried(gaps, good)
+            gaps = _carry_gaps(gaps, good)
             if not good.any():
                 self._gap_pending = self._gap_pending or self._count > 0
                 return
@@ -294,7 +294,7 @@ class Samples:
 
     def _shrink_arrays(self) -> None:
         # After the limit became much smaller, because more curves share the plot's capacity.
-        if len(self._times) > 4 * max(self.limit, self._count, _FIRST_ROOM):
+        if len(self._times) > 4 * max(self.limit, self._count, _INITIAL_CAPACITY):
             for name in ("_times", "_values", "_gaps"):
                 setattr(self, name, getattr(self, name)[: self._count].copy())
 
@@ -302,7 +302,9 @@ class Samples:
         if self._count <= self.limit:
             return
         oldest = self._count - self.limit * 3 // 4
-        drop = min(-(-oldest // _GRAIN) * _GRAIN, self._count // _GRAIN * _GRAIN)
+        drop = min(
+            -(-oldest // _EVICTION_UNIT) * _EVICTION_UNIT, self._count // _EVICTION_UNIT * _EVICTION_UNIT
+        )
         if drop <= 0:
             return
         kept = self._count - drop
@@ -311,13 +313,13 @@ class Samples:
         for each in (self._times, self._values, self._gaps):
             each[:kept] = each[drop : self._count].copy()
         for level in self._levels:
-            level.forget(drop >> level.shift)
+            level.discard(drop >> level.shift)
         self._count, self.begun = kept, self.begun + drop
         self._shrink_arrays()
 
     # -- queries -----------------------------------------------------------------------------------
 
-    def places(self, begin_s: float, end_s: float) -> tuple[int, int]:
+    def index_range(self, begin_s: float, end_s: float) -> tuple[int, int]:
         """Return the index range of the samples in an inclusive time range, as (first, last + 1)."""
         first = np.searchsorted(self.times, begin_s, side="left")
         return int(first), int(np.searchsorted(self.times, end_s, side="right"))
@@ -331,7 +333,7 @@ class Samples:
             return None
         return float(self._times[place]), float(self._values[place])
 
-    def beside(self, time_s: float, steps: int) -> float | None:
+    def time_at_step(self, time_s: float, steps: int) -> float | None:
         """Return the time of the sample ``steps`` samples after (or before) a time; None if there is none."""
         if steps > 0:
             place = int(np.searchsorted(self.times, time_s, side="right")) + steps - 1
@@ -339,14 +341,14 @@ class Samples:
             place = int(np.searchsorted(self.times, time_s, side="left")) + steps
         return float(self._times[place]) if 0 <= place < self._count else None
 
-    def figures(self, begin_s: float, end_s: float) -> Figures:
+    def stats(self, begin_s: float, end_s: float) -> RangeStats:
         """Return the statistics of a range."""
-        first, end = self.places(begin_s, end_s)
+        first, end = self.index_range(begin_s, end_s)
         if end <= first:
-            return Figures()
-        low, high, total = self._reduced(np.array([first]), np.array([end]))
+            return RangeStats()
+        low, high, total = self._reduce_ranges(np.array([first]), np.array([end]))
         mean = float(total[0]) / (end - first)
-        return Figures(end - first, float(low[0]), float(high[0]), mean if isfinite(mean) else None)
+        return RangeStats(end - first, float(low[0]), float(high[0]), mean if isfinite(mean) else None)
 
     def line(self, begin_s: float, end_s: float, columns: int) -> Line:
         """Return the polyline for a range on ``columns`` pixels.
@@ -354,14 +356,14 @@ class Samples:
         Contains all samples, or the minimum and maximum in each pixel, and one sample on each side of the
         range, so that the line reaches the edges.
         """
-        first, end = self.places(begin_s, end_s)
+        first, end = self.index_range(begin_s, end_s)
         points = end - first
         first, end = max(0, first - 1), min(self._count, end + 1)
         columns = max(1, columns)
         if end - first <= RAW_PER_COLUMN * columns or end_s <= begin_s:
             pixel_s = max(0.0, end_s - begin_s) / columns
-            return Line(*self._all_samples(first, end, pixel_s), points, is_whole=True)
-        return self._peaks(begin_s, end_s, columns, (first, end))
+            return Line(*self._all_samples(first, end, pixel_s), points, is_complete=True)
+        return self._peak_line(begin_s, end_s, columns, (first, end))
 
     def _all_samples(self, first: int, end: int, pixel_s: float) -> tuple[Floats, Floats]:
         # NaN at gaps; a sample between two gaps is drawn one pixel wide.
@@ -379,7 +381,7 @@ class Samples:
             np.insert(values, places, np.concatenate([values[alone], np.full(len(broken), np.nan)])),
         )
 
-    def _peaks(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Line:
+    def _peak_line(self, begin_s: float, end_s: float, columns: int, part: tuple[int, int]) -> Line:
         width = (end_s - begin_s) / columns
         if 1e-30 < width < 1e30:  # rounded, so that the edges of pixels stay the same while the plot moves
             width = float(np.float32(width))
@@ -387,7 +389,7 @@ class Samples:
         first, end = begin - 1, begin + columns + 1  # one more pixel, so that the line reaches the edge
         known = self._valid_pixels(width).part(first, end - 1)
         if len(known.keys) and known.keys[0] == first:
-            pixels = _Pixels.joined((known, self._pixels(width, (known.end, end), None, part[1])))
+            pixels = _Pixels.join((known, self._pixels(width, (known.end, end), None, part[1])))
         else:
             place, inside = np.searchsorted(self.times, (width * first, width * begin))
             alone = bool(place == inside)  # then the sample before the range is used instead
@@ -395,13 +397,13 @@ class Samples:
             first += alone
         sure = float(np.floor(self._times[self._count - 1] / width)) - 1  # later pixels may get more samples
         kept = pixels.part(first, max(first, min(sure, end - 1)))
-        self._render_cache = _Drawn(width, self.rewritten, self.begun, kept)
+        self._render_cache = _PixelCache(width, self.rewritten, self.begun, kept)
         times, values = pixels.times, pixels.values
         broken = 2 * np.flatnonzero(pixels.broken)
         broken = broken[broken > 0]
         if len(broken):
             times, values = np.insert(times, broken, times[broken]), np.insert(values, broken, np.nan)
-        return Line(times, values, part[1] - part[0], is_whole=False)
+        return Line(times, values, part[1] - part[0], is_complete=False)
 
     def _valid_pixels(self, width_s: float) -> _Pixels:
         # The part of the last rendering that is still valid.
@@ -428,7 +430,7 @@ class Samples:
         if not len(there):
             return _Pixels(*keys)
         starts, ends = places[there], places[there + 1]
-        low, high = self._least_and_most(starts, ends)
+        low, high = self._min_and_max(starts, ends)
         times, values = np.repeat(edges[there] + width / 2, 2), np.empty(2 * len(there))
         rising = self._values[ends - 1] < self._values[starts]  # closer to the actual shape of the line
         values[0::2], values[1::2] = np.where(rising, high, low), np.where(rising, low, high)
@@ -436,15 +438,15 @@ class Samples:
         times[1::2] += np.where(low == high, width / 2, 0.0)
         return _Pixels(*keys, keys[0] + there.astype(np.float64), times, values, self._gaps[starts])
 
-    def _least_and_most(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats]:
+    def _min_and_max(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats]:
         # Of each index range; none is empty.
         if len(starts) > FEW_RANGES or ends[-1] - starts[0] > FEW_NUMBERS:
-            low, high, _total = self._reduced(starts, ends)
+            low, high, _total = self._reduce_ranges(starts, ends)
             return low, high
         parts = [self._values[start:end] for start, end in zip(starts, ends, strict=True)]
         return np.array([part.min() for part in parts]), np.array([part.max() for part in parts])
 
-    def _reduced(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats, Floats]:
+    def _reduce_ranges(self, starts: Indexes, ends: Indexes) -> tuple[Floats, Floats, Floats]:
         # Minimum, maximum and sum of each index range; none is empty. Exact: partial buckets use the samples.
         mean_count = float(np.mean(ends - starts))
         fitting = [level for level in self._levels if 4**level.shift <= mean_count * 4]
@@ -484,7 +486,7 @@ def _reduce(
     return low, high, total
 
 
-def _gaps_carried(gaps: NDArray[np.bool_], good: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _carry_gaps(gaps: NDArray[np.bool_], good: NDArray[np.bool_]) -> NDArray[np.bool_]:
     # Moves the gaps of skipped samples to the next one.
     bad_before = np.concatenate([[False], ~good[:-1]])
     carried = gaps.copy()

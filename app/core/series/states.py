@@ -19,7 +19,7 @@ class StateRun:
 
     begin_s: float
     end_s: float
-    word: str | None
+    value: str | None
 
 
 class States:
@@ -47,12 +47,12 @@ class States:
             gap = True
         word = word if word is None else word[:MAX_STATE_LENGTH]
         if gap and self._words and self._words[-1] is not None and self.last_s is not None:
-            self._begin(self.last_s, None)
+            self._start_run(self.last_s, None)
         if not self._words or self._words[-1] != word:
-            self._begin(time_s, word)
+            self._start_run(time_s, word)
         self.last_s = time_s
 
-    def _begin(self, time_s: float, word: str | None) -> None:
+    def _start_run(self, time_s: float, word: str | None) -> None:
         self._begins.append(time_s)
         self._words.append(word)
         if len(self._begins) > self._limit:
@@ -84,7 +84,7 @@ class States:
             step_s: Duration in which one run is sufficient.
             without: Values to be skipped; if given, parts with unknown values are skipped too.
         """
-        place, end = self._places(begin_s, end_s)
+        place, end = self._index_range(begin_s, end_s)
         while place < end:
             at_s, word = self._begins[place], self._words[place]
             if without is not None and (word is None or word in without):
@@ -94,12 +94,12 @@ class States:
             # the last run that begins within the step may extend beyond it
             place = max(place + 1, bisect_right(self._begins, at_s + step_s) - 1)
 
-    def words(self, begin_s: float, end_s: float) -> set[str]:
+    def values_in(self, begin_s: float, end_s: float) -> set[str]:
         """Return the distinct values in a range."""
-        first, end = self._places(begin_s, end_s)
+        first, end = self._index_range(begin_s, end_s)
         return {word for word in set(self._words[first:end]) if word is not None}
 
-    def _places(self, begin_s: float, end_s: float) -> tuple[int, int]:
+    def _index_range(self, begin_s: float, end_s: float) -> tuple[int, int]:
         # Index range of the runs in a time range: first, and one behind the last.
         first = max(0, bisect_right(self._begins, begin_s) - 1)
         return first, bisect_right(self._begins, end_s)
@@ -114,16 +114,16 @@ class States:
         place = bisect_right(self._begins, time_s) - 1
         return self._words[place] if place >= 0 else None
 
-    def changes(self, begin_s: float, end_s: float) -> int:
+    def change_count(self, begin_s: float, end_s: float) -> int:
         """Return the number of changes in a range."""
-        first, end = self._places(begin_s, end_s)
+        first, end = self._index_range(begin_s, end_s)
         words = [word for word in self._words[first:end] if word is not None]
         return sum(one != other for one, other in pairwise(words))
 
-    def lasted_s(self, word: str, begin_s: float, end_s: float) -> float:
+    def duration_s(self, word: str, begin_s: float, end_s: float) -> float:
         """Return the total duration of a value in a range, in seconds."""
         return sum(
             max(0.0, min(self._end_of(place), end_s) - max(self._begins[place], begin_s))
-            for place in range(*self._places(begin_s, end_s))
+            for place in range(*self._index_range(begin_s, end_s))
             if self._words[place] == word
         )

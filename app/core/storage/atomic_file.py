@@ -18,13 +18,13 @@ from pathlib import Path
 from nep.i18n import _, number
 from nep.system.replace_file import replace_file
 
-LEFT_AFTER_S = 60.0
+STALE_PART_AGE_S = 60.0
 MAX_BYTES = 10_000_000
 """Maximum size of a file that is read into memory, in bytes."""
 _PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
 
 
-def read_whole(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
+def read_regular_file(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
     """Return the content of a regular file.
 
     Raises OSError for anything else, with the reason in ``strerror``.
@@ -71,7 +71,7 @@ def write_atomically(
     if isinstance(data, bytes) and not data:
         raise ValueError("an empty file is never written over a full one")
     if private:
-        private_folder(path.parent)
+        create_private_folder(path.parent)
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
     try:
@@ -93,35 +93,35 @@ def write_atomically(
 
 def _remove_stale_parts(path: Path) -> None:
     # Removes parts left by killed writers; writes in progress are younger.
-    before = time.time() - LEFT_AFTER_S
+    before = time.time() - STALE_PART_AGE_S
     for part in path.parent.glob(f".{glob.escape(path.name)}.*.part"):
         with contextlib.suppress(OSError):  # removed by another process, or not permitted
             if part.stat().st_mtime < before:
                 part.unlink()
 
 
-def private_folder(folder: Path) -> None:
+def create_private_folder(folder: Path) -> None:
     """Create the folder if necessary, and make it private. Raises OSError if it can't be created.
 
     Folders of other users are left unchanged. On Windows nothing is changed, because user folders are already
     private.
     """
     folder.mkdir(mode=_PRIVATE_FOLDER, parents=True, exist_ok=True)
-    _close_to_others(folder)
+    _restrict_to_owner(folder)
 
 
 def make_private(folder: Path, files: str) -> None:
     """Make a folder and the matching files in it private, because earlier versions did not."""
     if os.name != "posix" or not folder.is_dir():
         return
-    _close_to_others(folder)
+    _restrict_to_owner(folder)
     with contextlib.suppress(OSError):
         for file in folder.glob(files):
             if file.is_file() and not file.is_symlink():
-                _close_to_others(file)
+                _restrict_to_owner(file)
 
 
-def _close_to_others(path: Path) -> None:
+def _restrict_to_owner(path: Path) -> None:
     if os.name != "posix":
         return
     with contextlib.suppress(OSError):  # another user's, or a file system without modes
@@ -135,11 +135,11 @@ def _copy_mode(old: Path, new: Path) -> None:
     try:
         mode = old.stat().st_mode & 0o777
     except FileNotFoundError:
-        mode = _mode_of_new_files(new)
+        mode = _default_mode(new)
     new.chmod(mode)
 
 
-def _mode_of_new_files(beside: Path) -> int:
+def _default_mode(beside: Path) -> int:
     # Determined by creating a file: reading the umask would change it for all threads.
     probe = beside.with_name(f"{beside.stem}.mode.part")  # removed with the others after a crash
     os.close(os.open(probe, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 _START = ("=", "+", "-", "@", "\t", "\r")
 
 
-def harmless(text: str) -> str:
+def escape_formula(text: str) -> str:
     """Prefix a text with an apostrophe if a spreadsheet would interpret it as a formula."""
     return f"'{text}" if text.startswith(_START) else text
 

@@ -13,14 +13,14 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
-LEVELS = 9_000
-SHALLOW = 8_000
+MAX_LEVELS = 9_000
+MAX_SHALLOW_LEVELS = 8_000
 """Number of brackets up to which a text can't be nested too deeply."""
 STACK_BYTES = 255 * 1024 * 1024
 """Size of the stack in bytes; Python for Windows rejects 256 MiB."""
 
 T = TypeVar("T")
-_one_at_a_time = threading.Lock()
+_thread_lock = threading.Lock()
 
 
 def loads(text: str | bytes) -> object:
@@ -28,7 +28,7 @@ def loads(text: str | bytes) -> object:
 
     Raises ValueError for invalid JSON, RecursionError beyond 9000 levels.
     """
-    return deeply(lambda: json.loads(text))
+    return run_deep(lambda: json.loads(text))
 
 
 def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> str:
@@ -39,17 +39,17 @@ def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> s
     try:
         return json.dumps(value, indent=indent, ensure_ascii=ascii)
     except RecursionError:
-        return deeply(lambda: json.dumps(value, ensure_ascii=ascii))
+        return run_deep(lambda: json.dumps(value, ensure_ascii=ascii))
 
 
-def same(one: object, other: object) -> bool:
+def are_equal(one: object, other: object) -> bool:
     """Return True if two values are equal, independent of their depth."""
-    return deeply(lambda: one == other)
+    return run_deep(lambda: one == other)
 
 
 def start_deep(thread: threading.Thread) -> None:
     """Start a thread whose stack is large enough for values with deep nesting."""
-    with _one_at_a_time:
+    with _thread_lock:
         size = threading.stack_size(STACK_BYTES)
         try:
             thread.start()
@@ -57,7 +57,7 @@ def start_deep(thread: threading.Thread) -> None:
             threading.stack_size(size)
 
 
-def deeply(work: Callable[[], T]) -> T:
+def run_deep(work: Callable[[], T]) -> T:
     """Return the result of ``work``, called in a thread with a larger stack if necessary.
 
     ``work`` may be called twice, so it must not have side effects.
@@ -76,9 +76,9 @@ def deeply(work: Callable[[], T]) -> T:
             failed.append(error)
 
     # the recursion limit is global, and the stack size applies to the next thread: one at a time
-    with _one_at_a_time:
+    with _thread_lock:
         limit, size = sys.getrecursionlimit(), threading.stack_size(STACK_BYTES)
-        sys.setrecursionlimit(max(limit, LEVELS))
+        sys.setrecursionlimit(max(limit, MAX_LEVELS))
         try:
             thread = threading.Thread(target=run, name="deep json")
             thread.start()

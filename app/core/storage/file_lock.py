@@ -44,7 +44,7 @@ else:
         pass  # closing unlocks it; a child that inherited the file keeps the lock
 
 
-HELD = frozenset({errno.EACCES, errno.EAGAIN, errno.EWOULDBLOCK, errno.EDEADLK})
+HELD_ERRNOS = frozenset({errno.EACCES, errno.EAGAIN, errno.EWOULDBLOCK, errno.EDEADLK})
 """Error numbers that mean that another process holds the lock; others mean that locks aren't supported."""
 
 
@@ -55,7 +55,7 @@ def _acquire(file: IO[bytes], until: float) -> bool:
         try:
             _lock(file)
         except OSError as error:
-            if error.errno not in HELD or time.monotonic() >= until:
+            if error.errno not in HELD_ERRNOS or time.monotonic() >= until:
                 return False
         else:
             return True
@@ -93,7 +93,7 @@ class FileLock:
             _lock(file)
         except OSError as error:
             file.close()
-            return error.errno not in HELD
+            return error.errno not in HELD_ERRNOS
         self._file = file
         return True
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.storage.atomic_file import read_regular_file, write_atomically
 from nep.errors import NepError
 from nep.i18n import _
 from nep.system.replace_file import replace_file
@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class KeptFile(Generic[T]):
+class StoredFile(Generic[T]):
     """Result of reading such a file.
 
     Attributes:
@@ -31,9 +31,9 @@ class KeptFile(Generic[T]):
     is_newer: bool = False
 
 
-def read_kept(
+def read_stored(
     path: Path, parse: Callable[[bytes], tuple[T, str]], newer: type[NepError], most_bytes: int
-) -> KeptFile[T]:
+) -> StoredFile[T]:
     """Read a file of limited size; from a damaged file, the readable part is used.
 
     ``parse`` returns the value, and a problem or "". It raises `NepError` for an unreadable file, and
@@ -41,22 +41,22 @@ def read_kept(
     "alarms.damaged.json".
     """
     try:
-        data = read_whole(path, most_bytes)
+        data = read_regular_file(path, most_bytes)
     except (FileNotFoundError, NotADirectoryError):
-        return KeptFile()
+        return StoredFile()
     except OSError as error:
-        return KeptFile(None, _put_aside(path, error.strerror or str(error)))
+        return StoredFile(None, _save_damaged(path, error.strerror or str(error)))
     try:
         value, problem = parse(data)
     except newer as error:
         template = _("Your changes are not being saved: {reason}. The file is unchanged.")
-        return KeptFile(None, template.format(reason=error), is_newer=True)
+        return StoredFile(None, template.format(reason=error), is_newer=True)
     except NepError as error:
-        return KeptFile(None, _put_aside(path, str(error)))
-    return KeptFile(value, _put_aside(path, problem, data) if problem else "")
+        return StoredFile(None, _save_damaged(path, str(error)))
+    return StoredFile(value, _save_damaged(path, problem, data) if problem else "")
 
 
-def _put_aside(path: Path, reason: str, data: bytes | None = None) -> str:
+def _save_damaged(path: Path, reason: str, data: bytes | None = None) -> str:
     # With `data`, a copy is stored next to the file, whose readable part is used.
     beside = path.with_name(f"{path.stem}.damaged{path.suffix}")
     with suppress(OSError):

@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 import platformdirs
 
-from app.core.storage.atomic_file import make_private, read_whole, write_atomically
+from app.core.storage.atomic_file import make_private, read_regular_file, write_atomically
 from app.core.storage.file_lock import locked
 from app.errors import SettingsError
 from nep.i18n import _
@@ -23,9 +23,9 @@ FORMAT = 1
 
 The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are part of the format.
 """
-_OWN_NAME = f"settings.format-{FORMAT}.json"
+_OWN_FILE_NAME = f"settings.format-{FORMAT}.json"
 RECENT_LIMIT = 12
-_LATEST_S = 1e12
+_MAX_TIME_S = 1e12
 """Latest valid time. A damaged file may contain a time that the calendar doesn't support."""
 T = TypeVar("T")
 
@@ -56,25 +56,25 @@ def state_home() -> Path:
     return Path(chosen) if chosen else Path(platformdirs.user_state_dir("nep-studio", appauthor=False))
 
 
-def kept_folder() -> Path:
+def closed_tabs_folder() -> Path:
     """Return the folder of behaviours whose tabs were closed without saving them to a file."""
     return home() / "kept"
 
 
-def kept_language(folder: Path | None = None) -> str:
+def saved_language(folder: Path | None = None) -> str:
     """Read the chosen language, or "", before translations are loaded. Creates and moves no file."""
     place = folder if folder is not None else home()
-    values = _values_in(place / "settings.json")
+    values = _read_values(place / "settings.json")
     if _format_of(values) > FORMAT:
-        values = _values_in(place / _OWN_NAME) or values
+        values = _read_values(place / _OWN_FILE_NAME) or values
     chosen = values.get("language")
     return chosen if isinstance(chosen, str) else ""
 
 
-def _values_in(path: Path) -> dict[str, object]:
+def _read_values(path: Path) -> dict[str, object]:
     # Empty if the file can't be read.
     try:
-        values = json.loads(read_whole(path))
+        values = json.loads(read_regular_file(path))
     except (OSError, ValueError, RecursionError):
         return {}
     return values if isinstance(values, dict) else {}
@@ -87,7 +87,7 @@ class RecentFile:
     path: Path
     name: str
     opened_s: float
-    there: bool = True
+    exists: bool = True
 
 
 class ListSettings(Protocol):
@@ -151,19 +151,19 @@ class Settings:
     @property
     def recent(self) -> list[RecentFile]:
         """Recent files, newest first, without missing ones."""
-        return [file for file in self.recent_known if file.there]
+        return [file for file in self.all_recent if file.exists]
 
     @property
-    def recent_known(self) -> list[RecentFile]:
+    def all_recent(self) -> list[RecentFile]:
         """Recent files, newest first, including missing ones."""
         found = []
         entries: list[object] = self.get("recent", [])
         for entry in entries:
             if isinstance(entry, Mapping) and isinstance(entry.get("path"), str):
                 path, when, name = Path(entry["path"]), entry.get("opened_s", 0), entry.get("name")
-                is_time = isinstance(when, int | float) and abs(when) <= _LATEST_S
+                is_time = isinstance(when, int | float) and abs(when) <= _MAX_TIME_S
                 opened_s = float(when) if is_time else 0.0
-                if not isinstance(name, str) or path.parent != kept_folder():
+                if not isinstance(name, str) or path.parent != closed_tabs_folder():
                     name = path.stem
                 found.append(RecentFile(path, name, opened_s, _is_file(path)))
         return found
@@ -172,14 +172,14 @@ class Settings:
         """Move or add ``path`` to the top of the recent files. Raises SettingsError."""
         path = path.resolve()
         self._values = self._merged_values()
-        kept = [file for file in self.recent_known if file.path != path]
+        kept = [file for file in self.all_recent if file.path != path]
         self.set_recent([RecentFile(path, name or path.stem, self._clock()), *kept])
 
     def rename_recent(self, old: Path, new: Path) -> None:
         """Rename a recent file without changing its position. Raises SettingsError."""
         old, new = old.resolve(), new.resolve()
         self._values = self._merged_values()
-        kept = [file for file in self.recent_known if file.path != new]
+        kept = [file for file in self.all_recent if file.path != new]
         named = [replace(file, path=new, name=new.stem) if file.path == old else file for file in kept]
         self.set_recent(named)
 
@@ -193,29 +193,31 @@ class Settings:
 
     def _read(self) -> dict[str, object]:
         try:
-            text = read_whole(self.path).decode("utf-8-sig")
+            text = read_regular_file(self.path).decode("utf-8-sig")
         except FileNotFoundError:
             self.are_new = True
             return {}
         except NotADirectoryError:
             return {}
         except (OSError, UnicodeDecodeError):
-            return self._set_aside()
+            return self._rename_damaged_file()
         try:
             values = json.loads(text)
         except (ValueError, RecursionError):
-            return self._set_aside()
+            return self._rename_damaged_file()
         if not isinstance(values, dict):
-            return self._set_aside()
+            return self._rename_damaged_file()
         if _format_of(values) <= FORMAT:
             return values
-        return self._set_aside() if self.path == self._own_path() else self._use_own_file(values)
+        return (
+            self._rename_damaged_file() if self.path == self._own_path() else self._switch_to_own_file(values)
+        )
 
     def _own_path(self) -> Path:
         # Used while a newer Studio has its settings in the usual place.
-        return self.path.with_name(_OWN_NAME)
+        return self.path.with_name(_OWN_FILE_NAME)
 
-    def _use_own_file(self, newer: dict[str, object]) -> dict[str, object]:
+    def _switch_to_own_file(self, newer: dict[str, object]) -> dict[str, object]:
         # The file of a newer Studio stays unchanged; a file of this version is used in addition.
         found = self.path.name
         self.path = self._own_path()
@@ -230,17 +232,17 @@ class Settings:
     def _merged_values(self) -> dict[str, object]:
         # Current file content with unwritten values; the known values if it can't be read.
         try:
-            values = json.loads(read_whole(self.path))
+            values = json.loads(read_regular_file(self.path))
         except (OSError, ValueError, RecursionError):
             return self._values
         if not isinstance(values, dict):
             return self._values
         if _format_of(values) > FORMAT:  # a newer Studio also runs on this computer
-            self._use_own_file(values)
+            self._switch_to_own_file(values)
             return self._values
         return {**values, **self._unwritten}
 
-    def _set_aside(self) -> dict[str, object]:
+    def _rename_damaged_file(self) -> dict[str, object]:
         self.damaged = self.path.with_name(f"{self.path.stem}.damaged.json")
         try:
             replace_file(self.path, self.damaged)

@@ -11,40 +11,53 @@ import re
 from collections.abc import Mapping
 
 from app.errors import DescriptionError
-from app.robots.description.inputs import Choice, Parameter, pretty_unit
-from app.robots.description.json_access import as_part, part, text
+from app.robots.description.inputs import Choice, Parameter, display_unit
+from app.robots.description.json_access import as_object, object_member, text
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from app.robots.description.parser import read
-from app.robots.description.validate import cleaned, validate
+from app.robots.description.validate import validate, without_control_characters
 from nep.i18n import _, number
 from nep.messages.message import Message
 
 __all__ = [
-    "Action", "Choice", "DataField", "Event", "Parameter", "Robot", "RobotTopics", "SafeStop", "Sensor",
-    "announced", "parse", "pretty_unit", "td_for", "topic_of", "validate",
+    "Action",
+    "Choice",
+    "DataField",
+    "Event",
+    "Parameter",
+    "Robot",
+    "RobotTopics",
+    "SafeStop",
+    "Sensor",
+    "display_unit",
+    "parse",
+    "parse_announcement",
+    "thing_description",
+    "topic_of",
+    "validate",
 ]  # fmt: skip
 
 MAX_BYTES = 1_000_000
 """Maximum size of a description in bytes; larger ones are rejected before decoding."""
-_NOT_IN_TOPICS = re.compile(r"[^\w.-]")
+_INVALID_TOPIC_CHARACTERS = re.compile(r"[^\w.-]")
 
 
 def topic_of(name: str, leaf: str) -> str:
     """Return the topic of a part of a robot: ``topic_of("My robot", "camera")`` is ``/My_robot/camera``."""
-    return f"/{_NOT_IN_TOPICS.sub('_', name)}/{leaf}"
+    return f"/{_INVALID_TOPIC_CHARACTERS.sub('_', name)}/{leaf}"
 
 
 def parse(document: Mapping[str, object]) -> Robot:
     """Parse a Thing Model or Thing Description. Raises DescriptionError, which lists all problems."""
     problems = validate(document)
     if problems:
-        title = as_part(document).get("title")
+        title = as_object(document).get("title")
         raise DescriptionError(title if isinstance(title, str) else _("a robot"), problems)
-    document = cleaned(document)
+    document = without_control_characters(document)
     return read(document, default_topics(str(document["title"])))
 
 
-def announced(message: Message) -> Robot:
+def parse_announcement(message: Message) -> Robot:
     """Parse the robot description in a message. Messages larger than 1 MB are not decoded.
 
     Raises:
@@ -74,13 +87,13 @@ def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
     )
 
 
-def td_for(model: Mapping[str, object], name: str) -> dict[str, object]:
+def thing_description(model: Mapping[str, object], name: str) -> dict[str, object]:
     """Return the Thing Description of a robot with this model and name, including id and forms.
 
     The model must be valid (see :func:`validate`). It is not modified.
     """
     described = copy.deepcopy(dict(model))
-    kind = part(described, "rb:robot")
+    kind = object_member(described, "rb:robot")
     topics = default_topics(name, virtual=kind.get("virtual") is True)
     kept = {
         key: value
@@ -90,8 +103,8 @@ def td_for(model: Mapping[str, object], name: str) -> dict[str, object]:
     kept |= {
         "@type": ["rb:Robot"],
         "title": name,
-        "id": f"urn:nep:robot:{_NOT_IN_TOPICS.sub('_', name)}",
-        "version": {"instance": "1.0.0", **part(described, "version")},
+        "id": f"urn:nep:robot:{_INVALID_TOPIC_CHARACTERS.sub('_', name)}",
+        "version": {"instance": "1.0.0", **object_member(described, "version")},
         "securityDefinitions": {"nosec_sc": {"scheme": "nosec"}},
         "security": "nosec_sc",
         "rb:robot": {**kind, "title": text(kind.get("title")) or str(model["title"])},
@@ -99,16 +112,19 @@ def td_for(model: Mapping[str, object], name: str) -> dict[str, object]:
     }
     asked = _form(topics.command, "invokeaction", "cancelaction") | {"rb:answer": f"nep:{topics.answer}"}
     kept["properties"] = {
-        leaf: {**as_part(sensor), "forms": [_sensor_form(topic_of(name, leaf), as_part(sensor))]}
-        for leaf, sensor in part(described, "properties").items()
+        leaf: {**as_object(sensor), "forms": [_sensor_form(topic_of(name, leaf), as_object(sensor))]}
+        for leaf, sensor in object_member(described, "properties").items()
     }
     kept["actions"] = {
-        leaf: {**as_part(action), "forms": [dict(asked)]}
-        for leaf, action in part(described, "actions").items()
+        leaf: {**as_object(action), "forms": [dict(asked)]}
+        for leaf, action in object_member(described, "actions").items()
     }
     kept["events"] = {
-        leaf: {**as_part(event), "forms": [_form(topic_of(name, leaf), "subscribeevent", "unsubscribeevent")]}
-        for leaf, event in part(described, "events").items()
+        leaf: {
+            **as_object(event),
+            "forms": [_form(topic_of(name, leaf), "subscribeevent", "unsubscribeevent")],
+        }
+        for leaf, event in object_member(described, "events").items()
     }
     return kept
 

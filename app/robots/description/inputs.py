@@ -13,8 +13,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from app.errors import InputProblem
-from app.robots.description.json_access import as_part, names, number, number_of, part, spoken, text
-from nep.i18n import _, listed, ngettext, translate
+from app.robots.description.json_access import (
+    as_object,
+    display_text,
+    names,
+    number,
+    object_member,
+    text,
+    to_number,
+)
+from nep.i18n import _, format_list, ngettext, translate
 from nep.i18n import number as number_text
 from nep.text import bounded_str, quotable
 
@@ -22,7 +30,7 @@ _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _LENGTH_KEYS, _ITEM_COUNT_KEYS = ("minLength", "maxLength"), ("minItems", "maxItems")
 _MAX_DEPTH = 40
 _MAX_WORD_LENGTH = 100
-_MAX_UNKNOWN_NAMED = 5  # a similarity search takes 20 µs, and untrusted input may have any number of names
+_MAX_UNKNOWN_REPORTED = 5  # a similarity search takes 20 µs, and untrusted input may have any number of names
 NUMBER_KINDS = frozenset({"number", "integer", "angle"})
 _UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"}
 
@@ -77,24 +85,24 @@ class Parameter:
     min_length: int = 0
     max_length: int | None = None
     widget: str | None = None
-    bare: bool = False
+    is_bare_base64: bool = False
     nullable: bool = False
-    each: Parameter | None = None
-    places: tuple[Parameter, ...] = ()
+    item: Parameter | None = None
+    prefix_items: tuple[Parameter, ...] = ()
     fields: tuple[Parameter, ...] = ()
 
 
-def pretty_unit(unit: str | None) -> str | None:
+def display_unit(unit: str | None) -> str | None:
     """Return the unit as displayed: "deg" is "°"; None stays None."""
     return None if unit is None else _UNITS.get(unit, unit)
 
 
-def pretty_number(value: float) -> str:
+def format_number(value: float) -> str:
     """Format a number without trailing zeros: 360, -0.05."""
     return f"{value:.10g}"
 
 
-def near_miss(wrong: str, known: Iterable[str]) -> str:
+def closest_match(wrong: str, known: Iterable[str]) -> str:
     """Return the most similar known word, or ""."""
     if len(wrong) > _MAX_WORD_LENGTH:
         return ""
@@ -109,12 +117,12 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
     places = held if isinstance(held, (list, tuple)) else ()
     return Parameter(
         name=name,
-        title=spoken(data) or translate("robot", name.replace("_", " ")),
+        title=display_text(data) or translate("robot", name.replace("_", " ")),
         kind=kind_of(data),
         minimum=number(data.get("minimum")),
         maximum=number(data.get("maximum")),
         step=number(data.get("rb:step")) or number(data.get("multipleOf")),
-        unit=pretty_unit(text(data.get("unit"))),
+        unit=display_unit(text(data.get("unit"))),
         default=data.get("default"),
         choices=choices_of(data),
         required=required,
@@ -123,10 +131,10 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
         min_length=int(shortest or 0),
         max_length=None if longest is None else int(longest),
         widget=text(data.get("rb:widget")),
-        bare=data.get("contentEncoding") == "base64" and "format" not in data,
+        is_bare_base64=data.get("contentEncoding") == "base64" and "format" not in data,
         nullable=data.get("rb:nullable") is True,
-        each=parameter_of("value", held) if isinstance(held, Mapping) and held else None,
-        places=tuple(parameter_of(f"value {at}", as_part(each)) for at, each in enumerate(places, 1)),
+        item=parameter_of("value", held) if isinstance(held, Mapping) and held else None,
+        prefix_items=tuple(parameter_of(f"value {at}", as_object(each)) for at, each in enumerate(places, 1)),
         fields=fields_of(data),
     )
 
@@ -135,8 +143,8 @@ def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
     """Return the named values of an object schema."""
     required = names(data.get("required"))
     return tuple(
-        parameter_of(name, as_part(each), required=name in required)
-        for name, each in part(data, "properties").items()
+        parameter_of(name, as_object(each), required=name in required)
+        for name, each in object_member(data, "properties").items()
     )
 
 
@@ -162,7 +170,7 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
         pairs = [(value, None) for value in enum]
     named = data.get("oneOf")
     if isinstance(named, (list, tuple)):
-        pairs = [(as_part(item).get("const"), spoken(as_part(item))) for item in named]
+        pairs = [(as_object(item).get("const"), display_text(as_object(item))) for item in named]
     return tuple(
         Choice(value, title or translate("robot", bounded_str(value).replace("_", " ")))
         for value, title in pairs
@@ -170,7 +178,7 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
     )
 
 
-def from_words(parameter: Parameter, words: str) -> object:
+def parse_value(parameter: Parameter, words: str) -> object:
     """Parse a list or object that the user typed: ``1, 2.5`` or JSON. Invalid text is returned unchanged.
 
     Numbers with a decimal comma are separated by semicolons: ``1; 2,5``. ``0,2, 0,5`` is ambiguous and
@@ -182,21 +190,21 @@ def from_words(parameter: Parameter, words: str) -> object:
         except (ValueError, RecursionError):
             return words
         return found
-    kinds = {each.kind for each in parameter.places or filter(None, (parameter.each,))}
+    kinds = {each.kind for each in parameter.prefix_items or filter(None, (parameter.item,))}
     is_numeric = bool(kinds) and kinds <= NUMBER_KINDS
     if is_numeric and re.search(r"\d,\d", words) and re.search(r",\s", words):
         return words
     if is_numeric and ";" in words:
         words = words.replace(",", ".").replace(";", ",")
     items = [word.strip() for word in words.split(",") if word.strip()]
-    if parameter.places:
-        return [_parse_word(each, item) for each, item in zip(parameter.places, items, strict=False)] + items[
-            len(parameter.places) :
-        ]
-    return items if parameter.each is None else [_parse_word(parameter.each, item) for item in items]
+    if parameter.prefix_items:
+        return [
+            _parse_item(each, item) for each, item in zip(parameter.prefix_items, items, strict=False)
+        ] + items[len(parameter.prefix_items) :]
+    return items if parameter.item is None else [_parse_item(parameter.item, item) for item in items]
 
 
-def to_words(value: object) -> str:
+def format_for_editing(value: object) -> str:
     """Format a list or object for editing; the inverse of :func:`from_words`."""
     if isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value):
         words = [str(item).lower() if isinstance(item, bool) else str(item) for item in value]
@@ -205,7 +213,7 @@ def to_words(value: object) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _parse_word(parameter: Parameter, word: str) -> object:
+def _parse_item(parameter: Parameter, word: str) -> object:
     known = [choice.value for choice in parameter.choices if word in {str(choice.value), choice.title}]
     if known:
         return known[0]
@@ -213,7 +221,7 @@ def _parse_word(parameter: Parameter, word: str) -> object:
         return {"yes": True, "true": True, "no": False, "false": False}.get(word.lower(), word)
     if parameter.kind not in NUMBER_KINDS:
         return word
-    found = number_of(word)
+    found = to_number(word)
     if found is None:
         return word
     return int(found) if found.is_integer() and "." not in word else found
@@ -221,29 +229,29 @@ def _parse_word(parameter: Parameter, word: str) -> object:
 
 def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
     """Return a message for each problem of an input; empty if the input is valid."""
-    return tuple(f"{action}: {problem.sentence}" for problem in problems_of(parameters, given))
+    return tuple(f"{action}: {problem.message}" for problem in input_problems(parameters, given))
 
 
-def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[InputProblem, ...]:
+def input_problems(parameters: tuple[Parameter, ...], given: object) -> tuple[InputProblem, ...]:
     """Return the problems of an input in the order of the parameters; unknown names come first."""
     if not isinstance(given, Mapping):
         return (InputProblem("", _("the input must be an object with named values")),)
     known = {parameter.name: parameter for parameter in parameters}
     unknown = [name for name in given if name not in known]
     problems = []
-    for name in unknown[:_MAX_UNKNOWN_NAMED]:
-        close = near_miss(str(name), known)
+    for name in unknown[:_MAX_UNKNOWN_REPORTED]:
+        close = closest_match(str(name), known)
         words = _("unknown name “{word}”; did you mean “{close}”?") if close else _("unknown name “{word}”")
         problems.append(InputProblem("", words.format(word=quotable(name), close=close)))
-    if len(unknown) > _MAX_UNKNOWN_NAMED:
-        count = len(unknown) - _MAX_UNKNOWN_NAMED
+    if len(unknown) > _MAX_UNKNOWN_REPORTED:
+        count = len(unknown) - _MAX_UNKNOWN_REPORTED
         words = ngettext("{count} more name is unknown", "{count} more names are unknown", count)
         problems.append(InputProblem("", words.format(count=count)))
     for name, parameter in known.items():
         if name in given and given[name] is None and parameter.nullable:
             continue
         if name in given:
-            wrong = wrong_value(parameter, given[name])
+            wrong = value_problem(parameter, given[name])
             if wrong is not None:
                 problems.append(InputProblem(name, wrong))
         elif parameter.required:
@@ -251,33 +259,33 @@ def problems_of(parameters: tuple[Parameter, ...], given: object) -> tuple[Input
     return tuple(problems)
 
 
-def wrong_value(parameter: Parameter, value: object, place: str = "") -> str | None:
+def value_problem(parameter: Parameter, value: object, place: str = "") -> str | None:
     """Return what a value must be instead ("speed must be a number"), or None if the value is valid.
 
     ``place`` names the value in the message (default: the title of the parameter).
     """
     place = place or parameter.title
     if parameter.choices:
-        if any(_same(choice.value, value) for choice in parameter.choices):
+        if any(_is_json_equal(choice.value, value) for choice in parameter.choices):
             return None
         return _("{place} must be {choices}").format(
-            place=place, choices=listed([choice.title for choice in parameter.choices], "or")
+            place=place, choices=format_list([choice.title for choice in parameter.choices], "or")
         )
     if parameter.kind in {"number", "integer", "angle"}:
-        return _wrong_number(parameter, value, place)
+        return _number_problem(parameter, value, place)
     if parameter.kind == "boolean":
         return None if isinstance(value, bool) else _("{place} must be yes or no").format(place=place)
     if parameter.kind == "colour":
         good = isinstance(value, str) and _HEX_COLOUR.fullmatch(value) is not None
         return None if good else _("{place} must be a colour like #20c0e0").format(place=place)
     if parameter.kind == "list":
-        return _wrong_list(parameter, value, place)
+        return _list_problem(parameter, value, place)
     if parameter.kind == "object":
-        return _wrong_object(parameter, value, place)
-    return _wrong_text(parameter, value, place)
+        return _object_problem(parameter, value, place)
+    return _text_problem(parameter, value, place)
 
 
-def _wrong_list(parameter: Parameter, value: object, place: str) -> str | None:
+def _list_problem(parameter: Parameter, value: object, place: str) -> str | None:
     if not isinstance(value, (list, tuple)):
         return _("{place} must be a list").format(place=place)
     least, most = parameter.min_length, parameter.max_length
@@ -295,9 +303,9 @@ def _wrong_list(parameter: Parameter, value: object, place: str) -> str | None:
         )
         return words.format(place=place, count=most)
     for at, item in enumerate(value):
-        held = parameter.places[at] if at < len(parameter.places) else parameter.each
+        held = parameter.prefix_items[at] if at < len(parameter.prefix_items) else parameter.item
         inner = _("{place} value {number}").format(place=place, number=at + 1)
-        wrong = None if held is None else wrong_value(held, item, inner)
+        wrong = None if held is None else value_problem(held, item, inner)
         if held is None and not _is_json(item):
             wrong = _("{place} can't be an item of a list").format(place=inner)
         if wrong is not None:
@@ -305,7 +313,7 @@ def _wrong_list(parameter: Parameter, value: object, place: str) -> str | None:
     return None
 
 
-def _wrong_object(parameter: Parameter, value: object, place: str) -> str | None:
+def _object_problem(parameter: Parameter, value: object, place: str) -> str | None:
     if not isinstance(value, Mapping):
         return _("{place} must be an object with named values").format(place=place)
     known = {field.name: field for field in parameter.fields}
@@ -317,24 +325,24 @@ def _wrong_object(parameter: Parameter, value: object, place: str) -> str | None
         inner = _("{place} {inner}").format(place=place, inner=field.title)
         if name not in value:
             return _("{place} is missing").format(place=inner)
-        wrong = wrong_value(field, value[name], inner)
+        wrong = value_problem(field, value[name], inner)
         if wrong is not None:
             return wrong
     others = {name: item for name, item in value.items() if name not in known}
-    return _wrong_other(parameter, others, place)
+    return _other_values_problem(parameter, others, place)
 
 
-def _wrong_other(parameter: Parameter, others: Mapping[str, object], place: str) -> str | None:
+def _other_values_problem(parameter: Parameter, others: Mapping[str, object], place: str) -> str | None:
     known = [field.name for field in parameter.fields]
     for name, item in others.items():
-        if parameter.each is not None:
-            wrong = wrong_value(
-                parameter.each, item, _("{place} “{name}”").format(place=place, name=quotable(name))
+        if parameter.item is not None:
+            wrong = value_problem(
+                parameter.item, item, _("{place} “{name}”").format(place=place, name=quotable(name))
             )
             if wrong is not None:
                 return wrong
         elif known:
-            close = near_miss(str(name), known)
+            close = closest_match(str(name), known)
             words = (
                 _("{place} has no “{word}”; did you mean “{close}”?")
                 if close
@@ -352,12 +360,12 @@ def _is_json(value: object, depth: int = 0) -> bool:
     return value is None or isinstance(value, (str, int, float))
 
 
-def _same(allowed: object, given: object) -> bool:
+def _is_json_equal(allowed: object, given: object) -> bool:
     # 1 == True in Python, but they are different choices.
     return allowed == given and isinstance(allowed, bool) == isinstance(given, bool)
 
 
-def _wrong_number(parameter: Parameter, value: object, place: str) -> str | None:
+def _number_problem(parameter: Parameter, value: object, place: str) -> str | None:
     whole = parameter.kind == "integer"
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not _is_finite(value):
         words = _("{place} must be a whole number") if whole else _("{place} must be a number")
@@ -370,10 +378,12 @@ def _wrong_number(parameter: Parameter, value: object, place: str) -> str | None
     unit = "" if parameter.unit is None else f" {parameter.unit}"
     if low is not None and high is not None:
         words = _("{place} must be between {low} and {high}")
-        return words.format(place=place, low=_shown(low), high=f"{_shown(high)}{unit}")
+        return words.format(place=place, low=_format_limit(low), high=f"{_format_limit(high)}{unit}")
     if low is not None:
-        return _("{place} must be at least {limit}").format(place=place, limit=f"{_shown(low)}{unit}")
-    return _("{place} must be at most {limit}").format(place=place, limit=f"{_shown(high or 0.0)}{unit}")
+        return _("{place} must be at least {limit}").format(place=place, limit=f"{_format_limit(low)}{unit}")
+    return _("{place} must be at most {limit}").format(
+        place=place, limit=f"{_format_limit(high or 0.0)}{unit}"
+    )
 
 
 def _is_finite(value: float) -> bool:
@@ -383,7 +393,7 @@ def _is_finite(value: float) -> bool:
         return False
 
 
-def _wrong_text(parameter: Parameter, value: object, place: str) -> str | None:
+def _text_problem(parameter: Parameter, value: object, place: str) -> str | None:
     if not isinstance(value, str):
         return _("{place} must be text").format(place=place)
     if len(value) < parameter.min_length:
@@ -403,5 +413,5 @@ def _wrong_text(parameter: Parameter, value: object, place: str) -> str | None:
     return None
 
 
-def _shown(value: float) -> str:
+def _format_limit(value: float) -> str:
     return number_text(value, ".10g")

@@ -9,12 +9,12 @@ from nep.i18n import language, translate
 from nep.text import bounded_str
 
 
-def part(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
+def object_member(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
     """Return the member with this name if it is an object, else an empty object."""
-    return as_part(mapping.get(name))
+    return as_object(mapping.get(name))
 
 
-def as_part(value: object) -> Mapping[str, object]:
+def as_object(value: object) -> Mapping[str, object]:
     """Return the value if it is an object, else an empty object."""
     return value if isinstance(value, Mapping) else {}
 
@@ -33,12 +33,12 @@ def text(value: object) -> str | None:
     return value if isinstance(value, str) and value else None
 
 
-def spoken(owner: Mapping[str, object], member: str = "title") -> str | None:
+def display_text(owner: Mapping[str, object], member: str = "title") -> str | None:
     """Return a member that is shown to the user, in the current language.
 
     ``titles`` and ``descriptions`` contain translations. If there is none, Studio's catalogue is used.
     """
-    words = part(owner, f"{member}s")
+    words = object_member(owner, f"{member}s")
     own = text(owner.get(member))
     return text(words.get(language())) or (own and translate("robot", own))
 
@@ -48,7 +48,7 @@ def number(value: object) -> float | None:
     return value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
 
 
-def number_of(value: object) -> float | None:
+def to_number(value: object) -> float | None:
     """Convert a value to a number, or None. Text is accepted, because RIZE sends numbers as text."""
     if isinstance(value, bool):
         return None
@@ -58,7 +58,7 @@ def number_of(value: object) -> float | None:
         return None
 
 
-def finite(value: object) -> float | None:
+def finite_float(value: object) -> float | None:
     """Convert a number to a finite float, or None.
 
     Returns None for other types, NaN, infinity, and integers too large for a float.

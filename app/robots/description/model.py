@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from app.errors import InputProblem
-from app.robots.description.inputs import Choice, Parameter, check_input, problems_of
+from app.robots.description.inputs import Choice, Parameter, check_input, input_problems
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Action:
     text: str
     says: str | None
     topic: str
-    answer_topic: str
+    reply_topic: str
     risk: str | None = None
     cancellable: bool = False
     timeout_s: float | None = None
@@ -58,7 +58,7 @@ class Action:
 
     def problems(self, given: object) -> tuple[InputProblem, ...]:
         """Return the problems of an input and the parameters concerned, without the name of the action."""
-        return problems_of(self.parameters, given)
+        return input_problems(self.parameters, given)
 
     def complete(self, given: Mapping[str, object]) -> dict[str, object]:
         """Return the input with default values for missing parameters."""

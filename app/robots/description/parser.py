@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.robots.description.inputs import Parameter, choices_of, kind_of, parameter_of, pretty_unit
-from app.robots.description.json_access import as_part, names, number, part, spoken, text
+from app.robots.description.inputs import Parameter, choices_of, display_unit, kind_of, parameter_of
+from app.robots.description.json_access import as_object, display_text, names, number, object_member, text
 from app.robots.description.model import Action, DataField, Event, Robot, RobotTopics, SafeStop, Sensor
 from nep.i18n import ENGLISH, language, translate
 
@@ -15,7 +15,7 @@ _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
     """Convert a valid document. ``topics`` are the default topics."""
-    own = part(document, "rb:topics")
+    own = object_member(document, "rb:topics")
     topics = RobotTopics(
         description=text(own.get("description")) or topics.description,
         command=text(own.get("command")) or topics.command,
@@ -24,7 +24,7 @@ def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
         world=text(own.get("world")) or topics.world,
     )
     name = str(document["title"])
-    kind = part(document, "rb:robot")
+    kind = object_member(document, "rb:robot")
     home = topics.command.rpartition("/")[0]
     return Robot(
         name=name,
@@ -32,10 +32,16 @@ def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
         title=text(kind.get("title")) or name,
         virtual=kind.get("virtual") is True,
         dialect=text(kind.get("dialect")) or "native",
-        actions=tuple(_action(leaf, as_part(a), topics) for leaf, a in part(document, "actions").items()),
-        sensors=tuple(_sensor(leaf, as_part(s), home) for leaf, s in part(document, "properties").items()),
-        events=tuple(_event(leaf, as_part(e), home) for leaf, e in part(document, "events").items()),
-        safe_stop=_safe_stop(part(document, "rb:safeStop")),
+        actions=tuple(
+            _action(leaf, as_object(a), topics) for leaf, a in object_member(document, "actions").items()
+        ),
+        sensors=tuple(
+            _sensor(leaf, as_object(s), home) for leaf, s in object_member(document, "properties").items()
+        ),
+        events=tuple(
+            _event(leaf, as_object(e), home) for leaf, e in object_member(document, "events").items()
+        ),
+        safe_stop=_safe_stop(object_member(document, "rb:safeStop")),
         resources=names(document.get("rb:resources")),
         topics=topics,
         source=document,
@@ -55,10 +61,10 @@ def _safe_stop(stop: Mapping[str, object]) -> SafeStop:
 
 
 def _action(name: str, action: Mapping[str, object], topics: RobotTopics) -> Action:
-    given = part(action, "input")
+    given = object_member(action, "input")
     required = names(given.get("required"))
-    parameters = _parameters(part(given, "properties"), required)
-    block = part(action, "rb:block")
+    parameters = _parameters(object_member(given, "properties"), required)
+    block = object_member(action, "rb:block")
     risk = text(action.get("rb:risk"))
     title = _title(name, action)
     return Action(
@@ -67,37 +73,37 @@ def _action(name: str, action: Mapping[str, object], topics: RobotTopics) -> Act
         icon=text(block.get("icon")) or _ICONS.get(risk or "", "play"),
         category=_category(block, "Actions"),
         parameters=parameters,
-        text=_with_robot(_words(block, "text") or _default_text(title, parameters)),
-        says=_with_robot(_words(block, "says")) or None,
+        text=_with_robot_placeholder(_block_text(block, "text") or _default_text(title, parameters)),
+        says=_with_robot_placeholder(_block_text(block, "says")) or None,
         topic=_topic(action, topics.command),
-        answer_topic=_topic(action, topics.answer, "rb:answer"),
+        reply_topic=_topic(action, topics.answer, "rb:answer"),
         risk=risk,
         cancellable=action.get("rb:cancel") is True,
         timeout_s=number(action.get("rb:timeout")),
         uses=names(action.get("rb:uses")),
         on_busy=text(action.get("rb:onBusy")) or "queue",
         synchronous=action.get("synchronous") is True,
-        feedback=_fields(part(action, "rb:feedback")),
-        output=_fields(part(action, "output")),
+        feedback=_fields(object_member(action, "rb:feedback")),
+        output=_fields(object_member(action, "output")),
         repeat_s=number(action.get("rb:repeat")),
     )
 
 
 def _sensor(name: str, sensor: Mapping[str, object], home: str) -> Sensor:
-    block = part(sensor, "rb:block")
+    block = object_member(sensor, "rb:block")
     return Sensor(
         name=name,
         title=_title(name, sensor),
         kind=_sensor_kind(sensor),
         topic=_topic(sensor, f"{home}/{name}"),
-        unit=pretty_unit(text(sensor.get("unit"))),
+        unit=display_unit(text(sensor.get("unit"))),
         minimum=number(sensor.get("minimum")),
         maximum=number(sensor.get("maximum")),
         rate_hz=number(sensor.get("rb:rate")),
         fields=_fields(sensor),
         icon=text(block.get("icon")) or "activity",
         category=_category(block, "Sensors"),
-        text=_with_robot(_words(block, "text")),
+        text=_with_robot_placeholder(_block_text(block, "text")),
         camera=text(sensor.get("rb:camera")),
         choices=choices_of(sensor),
     )
@@ -113,11 +119,11 @@ def _sensor_kind(sensor: Mapping[str, object]) -> str:
 
 
 def _event(name: str, event: Mapping[str, object], home: str) -> Event:
-    block = part(event, "rb:block")
-    fields = _parameters(part(part(event, "data"), "properties"), ())
+    block = object_member(event, "rb:block")
+    fields = _parameters(object_member(object_member(event, "data"), "properties"), ())
     filters = names(event.get("rb:filter"))
     title = _title(name, event)
-    words = _words(block, "text") or f"when %robot {title}"
+    words = _block_text(block, "text") or f"when %robot {title}"
     return Event(
         name=name,
         title=title,
@@ -125,25 +131,25 @@ def _event(name: str, event: Mapping[str, object], home: str) -> Event:
         category=_category(block, "Events"),
         fields=fields,
         filters=filters,
-        text=_with_robot(words),
+        text=_with_robot_placeholder(words),
         topic=_topic(event, f"{home}/{name}"),
     )
 
 
 def _parameters(data: Mapping[str, object], required: tuple[str, ...]) -> tuple[Parameter, ...]:
-    return tuple(parameter_of(name, as_part(d), required=name in required) for name, d in data.items())
+    return tuple(parameter_of(name, as_object(d), required=name in required) for name, d in data.items())
 
 
 def _fields(owner: Mapping[str, object]) -> tuple[DataField, ...]:
-    parts = ((name, as_part(found)) for name, found in part(owner, "properties").items())
+    parts = ((name, as_object(found)) for name, found in object_member(owner, "properties").items())
     return tuple(
-        DataField(name, _title(name, each), kind_of(each), pretty_unit(text(each.get("unit"))))
+        DataField(name, _title(name, each), kind_of(each), display_unit(text(each.get("unit"))))
         for name, each in parts
     )
 
 
 def _title(name: str, owner: Mapping[str, object]) -> str:
-    return spoken(owner) or translate("robot", name.replace("_", " "))
+    return display_text(owner) or translate("robot", name.replace("_", " "))
 
 
 def _category(block: Mapping[str, object], otherwise: str) -> str:
@@ -151,8 +157,8 @@ def _category(block: Mapping[str, object], otherwise: str) -> str:
     return found[:1].upper() + found[1:]
 
 
-def _words(block: Mapping[str, object], kind: str) -> str:
-    words = part(block, kind)
+def _block_text(block: Mapping[str, object], kind: str) -> str:
+    words = object_member(block, kind)
     english = text(words.get(ENGLISH)) or next((str(word) for word in words.values()), "")
     return (
         text(words.get(language())) or translate("robot", english.strip().removeprefix("%robot "))
@@ -165,7 +171,7 @@ def _default_text(title: str, parameters: tuple[Parameter, ...]) -> str:
     return " ".join([title, *values])
 
 
-def _with_robot(words: str) -> str:
+def _with_robot_placeholder(words: str) -> str:
     if not words or "%robot" in words:
         return words
     if words.startswith("when "):
@@ -176,7 +182,7 @@ def _with_robot(words: str) -> str:
 def _topic(owner: Mapping[str, object], otherwise: str, member: str = "href") -> str:
     forms = owner.get("forms")
     for form in forms if isinstance(forms, (list, tuple)) else ():
-        href = text(as_part(form).get(member))
+        href = text(as_object(form).get(member))
         if href is not None and href.startswith(_SCHEME):
             return href.removeprefix(_SCHEME)
     return otherwise

@@ -13,7 +13,9 @@ import unicodedata
 from nep.i18n import _, lazy
 
 NOT_A_NUMBER = lazy("Enter a number.")
-SEPARATORS = lazy("Enter a number with at most one decimal comma or point, such as 1234.5 or 1234,5.")
+AMBIGUOUS_SEPARATORS = lazy(
+    "Enter a number with at most one decimal comma or point, such as 1234.5 or 1234,5."
+)
 _NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _GROUPED = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re.ASCII)
 
@@ -25,7 +27,7 @@ class TypedNumberError(ValueError):
     """
 
     def __init__(self, *, has_separators: bool) -> None:
-        super().__init__(_(SEPARATORS if has_separators else NOT_A_NUMBER))
+        super().__init__(_(AMBIGUOUS_SEPARATORS if has_separators else NOT_A_NUMBER))
         self.has_separators = has_separators
 
 

@@ -15,10 +15,10 @@ from itertools import count, islice
 from typing import TYPE_CHECKING
 
 from app import resources
-from app.robots.description.inputs import parameter_of, wrong_value
-from app.robots.description.json_access import as_part, names, part
-from nep.i18n import _, lazy, listed
-from nep.text import bounded_str, control_in, harmless
+from app.robots.description.inputs import parameter_of, value_problem
+from app.robots.description.json_access import as_object, names, object_member
+from nep.i18n import _, format_list, lazy
+from nep.text import bounded_str, first_control, strip_controls
 
 if TYPE_CHECKING:
     from jsonschema import Draft7Validator
@@ -34,7 +34,7 @@ _TEXT_MEMBERS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
 """Members of a description that are shown to the user or contain such texts."""
 _VALUE_MEMBERS = frozenset({"default", "enum", "const"})
 _MAX_NUMBER = 1e15
-_accepted: deque[str] = deque(maxlen=8)
+_accepted_descriptions: deque[str] = deque(maxlen=8)
 """Recently accepted descriptions, because a robot publishes the same one repeatedly."""
 _RESERVED = {"description", "command", "answer", "state", "world"}
 
@@ -53,27 +53,27 @@ def validate(model: object) -> tuple[str, ...]:
     if not isinstance(model, Mapping):
         return (_("a description must be a JSON object"),)
     model = dict(model)
-    strange = _not_json(model, count(1))
+    strange = _json_problem(model, count(1))
     if strange is not None:
         return (strange,)
     text, problems = json.dumps(model), []
-    if text not in _accepted:
-        problems = [_sentence(error) for error in islice(_validator().iter_errors(model), _MAX_PROBLEMS)]
+    if text not in _accepted_descriptions:
+        problems = [_error_message(error) for error in islice(_validator().iter_errors(model), _MAX_PROBLEMS)]
         if not problems:
-            _accepted.append(text)
-    control = control_in(str(model.get("title")))
+            _accepted_descriptions.append(text)
+    control = first_control(str(model.get("title")))
     if control:
         problems.append(
             _("title: '{control}' can't be used in a name because it is invisible").format(control=control)
         )
     if not problems:
         problems = list(_contradictions(model))
-    if not problems and (harmless_model := cleaned(model)) != model:
+    if not problems and (harmless_model := without_control_characters(model)) != model:
         return validate(harmless_model)  # removing control characters may leave an empty text
     return tuple(dict.fromkeys(problems))[:_MAX_PROBLEMS]
 
 
-def cleaned(document: Mapping[str, object]) -> dict[str, object]:
+def without_control_characters(document: Mapping[str, object]) -> dict[str, object]:
     """Return the document without control characters in texts for the user; names are validated instead.
 
     A bidirectional control character in the title of an action would also reorder the text after it, such as
@@ -87,12 +87,12 @@ def cleaned(document: Mapping[str, object]) -> dict[str, object]:
             return {key: clean(item, place if place == _BLOCK else key) for key, item in value.items()}
         if isinstance(value, (list, tuple)):
             return [clean(item, "") for item in value]
-        return harmless(value) if isinstance(value, str) and place in _TEXT_MEMBERS else value
+        return strip_controls(value) if isinstance(value, str) and place in _TEXT_MEMBERS else value
 
     return {key: clean(item, "" if key == "title" else key) for key, item in document.items()}
 
 
-def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
+def _json_problem(value: object, seen: Iterator[int], path: str = "", depth: int = 0) -> str | None:
     # Also rejects `$ref`, unusable numbers, and more than `MAX_VALUES` values, counted by `seen`.
     if next(seen) > MAX_VALUES or depth > _MAX_DEPTH:
         if depth > _MAX_DEPTH:
@@ -100,7 +100,7 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
         return _("the description has more than {count} values").format(count=MAX_VALUES)
     if isinstance(value, dict):
         for key, item in value.items():
-            found = _bad_key(key, path or _(WHOLE)) or _not_json(
+            found = _key_problem(key, path or _(DESCRIPTION_LABEL)) or _json_problem(
                 item, seen, f"{path}.{key}" if path else str(key), depth + 1
             )
             if found is not None:
@@ -108,7 +108,7 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
         return None
     if isinstance(value, list):
         found_items = (
-            _not_json(item, seen, f"{path}[{index}]", depth + 1) for index, item in enumerate(value)
+            _json_problem(item, seen, f"{path}[{index}]", depth + 1) for index, item in enumerate(value)
         )
         return next((found for found in found_items if found is not None), None)
     if isinstance(value, (int, float)) and not -_MAX_NUMBER <= value <= _MAX_NUMBER:
@@ -118,7 +118,7 @@ def _not_json(value: object, seen: Iterator[int], path: str = "", depth: int = 0
     return _("{place} is not JSON: {kind}").format(place=path, kind=type(value).__name__)
 
 
-def _bad_key(key: object, place: str) -> str | None:
+def _key_problem(key: object, place: str) -> str | None:
     if not isinstance(key, str):
         return _("{place} has a name that is not text: {name}").format(place=place, name=repr(key))
     if key == "$ref":
@@ -130,7 +130,7 @@ def _bad_key(key: object, place: str) -> str | None:
 
 # ---- sentences for schema errors ----------------------------------------------------------
 
-_TYPE_WORDS = {
+_TYPE_NAMES = {
     "string": lazy("text"),
     "number": lazy("a number"),
     "integer": lazy("a whole number"),
@@ -141,47 +141,47 @@ _TYPE_WORDS = {
 }
 
 
-_EMPTY = lazy("{place} must not be empty")
-_LONG = lazy("{place} has more than {limit} entries")
-_RULES = {
+_EMPTY_MESSAGE = lazy("{place} must not be empty")
+_TOO_LONG_MESSAGE = lazy("{place} has more than {limit} entries")
+_RULE_MESSAGES = {
     "minimum": lazy("{place} must be at least {limit}"),
     "exclusiveMinimum": lazy("{place} must be greater than {limit}"),
     "maximum": lazy("{place} must be at most {limit}"),
-    "minLength": _EMPTY,
+    "minLength": _EMPTY_MESSAGE,
     "maxLength": lazy("{place} is longer than {limit} characters"),
-    "minItems": _EMPTY,
-    "minProperties": _EMPTY,
-    "maxItems": _LONG,
-    "maxProperties": _LONG,
+    "minItems": _EMPTY_MESSAGE,
+    "minProperties": _EMPTY_MESSAGE,
+    "maxItems": _TOO_LONG_MESSAGE,
+    "maxProperties": _TOO_LONG_MESSAGE,
     "anyOf": lazy("{place} doesn't match any allowed format"),
 }
-NOT_UNDERSTOOD = lazy("{place} is not valid")
-WHOLE = lazy("the description")
+INVALID_MESSAGE = lazy("{place} is not valid")
+DESCRIPTION_LABEL = lazy("the description")
 
 
-def _sentence(error: ValidationError) -> str:
-    place = ".".join(str(part) for part in error.absolute_path) or _(WHOLE)
+def _error_message(error: ValidationError) -> str:
+    place = ".".join(str(part) for part in error.absolute_path) or _(DESCRIPTION_LABEL)
     rule = str(error.validator)
     limit: object = error.validator_value
     if rule == "required":  # jsonschema names the missing property only in its message
         return _("{place} has no '{name}'").format(place=place, name=error.message.split("'")[1])
     if rule == "type":
         kinds = limit if isinstance(limit, list) else [limit]
-        words = listed([_(_TYPE_WORDS.get(str(kind), str(kind))) for kind in kinds], "or")
+        words = format_list([_(_TYPE_NAMES.get(str(kind), str(kind))) for kind in kinds], "or")
         return _("{place} must be {kinds}").format(place=place, kinds=words)
     if rule == "enum":
         return _("{place} must be one of {names}").format(place=place, names=", ".join(names(limit)))
     if rule == "const":
         return _("{place} must be {value}").format(place=place, value=limit)
     if rule == "pattern":
-        shown = _shortened(error.instance)
+        shown = _shorten_and_quote(error.instance)
         return _("{place}: {value} is not allowed; use letters, digits, - and _ without spaces").format(
             place=place, value=shown
         )
-    return _(_RULES.get(rule, NOT_UNDERSTOOD)).format(place=place, limit=limit)
+    return _(_RULE_MESSAGES.get(rule, INVALID_MESSAGE)).format(place=place, limit=limit)
 
 
-def _shortened(value: object) -> str:
+def _shorten_and_quote(value: object) -> str:
     text = bounded_str(value, 41)
     return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
 
@@ -190,41 +190,43 @@ def _shortened(value: object) -> str:
 
 
 def _contradictions(model: Mapping[str, object]) -> Iterator[str]:
-    actions = part(model, "actions")
-    properties = part(model, "properties")
-    stop = bounded_str(part(model, "rb:safeStop").get("action"))
+    actions = object_member(model, "actions")
+    properties = object_member(model, "properties")
+    stop = bounded_str(object_member(model, "rb:safeStop").get("action"))
     if stop not in actions:
         yield _("rb:safeStop.action names '{stop}', which is not an action").format(stop=stop)
-    elif part(part(actions, stop), "input").get("required"):
+    elif object_member(object_member(actions, stop), "input").get("required"):
         yield _("'{stop}' is the safe stop, so its input must not have required fields").format(stop=stop)
     resources_named = set(names(model.get("rb:resources")))
-    for name in (set(properties) | _RESERVED) & set(part(model, "events")) | set(properties) & _RESERVED:
+    for name in (set(properties) | _RESERVED) & set(object_member(model, "events")) | set(
+        properties
+    ) & _RESERVED:
         yield _(
             "'{name}' is reserved or used twice; each sensor and event needs a name of its own, "
             "because the name becomes a topic"
         ).format(name=name)
     for name, action in actions.items():
-        yield from _of_action(name, as_part(action), resources_named, properties)
+        yield from _action_contradictions(name, as_object(action), resources_named, properties)
     for name, sensor in properties.items():
-        yield from _of_data(f"properties.{name}", as_part(sensor))
-    for name, event in part(model, "events").items():
-        happening = as_part(event)
-        data = part(part(happening, "data"), "properties")
-        yield from _of_fields(f"events.{name}.data", data)
+        yield from _data_contradictions(f"properties.{name}", as_object(sensor))
+    for name, event in object_member(model, "events").items():
+        happening = as_object(event)
+        data = object_member(object_member(happening, "data"), "properties")
+        yield from _field_contradictions(f"events.{name}.data", data)
         for field in names(happening.get("rb:filter")):
             if field not in data:
                 yield _("events.{name}.rb:filter names '{field}', which is not in its data").format(
                     name=name, field=field
                 )
-        yield from _of_texts(f"events.{name}", happening, data)
+        yield from _text_contradictions(f"events.{name}", happening, data)
 
 
-def _of_action(
+def _action_contradictions(
     name: str, action: Mapping[str, object], resources_named: set[str], properties: Mapping[str, object]
 ) -> Iterator[str]:
-    fields = part(part(action, "input"), "properties")
-    yield from _of_fields(f"actions.{name}.input", fields)
-    for field in names(part(action, "input").get("required")):
+    fields = object_member(object_member(action, "input"), "properties")
+    yield from _field_contradictions(f"actions.{name}.input", fields)
+    for field in names(object_member(action, "input").get("required")):
         if field not in fields:
             yield _("actions.{name}.input requires '{field}', which it does not define").format(
                 name=name, field=field
@@ -235,22 +237,22 @@ def _of_action(
                 name=name, used=used
             )
     for field, data in fields.items():
-        source = as_part(data).get("rb:optionsFrom")
+        source = as_object(data).get("rb:optionsFrom")
         if source is not None and source not in properties:
             yield _(
                 "actions.{name}.input.{field} takes its options from '{source}', which is not a property"
             ).format(name=name, field=field, source=source)
-    yield from _of_texts(f"actions.{name}", action, fields)
+    yield from _text_contradictions(f"actions.{name}", action, fields)
 
 
-def _of_fields(place: str, fields: Mapping[str, object]) -> Iterator[str]:
+def _field_contradictions(place: str, fields: Mapping[str, object]) -> Iterator[str]:
     for name, data in fields.items():
         if name == "robot":
             yield _("{place}: the name 'robot' is reserved; use another one").format(place=place)
-        yield from _of_data(f"{place}.{name}", as_part(data))
+        yield from _data_contradictions(f"{place}.{name}", as_object(data))
 
 
-def _of_data(place: str, data: Mapping[str, object]) -> Iterator[str]:
+def _data_contradictions(place: str, data: Mapping[str, object]) -> Iterator[str]:
     low, high = data.get("minimum"), data.get("maximum")
     if isinstance(low, (int, float)) and isinstance(high, (int, float)) and low > high:
         yield _("{place}: minimum {low} is greater than maximum {high}").format(
@@ -258,15 +260,17 @@ def _of_data(place: str, data: Mapping[str, object]) -> Iterator[str]:
         )
     elif data.get("default") is not None:
         default = _("{place}: the default").format(place=place)
-        wrong = wrong_value(parameter_of(place, data), data["default"], default)
+        wrong = value_problem(parameter_of(place, data), data["default"], default)
         if wrong is not None:
             yield wrong
 
 
-def _of_texts(place: str, owner: Mapping[str, object], fields: Mapping[str, object]) -> Iterator[str]:
-    block = part(owner, "rb:block")
+def _text_contradictions(
+    place: str, owner: Mapping[str, object], fields: Mapping[str, object]
+) -> Iterator[str]:
+    block = object_member(owner, "rb:block")
     for kind in ("text", "says"):
-        for language, text in part(block, kind).items():
+        for language, text in object_member(block, kind).items():
             used = PLACEHOLDER.findall(str(text))
             for name in used:
                 if name != "robot" and name not in fields:

@@ -53,7 +53,7 @@ class Failed(Exception):  # noqa: N818 - the word of the answer's state
     """
 
 
-def _call_each(callbacks: Sequence[Callable[[], object]]) -> None:
+def _run_callbacks(callbacks: Sequence[Callable[[], object]]) -> None:
     for callback in callbacks:
         try:
             callback()
@@ -165,13 +165,13 @@ class Call:
             callbacks, self._on_cancel = self._on_cancel, []
         if callbacks:
             self._canceling = threading.Thread(
-                target=_call_each, args=(callbacks,), name=f"cancel {self.action}", daemon=True
+                target=_run_callbacks, args=(callbacks,), name=f"cancel {self.action}", daemon=True
             )
             try:
                 self._canceling.start()
             except (RuntimeError, MemoryError):  # out of threads
                 self._canceling = None
-                _call_each(callbacks)
+                _run_callbacks(callbacks)
 
     def close(self) -> None:
         """Wait at most 2 s until the callbacks of `on_cancel` have returned."""

@@ -11,20 +11,20 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 from app.errors import RobotValueError
-from app.robots.description.inputs import near_miss
-from app.robots.description.json_access import as_part, text
+from app.robots.description.inputs import closest_match
+from app.robots.description.json_access import as_object, text
 from app.robots.description.model import Action, Robot
 from app.robots.driver.call import Call, Failed
 from app.robots.driver.declare import ActionSpec
-from app.robots.driver.schema_values import given
-from app.robots.driver.task import Answer, ProgramId, Task
-from app.robots.driver.tasks import NOTHING_RUNS, Tasks
+from app.robots.driver.schema_values import from_json
+from app.robots.driver.task import ProgramId, Task, TaskReply
+from app.robots.driver.tasks import NO_SUCH_TASK, Tasks
 from app.robots.identity import program_of
 from nep.i18n import _
 from nep.text import bounded_str, quotable
 
 Publish: TypeAlias = Callable[[Mapping[str, object]], None]
-Done: TypeAlias = Callable[[object, Call], object]
+Resolve: TypeAlias = Callable[[object, Call], object]
 _MAX_ID_LENGTH = 200
 _MAX_ENDED_PROGRAMS = 100
 
@@ -42,7 +42,7 @@ class CommandHandler:
         specs: Mapping[str, ActionSpec],
         tasks: Tasks,
         publish: Publish,
-        done: Done,
+        done: Resolve,
     ) -> None:
         self._robot, self._body, self._specs = robot, body, specs
         self._tasks, self._publish, self._done = tasks, publish, done
@@ -51,7 +51,7 @@ class CommandHandler:
 
     def is_stop(self, command: object) -> bool:
         """Return True for a command that stops the robot. Thread-safe."""
-        message = as_part(command)
+        message = as_object(command)
         operation = message.get("op")
         return operation == "stop" or (
             operation == "invoke" and message.get("action") == self._robot.safe_stop.action
@@ -59,7 +59,7 @@ class CommandHandler:
 
     def stop(self, command: object) -> None:
         """Execute a stop command. Thread-safe; does not wait for queued commands."""
-        message = as_part(command)
+        message = as_object(command)
         ended = text(message.get("ends"))
         if ended is not None:
             self._ended_programs.append(program_of(ended))
@@ -67,7 +67,7 @@ class CommandHandler:
         if wanted is None or (operation == "invoke" and wanted in self._open_ids):
             self._tasks.stop(None)
         else:
-            self._tasks.stop(self._answering(wanted, str(operation), self._robot.safe_stop.action))
+            self._tasks.stop(self._reply_callback(wanted, str(operation), self._robot.safe_stop.action))
 
     def receive(self, command: object, publisher: int | None = None, epoch: int | None = None) -> None:
         """Handle one message of the command topic.
@@ -78,7 +78,7 @@ class CommandHandler:
                 requested the action.
             epoch: `Tasks.epoch` when the message was received.
         """
-        message = as_part(command)
+        message = as_object(command)
         wanted = _id_of(message)
         try:
             if self.is_stop(message):
@@ -90,13 +90,15 @@ class CommandHandler:
                 words = _("{robot} can't handle this command: {error}").format(
                     robot=self._robot.name, error=quotable(error)
                 )
-                self._answering(wanted, quotable(message.get("op")), "")(Answer("failed", error=words))
+                self._reply_callback(wanted, quotable(message.get("op")), "")(
+                    TaskReply("failed", error=words)
+                )
             raise
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
         """Reply to a command that was not decoded, unless its id belongs to another command."""
         if wanted not in self._open_ids:
-            self._answering(wanted, operation, "")(Answer("failed", error=error))
+            self._reply_callback(wanted, operation, "")(TaskReply("failed", error=error))
 
     def _handle(
         self,
@@ -116,7 +118,7 @@ class CommandHandler:
             return
         program = None if name is None else ProgramId(name, publisher)
         if program is not None:
-            self._tasks.sign_of_life(program, watch=operation == "invoke")
+            self._tasks.record_heartbeat(program, watch=operation == "invoke")
         if operation == "alive" or wanted is None:
             return
         if operation == "cancel":
@@ -127,9 +129,11 @@ class CommandHandler:
             error = _("unknown operation “{operation}”; use invoke, cancel, stop or alive").format(
                 operation=quotable(operation)
             )
-            self._answering(wanted, quotable(operation), "")(Answer("failed", error=error))
+            self._reply_callback(wanted, quotable(operation), "")(TaskReply("failed", error=error))
 
-    def beat(self, not_ended: Sequence[str] = (), error: str | None = None, rejected: int = 0) -> None:
+    def publish_heartbeat(
+        self, not_ended: Sequence[str] = (), error: str | None = None, rejected: int = 0
+    ) -> None:
         """Publish a heartbeat, whose absence programs notice.
 
         Args:
@@ -138,16 +142,16 @@ class CommandHandler:
             rejected: Number of messages to the robot that were not handled.
         """
         told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
-        told |= {"not_ended": list(not_ended), "error": _sendable(error)}
+        told |= {"not_ended": list(not_ended), "error": _replace_surrogates(error)}
         counts = {"rejected": rejected, "errors": self._tasks.failures}
         self._publish(told | {name: count for name, count in counts.items() if count})
 
-    def task(
+    def create_task(
         self,
         wanted: str,
         action: Action,
         given: Mapping[str, object],
-        answer: Callable[[Answer], None],
+        answer: Callable[[TaskReply], None],
         program: ProgramId | None = None,
         *,
         publisher: int | None = None,
@@ -159,7 +163,7 @@ class CommandHandler:
         function: Callable[..., object] = getattr(self._body, action.name)
 
         def run(call: Call) -> Mapping[str, object]:
-            returned = self._done(function(call, **_typed(spec, function, complete)), call)
+            returned = self._done(function(call, **_typed_arguments(spec, function, complete)), call)
             try:
                 return spec.returns.to_output(returned)
             except RobotValueError as error:
@@ -173,7 +177,7 @@ class CommandHandler:
             id=wanted,
             action=action.name,
             run=run,
-            answer=answer,
+            reply=answer,
             uses=action.uses,
             on_busy=action.on_busy,
             timeout_s=action.timeout_s,
@@ -181,13 +185,13 @@ class CommandHandler:
             title=action.title,
             program=program,
             publisher=publisher,
-            goes_on=action.repeat_s is not None,
+            continues_after_success=action.repeat_s is not None,
             epoch=epoch,
         )
 
-    def unknown(self, name: str) -> str:
+    def unknown_action_message(self, name: str) -> str:
         """Return the error message for an unknown action."""
-        close = near_miss(name, [each.name for each in self._robot.actions])
+        close = closest_match(name, [each.name for each in self._robot.actions])
         words = (
             _("{robot} can't “{action}”; did you mean “{close}”?") if close else _("{robot} can't “{action}”")
         )
@@ -204,23 +208,25 @@ class CommandHandler:
         if wanted in self._open_ids:
             return  # duplicate command
         name, given = message.get("action"), message.get("input")
-        answer = self._answering(wanted, "invoke", quotable(name or ""))
+        answer = self._reply_callback(wanted, "invoke", quotable(name or ""))
         if program is not None and program.name in self._ended_programs:
             # sent before its program was ended, received after the stop: must not move the robot
-            answer(Answer("canceled", error=_("its program was stopped")))
+            answer(TaskReply("canceled", error=_("its program was stopped")))
             return
         action = self._robot.action(name) if isinstance(name, str) else None
         if action is None:
-            answer(Answer("failed", error=self.unknown(bounded_str(name or ""))))
+            answer(TaskReply("failed", error=self.unknown_action_message(bounded_str(name or ""))))
             return
         if action.name == self._robot.safe_stop.action:
             self._tasks.stop(answer)
             return
         sentences = action.check({} if given is None else given)
         if sentences:
-            answer(Answer("failed", error="; ".join(sentences)))
+            answer(TaskReply("failed", error="; ".join(sentences)))
             return
-        task = self.task(wanted, action, as_part(given), answer, program, publisher=publisher, epoch=epoch)
+        task = self.create_task(
+            wanted, action, as_object(given), answer, program, publisher=publisher, epoch=epoch
+        )
         self._open_ids.add(wanted)
         try:
             self._tasks.submit(task)
@@ -230,23 +236,23 @@ class CommandHandler:
 
     def _cancel(self, wanted: str, name: str, publisher: int | None) -> None:
         error = self._tasks.cancel(lambda task: task.id == wanted and task.publisher == publisher)
-        if error is not None and wanted in self._open_ids and error == NOTHING_RUNS:
+        if error is not None and wanted in self._open_ids and error == NO_SUCH_TASK:
             error = _(
                 "only the program that started “{action}” can cancel it; any program can stop the robot"
             ).format(action=name or wanted)
         if error is not None:
-            error = _(error) if error == NOTHING_RUNS else error
-            self._answering(wanted, "cancel", name)(Answer("failed", error=error))
+            error = _(error) if error == NO_SUCH_TASK else error
+            self._reply_callback(wanted, "cancel", name)(TaskReply("failed", error=error))
 
-    def _answering(self, wanted: str, operation: str, name: str) -> Callable[[Answer], None]:
-        def answer(given: Answer) -> None:
+    def _reply_callback(self, wanted: str, operation: str, name: str) -> Callable[[TaskReply], None]:
+        def reply(given: TaskReply) -> None:
             if given.is_final and operation == "invoke":
                 self._open_ids.discard(wanted)
             told: dict[str, object] = {"id": wanted, "op": operation, "action": name, "state": given.state}
             told |= {
                 "output": dict(given.output),
                 "feedback": dict(given.feedback),
-                "error": _sendable(given.error),
+                "error": _replace_surrogates(given.error),
             }
             if given.waits_for:
                 told["waits_for"] = list(given.waits_for)
@@ -254,7 +260,7 @@ class CommandHandler:
                 told["replaces"] = list(given.replaces)
             self._publish(told)
 
-        return answer
+        return reply
 
 
 def _id_of(message: Mapping[str, object]) -> str | None:
@@ -264,17 +270,17 @@ def _id_of(message: Mapping[str, object]) -> str | None:
     return wanted
 
 
-def _sendable(error: str | None) -> str | None:
+def _replace_surrogates(error: str | None) -> str | None:
     return None if error is None else error.encode("utf-8", "replace").decode("utf-8")
 
 
-def _typed(
+def _typed_arguments(
     spec: ActionSpec, function: Callable[..., object], inputs: Mapping[str, object]
 ) -> dict[str, object]:
     typed: dict[str, object] = {}
     for name, value in inputs.items():
         try:
-            typed[name] = given(spec.inputs[name], value)
+            typed[name] = from_json(spec.inputs[name], value)
         except ValueError as error:
             raise Failed(f"{name}: {error}") from error
     for name, parameter in inspect.signature(function).parameters.items():

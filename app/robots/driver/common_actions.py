@@ -9,7 +9,7 @@ from app.robots.driver.declare import FromRize, SensorSpec, action, sensor
 from app.robots.driver.schema import Range, Title
 
 MOVEMENT = "Movement"
-DRIVE_S = 60
+DRIVE_TIMEOUT_S = 60
 
 
 def drives(
@@ -37,7 +37,7 @@ def drives(
         title=title,
         uses=("base",),
         on_busy="replace",
-        timeout_s=DRIVE_S,
+        timeout_s=DRIVE_TIMEOUT_S,
         risk="locomotes",
         feedback={**made, "to_go": Annotated[float, Range(unit=unit), Title("to go")]},
         output=made or None,

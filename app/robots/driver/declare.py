@@ -24,16 +24,16 @@ from app.robots.driver.schema import (
     fields_schema,
     input_schema,
     input_types,
-    returned_type,
+    return_type,
     schema_of,
 )
-from app.robots.driver.schema_values import check_sendable, plain, to_json, told_fields
-from app.robots.driver.tasks import BEAT_S
+from app.robots.driver.schema_values import any_to_json, check_encodable, fields_to_json, to_json
+from app.robots.driver.tasks import HEARTBEAT_INTERVAL_S
 from nep.i18n import _
 from nep.system.syntax import parse_module
 
 Function = TypeVar("Function", bound=Callable[..., object])
-Described = TypeVar("Described")
+DeclaredType = TypeVar("DeclaredType")
 Busy: TypeAlias = Literal["queue", "replace", "reject"]
 Risk: TypeAlias = Literal["moves", "locomotes"]
 FromRize: TypeAlias = Callable[[str, Mapping[str, object]], Mapping[str, object]]
@@ -100,9 +100,13 @@ class action:  # noqa: N801 - used as a decorator
         """
         try:
             _check_function(function)
-            returns = Returned(self.output, returned_type(function))
+            returns = ReturnSpec(self.output, return_type(function))
             spec = ActionSpec(
-                self._part(function, returns), self.rize, self.from_rize, input_types(function), returns
+                self._description(function, returns),
+                self.rize,
+                self.from_rize,
+                input_types(function),
+                returns,
             )
         except (TypeError, NameError) as error:
             where = line_of(function)
@@ -110,7 +114,7 @@ class action:  # noqa: N801 - used as a decorator
         setattr(function, _ACTION_ATTRIBUTE, spec)
         return function
 
-    def _part(self, function: Callable[..., object], returns: Returned) -> Schema:
+    def _description(self, function: Callable[..., object], returns: ReturnSpec) -> Schema:
         part: Schema = {
             "title": self.title or function.__name__.replace("_", " "),
             "synchronous": not self.cancellable,
@@ -131,7 +135,7 @@ class action:  # noqa: N801 - used as a decorator
 
 
 @dataclass(frozen=True)
-class Returned:
+class ReturnSpec:
     """Result of an action: the fields of ``output=``, or else the return type of the function."""
 
     fields: Mapping[str, object] | None = None
@@ -151,7 +155,7 @@ class Returned:
     def to_output(self, value: object) -> Mapping[str, object]:
         """Convert the return value of a function to the output. Raises RobotValueError for a wrong type."""
         made = self._to_output(value)
-        check_sendable(made)
+        check_encodable(made)
         return made
 
     def _to_output(self, value: object) -> Mapping[str, object]:
@@ -161,8 +165,8 @@ class Returned:
             only = list(self.fields) if len(self.fields) == 1 else []
             if only and not isinstance(value, Mapping):
                 value = {only[0]: value}
-            return told_fields(self.fields, value)
-        found = plain(value) if self.kind is None else to_json(self.kind, value)
+            return fields_to_json(self.fields, value)
+        found = any_to_json(value) if self.kind is None else to_json(self.kind, value)
         if isinstance(found, dict):
             return found
         return {} if found is None else {"value": found}
@@ -172,11 +176,11 @@ class Returned:
 class ActionSpec:
     """Declaration of an action, as given to the decorator :class:`action`."""
 
-    part: Schema
+    description: Schema
     primitive: str | None
     from_rize: FromRize | None
     inputs: Mapping[str, object] = field(default_factory=dict)
-    returns: Returned = field(default_factory=Returned)
+    returns: ReturnSpec = field(default_factory=ReturnSpec)
 
 
 @dataclass(frozen=True)
@@ -191,7 +195,7 @@ class StopSpec:
 class SensorSpec:
     """Declaration of a sensor, with its part of the description."""
 
-    part: Schema
+    description: Schema
     is_image: bool = False
     is_object: bool = False
     kind: object = None
@@ -201,7 +205,7 @@ class SensorSpec:
         if self.is_image:
             return value
         if isinstance(self.kind, Mapping):
-            return told_fields(self.kind, value)
+            return fields_to_json(self.kind, value)
         return to_json(self.kind, value) if self.is_object else {"value": to_json(self.kind, value)}
 
 
@@ -209,7 +213,7 @@ class SensorSpec:
 class EventSpec:
     """Declaration of an event, with its part of the description and its form on RIZE's blackboard."""
 
-    part: Schema
+    description: Schema
     to_rize: ToRize | None = None
     fields: Mapping[str, object] = field(default_factory=dict)
 
@@ -244,7 +248,11 @@ def sensor(
         icon: Icon of the block.
         rate_hz: Typical publishing rate.
     """
-    schema = _described(fields_schema, kind) if isinstance(kind, Mapping) else _described(schema_of, kind)
+    schema = (
+        _declared_schema(fields_schema, kind)
+        if isinstance(kind, Mapping)
+        else _declared_schema(schema_of, kind)
+    )
     is_object = schema.get("type") == "object"
     part: Schema = {**schema, "title": title, "readOnly": True, "observable": True}
     part |= _without_none({"rb:rate": rate_hz})
@@ -308,7 +316,7 @@ def event(
     block: Schema = {"category": "Events", "icon": icon, "text": {"en": text}}
     part: Schema = {
         "title": title,
-        "data": _described(fields_schema, fields),
+        "data": _declared_schema(fields_schema, fields),
         "rb:filter": list(choose),
         "rb:block": block,
     }
@@ -399,11 +407,11 @@ class Kind:
 
     def _thing_model(self) -> Schema:
         stop, timing = self.stop
-        actions = {name: spec.part for name, spec in self.actions.items()}
+        actions = {name: spec.description for name, spec in self.actions.items()}
         stopping: Schema = {"category": "Movement", "icon": "octagon-x", "text": {"en": "stop moving"}}
         actions[stop] = {"title": "stop", "synchronous": True, "idempotent": True, "rb:cancel": False}
         actions[stop] |= {"rb:uses": [], "rb:block": stopping | {"says": {"en": "stops"}}}
-        used = (name for part in actions.values() for name in _listed(part.get("rb:uses")))
+        used = (name for part in actions.values() for name in _string_list(part.get("rb:uses")))
         about: Schema = {"model": self.model, "title": self.title, "virtual": self.virtual}
         about |= {"kinds": list(self.kinds), "driver": self.driver, "dialect": "native"}
         return {
@@ -415,7 +423,7 @@ class Kind:
             "rb:profile": 1,
             "rb:robot": about,
             "rb:resources": list(dict.fromkeys(used)),
-            "rb:beat": BEAT_S,
+            "rb:beat": HEARTBEAT_INTERVAL_S,
             "rb:safeStop": {
                 "action": stop,
                 "watchdog": timing.watchdog_s,
@@ -424,9 +432,9 @@ class Kind:
                 "onDisconnect": True,
                 "confirmed": True,
             },
-            "properties": {name: spec.part for name, spec in self.sensors.items()},
+            "properties": {name: spec.description for name, spec in self.sensors.items()},
             "actions": actions,
-            "events": {name: spec.part for name, spec in self.events.items()},
+            "events": {name: spec.description for name, spec in self.events.items()},
         }
 
 
@@ -440,7 +448,7 @@ def _check_function(function: Callable[..., object]) -> None:
         )
 
 
-def _described(schema: Callable[[Described], Schema], kind: Described) -> Schema:
+def _declared_schema(schema: Callable[[DeclaredType], Schema], kind: DeclaredType) -> Schema:
     try:
         return schema(kind)
     except TypeError as error:
@@ -451,7 +459,7 @@ def _described(schema: Callable[[Described], Schema], kind: Described) -> Schema
         raise DeclarationError("", str(error), str(where)) from error
 
 
-def _listed(value: object) -> list[str]:
+def _string_list(value: object) -> list[str]:
     return [str(item) for item in value] if isinstance(value, list) else []
 
 

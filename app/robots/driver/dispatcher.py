@@ -14,10 +14,10 @@ from contextlib import suppress
 from functools import partial
 
 from app.robots.driver.call import Clock
-from nep.system.log_rarely import SurvivedErrors
+from nep.system.log_rarely import SuppressedErrors
 
 _MAX_CALLS_PER_TICK = 100  # a flood of callbacks must not keep timers waiting
-_RESTART_PAUSE_S = 0.05
+_RESTART_DELAY_S = 0.05
 _JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
 
@@ -46,7 +46,7 @@ class Dispatcher:
         next_due_s: Callable[[], float | None] = lambda: None,
         on_restart: Callable[[], object] = _do_nothing,
     ) -> None:
-        self.errors = SurvivedErrors(_log, name)
+        self.errors = SuppressedErrors(_log, name)
         """Exceptions raised by callbacks, ticks or the loop."""
         self._name, self._clock = name, clock
         self._tick, self._next_due_s, self._on_restart = tick, next_due_s, on_restart
@@ -115,7 +115,7 @@ class Dispatcher:
                 try:
                     if is_restart:
                         self._on_restart()
-                        self._closing.wait(_RESTART_PAUSE_S)
+                        self._closing.wait(_RESTART_DELAY_S)
                     is_restart = True
                     self._loop()
                 except BaseException as error:  # noqa: BLE001 - the loop restarts after any exception
@@ -131,13 +131,13 @@ class Dispatcher:
                 self._clock.wait(self._wake, self._next_due_s())
             self._wake.clear()
             for _count in range(_MAX_CALLS_PER_TICK):
-                callback = self._next()
+                callback = self._next_callback()
                 if callback is None:
                     break
                 self.call(callback)
             self.call(self._tick)
 
-    def _next(self) -> Callable[[], object] | None:
+    def _next_callback(self) -> Callable[[], object] | None:
         for queue in (self._urgent, self._callbacks):
             with suppress(IndexError):
                 return queue.popleft()

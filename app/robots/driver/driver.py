@@ -16,16 +16,16 @@ from typing import TYPE_CHECKING
 
 import nep
 from app.errors import DescriptionError, RobotValueError
-from app.robots.description.description import MAX_BYTES, parse, td_for, topic_of
-from app.robots.description.inputs import problems_of
-from app.robots.description.json_access import as_part
+from app.robots.description.description import MAX_BYTES, parse, thing_description, topic_of
+from app.robots.description.inputs import input_problems
+from app.robots.description.json_access import as_object
 from app.robots.driver.call import Call, Canceled, Clock, MonotonicClock
 from app.robots.driver.commands import CommandHandler
 from app.robots.driver.declare import Kind
 from app.robots.driver.dispatcher import Dispatcher
 from app.robots.driver.receiver import CommandReceiver, MessageQueue, RejectedMessages
 from app.robots.driver.rize_dialect import RizeDialect
-from app.robots.driver.schema_values import told_fields
+from app.robots.driver.schema_values import fields_to_json
 from app.robots.driver.tasks import Tasks
 from nep.i18n import _, lazy, number
 from nep.text import quotable
@@ -59,7 +59,7 @@ class Driver:
     def __init__(self, kind: Kind, name: str, node: nep.Node, *, clock: Clock | None = None) -> None:
         self.name = name
         self.kind = kind
-        self.description = td_for(kind.thing_model, name)
+        self.description = thing_description(kind.thing_model, name)
         self.robot = parse(self.description)
         if len(json.dumps(self.description)) > MAX_BYTES:
             raise DescriptionError(
@@ -94,7 +94,7 @@ class Driver:
             self._create_topics()
             self._body = self.kind.body(self)
             self._start_commands(self._body)
-            self._open(self.robot.topics.description, "robot/description", latched=True)
+            self._open_publisher(self.robot.topics.description, "robot/description", latched=True)
         except nep.NepError:
             self.close()
             raise
@@ -104,22 +104,24 @@ class Driver:
     def _create_topics(self) -> None:
         for name, spec in self.kind.sensors.items():
             msg_type = "image" if spec.is_image else "json"
-            self._open(topic_of(self.name, name), msg_type, latched=not spec.is_image)
+            self._open_publisher(topic_of(self.name, name), msg_type, latched=not spec.is_image)
         for name in self.kind.events:
-            self._open(topic_of(self.name, name))
-        self._open(self.robot.topics.answer, "robot/answer")
-        self._open(RIZE_ANSWERS)
-        self._open(RIZE_EVENTS, latched=True)
+            self._open_publisher(topic_of(self.name, name))
+        self._open_publisher(self.robot.topics.answer, "robot/answer")
+        self._open_publisher(RIZE_ANSWERS)
+        self._open_publisher(RIZE_EVENTS, latched=True)
         if any(spec.to_rize for spec in self.kind.events.values()):
-            self._open(BLACKBOARD)
+            self._open_publisher(BLACKBOARD)
 
     def _start_commands(self, body: object) -> None:
         stop, timing = self.kind.stop
         stop_function: Callable[[], object] = getattr(body, stop)
         answer = partial(self._publish, self.robot.topics.answer)
 
-        def beat(not_ended: tuple[str, ...], error: str | None) -> None:
-            desk.beat(not_ended, error, rejected=self._rejected.count)  # desk is created with the tasks below
+        def publish_heartbeat(not_ended: tuple[str, ...], error: str | None) -> None:
+            desk.publish_heartbeat(
+                not_ended, error, rejected=self._rejected.count
+            )  # desk is created with the tasks below
 
         self._tasks = tasks = Tasks(
             self.name,
@@ -127,7 +129,7 @@ class Driver:
             self.clock,
             within_s=timing.within_s,
             watchdog_s=timing.watchdog_s,
-            beat=beat,
+            beat=publish_heartbeat,
         )
         desk = CommandHandler(self.robot, body, self.kind.actions, tasks, answer, self._resolve)
         dialect = RizeDialect(
@@ -197,7 +199,7 @@ class Driver:
         """
         spec = self.kind.events[event]
         try:
-            data = told_fields(spec.fields, data)
+            data = fields_to_json(spec.fields, data)
         except RobotValueError as error:
             words = lazy("{robot}'s event '{event}': {error}")
             raise RobotValueError(words, robot=self.name, event=event, error=error) from error
@@ -216,7 +218,7 @@ class Driver:
             return (_("{robot} has no event “{event}”").format(robot=self.name, event=quotable(event)),)
         missing = [field for field in described.fields if field.name not in data]
         return (
-            *(problem.sentence for problem in problems_of(described.fields, data)),
+            *(problem.message for problem in input_problems(described.fields, data)),
             *(_("{place} is missing").format(place=field.title) for field in missing),
         )
 
@@ -224,7 +226,7 @@ class Driver:
         """Publish a value that is not in the description on ``/<name>/<leaf>``, such as ``state``."""
         topic = topic_of(self.name, leaf)
         if topic not in self._publishers:
-            self._open(topic)
+            self._open_publisher(topic)
         self._publish(topic, value)
 
     def watchers(self, leaf: str) -> int:
@@ -251,7 +253,7 @@ class Driver:
         Returns:
             A function that publishes a message; after `close` it does nothing.
         """
-        self._open(topic, latched=latched)
+        self._open_publisher(topic, latched=latched)
         self._subscribe(topic, changed)
         return partial(self._publish, topic)
 
@@ -260,7 +262,7 @@ class Driver:
 
     # ---- topics -----------------------------------------------------------------------------------
 
-    def _open(self, topic: str, msg_type: str = "json", *, latched: bool = False) -> None:
+    def _open_publisher(self, topic: str, msg_type: str = "json", *, latched: bool = False) -> None:
         publisher = self._node.new_pub(topic, msg_type, latched=latched)
         with self._lock:
             self._publishers[topic] = publisher
@@ -283,7 +285,7 @@ class Driver:
 
         def take(messages: Sequence[nep.Message]) -> None:
             for message in messages:
-                queue.put(message, lambda payload: changed(as_part(payload)))
+                queue.put(message, lambda payload: changed(as_object(payload)))
 
         self._subscribers.append(self._node.new_sub(topic, "json", sink=take))
 
@@ -313,7 +315,7 @@ class EventLoop:
             within_s: Timeout in seconds, after which the awaitable is cancelled and TimeoutError is raised.
         """
         loop, waited = self._running_loop(work), _PendingAwaitable(work)
-        self._call_soon(partial(waited.begin, loop, f"{self._name}: {call.action if call else 'run'}"))
+        self._call_soon(partial(waited.start, loop, f"{self._name}: {call.action if call else 'run'}"))
         if call is not None:
             call.on_cancel(partial(self._call_soon, waited.cancel))
         if not waited.ended.wait(within_s) and within_s is not None:
@@ -347,7 +349,7 @@ class EventLoop:
                 self._loop = asyncio.new_event_loop()
                 name = f"{self._name} asyncio"
                 self._thread = threading.Thread(
-                    target=_serve, args=(self._loop, lambda: self._closed), name=name, daemon=True
+                    target=_run_loop, args=(self._loop, lambda: self._closed), name=name, daemon=True
                 )
                 self._thread.start()
             return self._loop
@@ -374,9 +376,9 @@ class _PendingAwaitable:
         self._work = work
         self._task: asyncio.Task[None] | None = None
 
-    def begin(self, loop: asyncio.AbstractEventLoop, name: str) -> None:
+    def start(self, loop: asyncio.AbstractEventLoop, name: str) -> None:
         self._task = loop.create_task(self._run(), name=name)
-        self._task.add_done_callback(self._end)
+        self._task.add_done_callback(self._finish)
 
     def cancel(self) -> None:
         if self._task is not None:
@@ -392,13 +394,13 @@ class _PendingAwaitable:
         except BaseException as error:  # noqa: BLE001 - raised again in the waiting thread
             self.error = error
 
-    def _end(self, _task: object) -> None:
+    def _finish(self, _task: object) -> None:
         if asyncio.iscoroutine(self._work):
             self._work.close()  # canceled before its first step: avoid a "never awaited" warning
         self.ended.set()
 
 
-def _serve(loop: asyncio.AbstractEventLoop, is_closed: Callable[[], bool]) -> None:
+def _run_loop(loop: asyncio.AbstractEventLoop, is_closed: Callable[[], bool]) -> None:
     asyncio.set_event_loop(loop)
     try:
         while not is_closed():

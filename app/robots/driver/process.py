@@ -22,11 +22,11 @@ from app.robots.driver.declare import Kind
 from app.robots.driver.driver import Driver
 from nep.i18n import _
 from nep.system.addresses import master_address
-from nep.system.crash_trace import say_where_it_crashes
+from nep.system.crash_trace import enable_crash_trace
 from nep.system.terminal import Terminal, log_to
 from nep.text import escaped
 
-_OWNER_CHECK_S = 0.5
+_OWNER_CHECK_INTERVAL_S = 0.5
 
 
 def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
@@ -51,7 +51,7 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--owner-pid", type=int, default=None, help=_("exit when this process has ended"))
     chosen = parser.parse_args(arguments)
     ended = threading.Event()
-    say_where_it_crashes()
+    enable_crash_trace()
     _handle_signals(ended)
     with Terminal(sys.stderr) as terminal:  # a blocked stderr must not block the robot's threads
         log_to(terminal, logging.INFO)
@@ -63,7 +63,7 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def tell_briefly() -> None:
+def install_exception_hook() -> None:
     """Report an invalid description as one sentence instead of a traceback.
 
     Descriptions are generated while Python executes the class, before the driver can catch an exception.
@@ -91,10 +91,10 @@ def run(
     owner = _owner_process(owner_pid)
     if owner_pid is not None and owner is None:
         return
-    with Terminal(sys.stdout) as output, nep.node(name, master=master) as node, _published(node):
+    with Terminal(sys.stdout) as output, nep.node(name, master=master) as node, _forward_log(node):
         driver = Driver(kind, name, node)
 
-        def say(sentence: str) -> None:
+        def print_progress(sentence: str) -> None:
             if owner is None:
                 _print(sentence, output)
 
@@ -103,14 +103,14 @@ def run(
             if kind.virtual
             else _("{robot}: robot, model {model}; topics: {topics}")
         )
-        say(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
+        print_progress(words.format(robot=name, model=kind.model, topics=topic_of(name, "...")))
         try:
             if not _wait_for_master(
-                driver, name, master_address(master), say, lambda: _is_over(ended, owner)
+                driver, name, master_address(master), print_progress, lambda: _has_ended(ended, owner)
             ):
                 return
-            while not _is_over(ended, owner):
-                ended.wait(_OWNER_CHECK_S)
+            while not _has_ended(ended, owner):
+                ended.wait(_OWNER_CHECK_INTERVAL_S)
         finally:
             driver.close()
 
@@ -141,7 +141,7 @@ def _print(words: str, terminal: Terminal) -> None:
 
 
 @contextmanager
-def _published(node: nep.Node) -> Iterator[None]:
+def _forward_log(node: nep.Node) -> Iterator[None]:
     root = logging.getLogger()
     root.addHandler(node.log_handler)
     try:
@@ -158,12 +158,12 @@ def _try_start(driver: Driver) -> bool:
     return True
 
 
-def _is_over(ended: threading.Event, owner: psutil.Process | None) -> bool:
+def _has_ended(ended: threading.Event, owner: psutil.Process | None) -> bool:
     # is_running compares pid and start time, so a reused pid doesn't count.
-    return ended.is_set() or (owner is not None and _is_gone(owner))
+    return ended.is_set() or (owner is not None and _has_exited(owner))
 
 
-def _is_gone(owner: psutil.Process) -> bool:
+def _has_exited(owner: psutil.Process) -> bool:
     try:
         return not owner.is_running() or owner.status() == psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:
@@ -180,10 +180,10 @@ def _owner_process(pid: int | None) -> psutil.Process | None:
 
 
 def _handle_signals(ended: threading.Event) -> None:
-    def end(_number: int, _frame: FrameType | None) -> None:
+    def set_ended(_number: int, _frame: FrameType | None) -> None:
         ended.set()
 
-    signal.signal(signal.SIGTERM, end)
-    signal.signal(signal.SIGINT, end)
+    signal.signal(signal.SIGTERM, set_ended)
+    signal.signal(signal.SIGINT, set_ended)
     if os.name == "nt":
-        signal.signal(signal.SIGBREAK, end)  # type: ignore[attr-defined,unused-ignore]
+        signal.signal(signal.SIGBREAK, set_ended)  # type: ignore[attr-defined,unused-ignore]

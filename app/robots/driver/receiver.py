@@ -22,7 +22,7 @@ from nep.system.log_rarely import is_logged
 MAX_COMMAND_BYTES = 64_000
 _MAX_BACKLOG = 2_000
 _MAX_BACKLOG_BYTES = 16_000_000
-_SEARCHED_BYTES = 2_048
+_SEARCH_WINDOW_BYTES = 2_048
 _ID = re.compile(rb'"id"\s*:\s*"([\w .:/-]{1,200})"', re.ASCII)
 _OPERATION = re.compile(rb'"op"\s*:\s*"(\w{1,20})"', re.ASCII)
 _log = logging.getLogger(__name__)
@@ -89,7 +89,7 @@ class MessageQueue:
         """Queue a message whose payload is passed to ``use``; return False if the message is too large."""
         size = message.size_bytes
         if size > self.max_message_bytes:
-            self._rejected.add(self._topic, self.too_large(message))
+            self._rejected.add(self._topic, self.too_large_message(message))
             return False
         with self._lock:
             has_room = self._count < _MAX_BACKLOG and self._bytes + size <= _MAX_BACKLOG_BYTES
@@ -102,7 +102,7 @@ class MessageQueue:
             self._rejected.add(self._topic, _("messages arrive faster than they are handled"))
         return True
 
-    def too_large(self, message: Message) -> str:
+    def too_large_message(self, message: Message) -> str:
         """Return the error message for a message that is too large."""
         return _("the message is {size} kB in size; the limit is {limit} kB").format(
             size=number(message.size_bytes / 1000, ".0f"), limit=number(self.max_message_bytes / 1000, ".0f")
@@ -155,11 +155,11 @@ class CommandReceiver:
         epoch, last_stop, handled = self._tasks.epoch, max(stops, default=-1), frozenset(stops)
         for at, message in enumerate(messages):
             if self._queues_stops or at not in handled:
-                self._put(message, epoch if at >= last_stop else older_epoch)
+                self._enqueue(message, epoch if at >= last_stop else older_epoch)
 
     def _is_stop(self, message: Message) -> bool:
         if message.size_bytes > MAX_COMMAND_BYTES:
-            return _found(_OPERATION, message) == "stop"
+            return _search(_OPERATION, message) == "stop"
         raw = bytes(message.raw)
         if not any(needle in raw for needle in self._needles):
             return False
@@ -170,23 +170,25 @@ class CommandReceiver:
 
     def _stop(self, message: Message) -> None:
         if message.size_bytes > MAX_COMMAND_BYTES:
-            self._dialect.stop({"op": "stop", "id": _found(_ID, message)})
+            self._dialect.stop({"op": "stop", "id": _search(_ID, message)})
         else:
             self._dialect.stop(message.payload)
 
-    def _put(self, message: Message, epoch: int) -> None:
+    def _enqueue(self, message: Message, epoch: int) -> None:
         if self._queue.put(message, partial(self._receive, message.publisher, epoch)):
             return
-        wanted, operation = _found(_ID, message), _found(_OPERATION, message)
+        wanted, operation = _search(_ID, message), _search(_OPERATION, message)
         if wanted and operation == "invoke" and self._tasks.backlog < _MAX_BACKLOG:
-            error = self._queue.too_large(message)
+            error = self._queue.too_large_message(message)
             self._tasks.call_soon(partial(self._dialect.reject, wanted, operation, error))
 
     def _receive(self, publisher: int | None, epoch: int, command: object) -> None:
         self._dialect.receive(command, publisher, epoch)
 
 
-def _found(pattern: re.Pattern[bytes], message: Message) -> str:
+def _search(pattern: re.Pattern[bytes], message: Message) -> str:
     data = message.data
-    found = pattern.search(bytes(data[:_SEARCHED_BYTES])) or pattern.search(bytes(data[-_SEARCHED_BYTES:]))
+    found = pattern.search(bytes(data[:_SEARCH_WINDOW_BYTES])) or pattern.search(
+        bytes(data[-_SEARCH_WINDOW_BYTES:])
+    )
     return "" if found is None else found[1].decode()

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from app.robots.description.inputs import Parameter
-from app.robots.description.json_access import as_part, number_of, text
+from app.robots.description.json_access import as_object, text, to_number
 from app.robots.description.model import Action, Robot
 from app.robots.driver.call import Call
 from app.robots.driver.commands import CommandHandler
 from app.robots.driver.declare import ActionSpec
-from app.robots.driver.task import Answer, Task
+from app.robots.driver.task import Task, TaskReply
 from app.robots.driver.tasks import Tasks
 from nep.text import bounded_str
 
@@ -31,7 +31,7 @@ class _Group:
     """Primitives of one command, which get one reply."""
 
     command: Mapping[str, object]
-    open: int
+    open_count: int
     states: list[str] = field(default_factory=list)
 
 
@@ -55,12 +55,12 @@ class RizeDialect:
 
     def is_stop(self, message: object) -> bool:
         """Return True for a message whose primitives include the robot's stop. Thread-safe."""
-        command = as_part(message)
+        command = as_object(message)
         return (
-            self._is_for_me(command)
+            self._is_for_robot(command)
             and command.get("node") == "action"
             and any(
-                self._action_of(as_part(each)) == self._robot.safe_stop.action
+                self._action_of(as_object(each)) == self._robot.safe_stop.action
                 for each in _primitives(command)
             )
         )
@@ -74,8 +74,8 @@ class RizeDialect:
 
         ``epoch`` is `Tasks.epoch` when the message was received.
         """
-        command = as_part(message)
-        if not self._is_for_me(command):
+        command = as_object(message)
+        if not self._is_for_robot(command):
             return
         if command.get("node") == "cancel":
             self._tasks.cancel(lambda task: task.id.startswith(_PREFIX))
@@ -85,7 +85,7 @@ class RizeDialect:
     def reject(self, wanted: str, operation: str, error: str) -> None:
         """Do nothing, because a reply of RIZE's dialect would have to repeat the whole command."""
 
-    def _is_for_me(self, command: Mapping[str, object]) -> bool:
+    def _is_for_robot(self, command: Mapping[str, object]) -> bool:
         robots = command.get("robots")
         return robots == self._robot.name or (isinstance(robots, list) and self._robot.name in robots)
 
@@ -95,24 +95,24 @@ class RizeDialect:
 
     def _run(self, command: Mapping[str, object], epoch: int | None) -> None:
         primitives = _primitives(command)
-        group = _Group(command, open=len(primitives))
+        group = _Group(command, open_count=len(primitives))
         if not primitives or len(primitives) > _MAX_PRIMITIVES:
             self._publish({**command, "state": "failure"})
             return
         for primitive in primitives:
-            self._start(as_part(primitive), lambda answer: self._answered(group, answer), epoch)
+            self._start(as_object(primitive), lambda answer: self._record_reply(group, answer), epoch)
 
-    def _answered(self, group: _Group, answer: Answer) -> None:
+    def _record_reply(self, group: _Group, answer: TaskReply) -> None:
         if not answer.is_final:
             return
-        group.open -= 1
+        group.open_count -= 1
         group.states.append(answer.state)
-        if group.open == 0:
+        if group.open_count == 0:
             good = all(state == "succeeded" for state in group.states)
             self._publish({**group.command, "state": "success" if good else "failure"})
 
     def _start(
-        self, primitive: Mapping[str, object], answer: Callable[[Answer], None], epoch: int | None
+        self, primitive: Mapping[str, object], answer: Callable[[TaskReply], None], epoch: int | None
     ) -> None:
         name, given = text(primitive.get("primitive")) or "", _as_text(primitive.get("input"))
         wanted = f"{_PREFIX}{next(self._numbers)}"
@@ -124,14 +124,14 @@ class RizeDialect:
         task = None
         if action is not None:
             meant = _parsed_input(
-                action, spec, given, as_part(primitive.get("options"))
+                action, spec, given, as_object(primitive.get("options"))
             )  # options may be "none"
             if meant is not None and not action.check(meant):
-                task = self._commands.task(wanted, action, meant, answer, epoch=epoch)
+                task = self._commands.create_task(wanted, action, meant, answer, epoch=epoch)
         elif name == "wait":
-            task = _waiting(wanted, given, answer, epoch)
+            task = _wait_task(wanted, given, answer, epoch)
         if task is None:
-            answer(Answer("failed"))
+            answer(TaskReply("failed"))
         else:
             self._tasks.submit(task)
 
@@ -148,8 +148,10 @@ def _as_text(value: object) -> str:
     return str(value or "") if isinstance(value, (str, float, bool)) else bounded_str(value or "")
 
 
-def _waiting(wanted: str, given: str, answer: Callable[[Answer], None], epoch: int | None) -> Task | None:
-    seconds = number_of(given)
+def _wait_task(
+    wanted: str, given: str, answer: Callable[[TaskReply], None], epoch: int | None
+) -> Task | None:
+    seconds = to_number(given)
     if seconds is None or not 0 <= seconds <= _MAX_WAIT_S:
         return None
     return Task(wanted, "wait", lambda call: _wait(call, seconds), answer, epoch=epoch)
@@ -163,28 +165,28 @@ def _parsed_input(
     action: Action, spec: ActionSpec | None, given: str, options: Mapping[str, object]
 ) -> Mapping[str, object] | None:
     if spec is None or spec.from_rize is None:
-        return _by_name(action, given, options)
+        return _input_by_name(action, given, options)
     try:
         return spec.from_rize(given, options)
     except (ValueError, KeyError, TypeError, OverflowError):
         return None
 
 
-def _by_name(action: Action, given: str, options: Mapping[str, object]) -> dict[str, object]:
+def _input_by_name(action: Action, given: str, options: Mapping[str, object]) -> dict[str, object]:
     meant: dict[str, object] = {}
     if action.parameters and given:
         first = action.parameters[0]
-        meant[first.name] = _of_kind(first, given)
+        meant[first.name] = _convert_to_kind(first, given)
     for name, value in options.items():
         parameter = action.parameter(name)
         if parameter is not None:
-            meant[name] = _of_kind(parameter, value)
+            meant[name] = _convert_to_kind(parameter, value)
     return meant
 
 
-def _of_kind(parameter: Parameter, value: object) -> object:
+def _convert_to_kind(parameter: Parameter, value: object) -> object:
     if parameter.kind in {"number", "integer", "angle"} and isinstance(value, str):
-        number = number_of(value)
+        number = to_number(value)
         return value if number is None else number
     if parameter.kind == "boolean" and isinstance(value, str):
         return {"true": True, "false": False}.get(value.lower(), value)

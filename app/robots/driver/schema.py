@@ -13,8 +13,15 @@ from dataclasses import dataclass
 from typing import Annotated, Any, NoReturn, TypeAlias, get_args, get_origin, get_type_hints
 
 from app.errors import RobotValueError
-from app.robots.description.json_access import as_part
-from app.robots.driver.schema_values import bare, choices_in, fields_of, shown, to_json, without_none
+from app.robots.description.json_access import as_object
+from app.robots.driver.schema_values import (
+    choices_in,
+    fields_of,
+    format_type,
+    split_annotated,
+    split_optional,
+    to_json,
+)
 from nep.i18n import _
 
 Schema: TypeAlias = dict[str, object]
@@ -104,9 +111,9 @@ def schema_of(annotation: object) -> Schema:
 
 
 def _schema_of(annotation: object, inside: tuple[object, ...]) -> Schema:
-    annotation, notes = bare(annotation)
-    optional, may_be_none = without_none(annotation)
-    schema = _plain(annotation, inside) if optional is annotation else _schema_of(optional, inside)
+    annotation, notes = split_annotated(annotation)
+    optional, may_be_none = split_optional(annotation)
+    schema = _type_schema(annotation, inside) if optional is annotation else _schema_of(optional, inside)
     if may_be_none:
         schema["rb:nullable"] = True
     for note in notes:
@@ -114,12 +121,12 @@ def _schema_of(annotation: object, inside: tuple[object, ...]) -> Schema:
     return schema
 
 
-def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
+def _type_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
     if isinstance(annotation, type) and annotation in _TYPES:
         return {"type": _TYPES[annotation]}
     choices = choices_in(annotation)
     if choices is not None:
-        return _choice(annotation, choices)
+        return _choice_schema(annotation, choices)
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in {list, Sequence} and len(arguments) == 1:
         return {"type": "array", "items": _element_schema(arguments[0], inside)}
@@ -135,36 +142,36 @@ def _plain(annotation: object, inside: tuple[object, ...]) -> Schema:
         )
     if annotation in inside:
         raise TypeError(
-            _("recursive types are not supported: {annotation}").format(annotation=shown(annotation))
+            _("recursive types are not supported: {annotation}").format(annotation=format_type(annotation))
         )
     fields = fields_of(annotation)
     if fields is not None:
-        return _object(fields, (*inside, annotation))
+        return _object_schema(fields, (*inside, annotation))
     raise TypeError(
         _(
             "unsupported type {annotation}; use float, int, bool, str, list[...], tuple[...], "
             "dict[str, ...], Literal, Optional, an Enum, a dataclass or a TypedDict"
-        ).format(annotation=shown(annotation))
+        ).format(annotation=format_type(annotation))
     )
 
 
 def _element_schema(annotation: object, inside: tuple[object, ...]) -> Schema:
     # Elements of a list or map: None is not allowed.
-    if without_none(bare(annotation)[0])[1]:
+    if split_optional(split_annotated(annotation)[0])[1]:
         raise TypeError(
             _("items of a list or dict can't be None: {annotation}; leave them out").format(
-                annotation=shown(annotation)
+                annotation=format_type(annotation)
             )
         )
     return _schema_of(annotation, inside)
 
 
-def _choice(annotation: object, choices: tuple[tuple[object, object, str | None], ...]) -> Schema:
+def _choice_schema(annotation: object, choices: tuple[tuple[object, object, str | None], ...]) -> Schema:
     values = [value for value, _, _ in choices]
     if not all(isinstance(value, (str, int, float)) and not isinstance(value, bool) for value in values):
         raise TypeError(
             _("choices must be texts or numbers, not {annotation}; for true or false, use bool").format(
-                annotation=shown(annotation)
+                annotation=format_type(annotation)
             )
         )
     texts = [isinstance(value, str) for value in values]
@@ -174,12 +181,16 @@ def _choice(annotation: object, choices: tuple[tuple[object, object, str | None]
     return schema | {"enum": values}
 
 
-def _object(fields: Mapping[str, tuple[object, bool]], inside: tuple[object, ...]) -> Schema:
+def _object_schema(fields: Mapping[str, tuple[object, bool]], inside: tuple[object, ...]) -> Schema:
     properties = {
         name: {"title": name.replace("_", " "), **_schema_of(kind, inside)}
         for name, (kind, _) in fields.items()
     }
-    required = [name for name, (kind, must) in fields.items() if must and not without_none(bare(kind)[0])[1]]
+    required = [
+        name
+        for name, (kind, must) in fields.items()
+        if must and not split_optional(split_annotated(kind)[0])[1]
+    ]
     return _without_none({"type": "object", "required": required or None, "properties": properties})
 
 
@@ -195,7 +206,7 @@ def _note_schema(note: object, schema: Schema) -> Schema:
         values = schema.pop("enum", None)
         if values is None:
             named = schema.get("oneOf")
-            values = [as_part(each).get("const") for each in named] if isinstance(named, list) else []
+            values = [as_object(each).get("const") for each in named] if isinstance(named, list) else []
         names = values if isinstance(values, list) else []
         return {"oneOf": [{"const": value, "title": note.shown.get(value, str(value))} for value in names]}
     if isinstance(note, Title):
@@ -266,12 +277,12 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
     return found
 
 
-def returned_type(function: Callable[..., object]) -> object:
+def return_type(function: Callable[..., object]) -> object:
     """Return the annotated return type of a function; None if there is none, or if it is None or object."""
     kind = get_type_hints(function, include_extras=True).get("return")
     if get_origin(kind) in {Awaitable, Coroutine}:
         kind = get_args(kind)[-1]
-    plain, _ = bare(kind)
+    plain, _ = split_annotated(kind)
     free = plain in (None, type(None), Any, object, dict, Mapping, NoReturn)
     return None if free or get_args(plain)[1:] in ((object,), (Any,)) else kind
 
@@ -286,21 +297,21 @@ def input_schema(function: Callable[..., object]) -> Schema | None:
         schema.setdefault("title", name.replace("_", " "))
         default = parameters[name].default
         if default is inspect.Parameter.empty:
-            if not without_none(bare(kind)[0])[1]:
+            if not split_optional(split_annotated(kind)[0])[1]:
                 required.append(name)
         elif default is not None:
-            schema["default"] = _default(kind, default, name)
+            schema["default"] = _default_json(kind, default, name)
         properties[name] = schema
     if not properties:
         return None
     return _without_none({"type": "object", "required": required or None, "properties": properties})
 
 
-def _default(kind: object, default: object, name: str) -> object:
+def _default_json(kind: object, default: object, name: str) -> object:
     try:
         return to_json(kind, default)
     except RobotValueError as error:
-        raise TypeError(str(error.inside(_("the default of '{name}'").format(name=name)))) from error
+        raise TypeError(str(error.nested_in(_("the default of '{name}'").format(name=name)))) from error
 
 
 def fields_schema(fields: Mapping[str, object]) -> Schema:

@@ -15,7 +15,7 @@ from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints, is_typeddict
 
 from app.errors import RobotValueError
-from nep.i18n import _, lazy, listed
+from nep.i18n import _, format_list, lazy
 
 _MAX_SHOWN_LENGTH = 40
 _TYPE_MESSAGES = {
@@ -27,7 +27,7 @@ _TYPE_MESSAGES = {
 _MAX_DEPTH = 40
 
 
-def bare(annotation: object) -> tuple[object, tuple[object, ...]]:
+def split_annotated(annotation: object) -> tuple[object, tuple[object, ...]]:
     """Split ``Annotated`` into the type and its annotations."""
     if get_origin(annotation) is Annotated:
         plain, *notes = get_args(annotation)
@@ -35,7 +35,7 @@ def bare(annotation: object) -> tuple[object, tuple[object, ...]]:
     return annotation, ()
 
 
-def without_none(annotation: object) -> tuple[object, bool]:
+def split_optional(annotation: object) -> tuple[object, bool]:
     """Return the type inside an ``Optional``, and True if it is one; ``int | float`` counts as float."""
     if get_origin(annotation) not in {Union, UnionType}:
         return annotation, False
@@ -45,7 +45,9 @@ def without_none(annotation: object) -> tuple[object, bool]:
         return float, is_optional
     if len(kinds) != 1:
         raise TypeError(
-            _("a union of several types is not supported: {annotation}").format(annotation=shown(annotation))
+            _("a union of several types is not supported: {annotation}").format(
+                annotation=format_type(annotation)
+            )
         )
     return kinds[0], is_optional
 
@@ -94,32 +96,32 @@ def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], .
     )
 
 
-def shown(annotation: object) -> str:
+def format_type(annotation: object) -> str:
     """Format a type as written in source: ``float``, ``list[str]``, ``Pose``."""
     if isinstance(annotation, type) and get_origin(annotation) is None:
         return annotation.__name__
     return str(annotation).replace("typing.", "")
 
 
-def given(annotation: object, value: object) -> object:
+def from_json(annotation: object, value: object) -> object:
     """Convert a valid JSON value to an argument of this type.
 
     The constructor of a dataclass may raise ValueError.
     """
-    kind, is_optional = without_none(bare(annotation)[0])
-    kind = bare(kind)[0]
+    kind, is_optional = split_optional(split_annotated(annotation)[0])
+    kind = split_annotated(kind)[0]
     if value is None and is_optional:
         return None
     choices = choices_in(kind)
     if choices is not None:
-        return next((python for json, python, _title in choices if same(json, value)), value)
+        return next((python for json, python, _title in choices if is_json_equal(json, value)), value)
     if kind is float and isinstance(value, (int, float)):
         return float(value)
     if kind is int and isinstance(value, (int, float)):
         return int(value)
     fields = fields_of(kind)
     if fields is not None and isinstance(value, Mapping):
-        made = {name: given(each, value[name]) for name, (each, _must) in fields.items() if name in value}
+        made = {name: from_json(each, value[name]) for name, (each, _must) in fields.items() if name in value}
         if not dataclasses.is_dataclass(kind):
             return made
         absent = {name: None for name, (each, must) in fields.items() if must and name not in made}
@@ -127,43 +129,45 @@ def given(annotation: object, value: object) -> object:
     arguments = get_args(kind)
     if isinstance(value, (list, tuple)) and arguments:
         if get_origin(kind) is tuple and arguments[1:] != (Ellipsis,):
-            return tuple(given(each, item) for each, item in zip(arguments, value, strict=False))
-        items = [given(arguments[0], item) for item in value]
+            return tuple(from_json(each, item) for each, item in zip(arguments, value, strict=False))
+        items = [from_json(arguments[0], item) for item in value]
         return tuple(items) if get_origin(kind) is tuple else items
     if isinstance(value, Mapping) and len(arguments) == 2:
-        return {str(name): given(arguments[1], item) for name, item in value.items()}
+        return {str(name): from_json(arguments[1], item) for name, item in value.items()}
     return value
 
 
 def to_json(annotation: object, value: object) -> object:
     """Convert a value of this type to JSON. Raises RobotValueError if the value is invalid."""
-    kind, is_optional = without_none(bare(annotation)[0])
-    kind = bare(kind)[0]
+    kind, is_optional = split_optional(split_annotated(annotation)[0])
+    kind = split_annotated(kind)[0]
     if value is None and is_optional:
         return None
     if kind in (Any, object):
-        return plain(value)
-    value = _out_of_numpy(value)
+        return any_to_json(value)
+    value = _from_numpy(value)
     choices = choices_in(kind)
     if choices is not None:
-        found = [json for json, python, _title in choices if python is value or same(json, value)]
+        found = [json for json, python, _title in choices if python is value or is_json_equal(json, value)]
         if not found:
             words = [str(json) for json, _python, _title in choices]
             raise RobotValueError(
                 lazy("{place} must be {choices}, not {value}"),
-                choices=listed(words, "or"),
-                value=_shown_value(value),
+                choices=format_list(words, "or"),
+                value=_format_value(value),
             )
         return found[0]
     if kind in (float, int, bool, str):
-        return _simple(kind, value)
+        return _scalar_to_json(kind, value)
     fields = fields_of(kind)
     if fields is not None:
-        return told_fields({name: each for name, (each, _must) in fields.items()}, value, _required(fields))
-    return _collection(kind, value)
+        return fields_to_json(
+            {name: each for name, (each, _must) in fields.items()}, value, _required_names(fields)
+        )
+    return _collection_to_json(kind, value)
 
 
-def told_fields(
+def fields_to_json(
     kinds: Mapping[str, object], value: object, required: Sequence[str] = ()
 ) -> dict[str, object]:
     """Convert a value with these fields to a JSON object; other fields are kept unchanged.
@@ -174,32 +178,34 @@ def told_fields(
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
     if not isinstance(value, Mapping):
-        wanted = listed(list(kinds)) or _("named values")
+        wanted = format_list(list(kinds)) or _("named values")
         raise RobotValueError(
             lazy("{place} must be an object with {names}, not {value}"),
             names=wanted,
-            value=_shown_value(value),
+            value=_format_value(value),
         )
     made: dict[str, object] = {}
     for name, each in value.items():
         try:
             is_unknown = each is None and name not in required
-            made[str(name)] = to_json(kinds[name], each) if name in kinds and not is_unknown else plain(each)
+            made[str(name)] = (
+                to_json(kinds[name], each) if name in kinds and not is_unknown else any_to_json(each)
+            )
         except RobotValueError as error:
-            raise error.inside(str(name)) from error
+            raise error.nested_in(str(name)) from error
     for name in required:
         if name not in made:
             raise RobotValueError(lazy("{place} is missing"), name)
     return made
 
 
-def plain(value: object, depth: int = 0) -> object:
+def any_to_json(value: object, depth: int = 0) -> object:
     """Convert a value of any type to JSON. Raises RobotValueError if JSON can't represent it."""
-    value = _out_of_numpy(value)
+    value = _from_numpy(value)
     if value is None or isinstance(value, (bool, str)):
         return value
     if isinstance(value, Enum):
-        return plain(value.value, depth + 1)
+        return any_to_json(value.value, depth + 1)
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real):
@@ -209,13 +215,13 @@ def plain(value: object, depth: int = 0) -> object:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
     if isinstance(value, Mapping):
-        return {str(name): plain(item, depth + 1) for name, item in value.items()}
+        return {str(name): any_to_json(item, depth + 1) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item, depth + 1) for item in value]
-    raise RobotValueError(lazy("{place} must be a JSON value, not {value}"), value=_shown_value(value))
+        return [any_to_json(item, depth + 1) for item in value]
+    raise RobotValueError(lazy("{place} must be a JSON value, not {value}"), value=_format_value(value))
 
 
-def check_sendable(value: object) -> None:
+def check_encodable(value: object) -> None:
     """Raise RobotValueError for NaN, infinity and lone surrogates, which messages can't contain."""
     if isinstance(value, str) and not value.isascii() and any("\ud800" <= each <= "\udfff" for each in value):
         raise RobotValueError(lazy("{place} must be valid Unicode text"))
@@ -223,18 +229,18 @@ def check_sendable(value: object) -> None:
         raise RobotValueError(lazy("{place} must be a finite number, not {value}"), value=value)
     if isinstance(value, Mapping):
         for item in value.values():
-            check_sendable(item)
+            check_encodable(item)
     elif isinstance(value, list):
         for item in value:
-            check_sendable(item)
+            check_encodable(item)
 
 
-def same(allowed: object, value: object) -> bool:
+def is_json_equal(allowed: object, value: object) -> bool:
     """Return True if two values are equal in JSON, where 1 differs from true."""
     return allowed == value and isinstance(allowed, bool) == isinstance(value, bool)
 
 
-def _simple(kind: object, value: object) -> object:
+def _scalar_to_json(kind: object, value: object) -> object:
     wanted, words = next((each, words) for each, words in _TYPE_MESSAGES.items() if each is kind)
     if wanted is bool or wanted is str:
         good = isinstance(value, wanted)
@@ -244,7 +250,7 @@ def _simple(kind: object, value: object) -> object:
         if good and found is not None:
             return found if wanted is float else int(found)
     if not good:
-        raise RobotValueError(words, value=_shown_value(value))
+        raise RobotValueError(words, value=_format_value(value))
     return value
 
 
@@ -254,46 +260,50 @@ def _number(value: object) -> int | float | None:
     return int(value) if isinstance(value, numbers.Integral) else float(value)
 
 
-def _collection(kind: object, value: object) -> object:
+def _collection_to_json(kind: object, value: object) -> object:
     origin, arguments = get_origin(kind), get_args(kind)
     if origin in {dict, Mapping}:
         if not isinstance(value, Mapping):
             raise RobotValueError(
-                lazy("{place} must be an object with named values, not {value}"), value=_shown_value(value)
+                lazy("{place} must be an object with named values, not {value}"), value=_format_value(value)
             )
-        return {str(name): _told_at(arguments[1], item, str(name)) for name, item in value.items()}
+        return {str(name): _element_to_json(arguments[1], item, str(name)) for name, item in value.items()}
     if not isinstance(value, (list, tuple)):
-        raise RobotValueError(lazy("{place} must be a list, not {value}"), value=_shown_value(value))
+        raise RobotValueError(lazy("{place} must be a list, not {value}"), value=_format_value(value))
     if origin is tuple and arguments[1:] != (Ellipsis,):
         if len(value) != len(arguments):
             raise RobotValueError(
                 lazy("{place} must have {count} values, not {given}"), count=len(arguments), given=len(value)
             )
         return [
-            _told_at(each, item, place)
+            _element_to_json(each, item, place)
             for place, (each, item) in enumerate(zip(arguments, value, strict=True), 1)
         ]
-    return [_told_at(arguments[0], item, place) for place, item in enumerate(value, 1)]
+    return [_element_to_json(arguments[0], item, place) for place, item in enumerate(value, 1)]
 
 
-def _told_at(kind: object, value: object, place: int | str) -> object:
+def _element_to_json(kind: object, value: object, place: int | str) -> object:
     try:
         return to_json(kind, value)
     except RobotValueError as error:
         named = f"“{place}”" if isinstance(place, str) else _("value {number}").format(number=place)
-        raise error.inside(named) from error
+        raise error.nested_in(named) from error
 
 
-def _required(fields: Mapping[str, tuple[object, bool]]) -> list[str]:
-    return [name for name, (kind, must) in fields.items() if must and not without_none(bare(kind)[0])[1]]
+def _required_names(fields: Mapping[str, tuple[object, bool]]) -> list[str]:
+    return [
+        name
+        for name, (kind, must) in fields.items()
+        if must and not split_optional(split_annotated(kind)[0])[1]
+    ]
 
 
-def _out_of_numpy(value: object) -> object:
+def _from_numpy(value: object) -> object:
     if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
         return value.tolist()
     return value
 
 
-def _shown_value(value: object) -> str:
+def _format_value(value: object) -> str:
     words = repr(value) if isinstance(value, (str, int, float, bool, type(None))) else type(value).__name__
     return words if len(words) <= _MAX_SHOWN_LENGTH else f"{words[:_MAX_SHOWN_LENGTH]}…"

@@ -7,9 +7,9 @@ import threading
 from collections.abc import Callable
 
 from app.robots.driver.call import Clock, Failed
-from app.robots.identity import ERROR_MOST, MAY_MOVE
+from app.robots.identity import MAX_ERROR_LENGTH, MAY_MOVE_MESSAGE
 from nep.i18n import _
-from nep.system.log_rarely import SurvivedErrors
+from nep.system.log_rarely import SuppressedErrors
 from nep.text import bounded_str
 
 _JOIN_TIMEOUT_S = 0.5
@@ -36,7 +36,7 @@ class StopThread:
         clock: Clock,
     ) -> None:
         self._name, self._stop, self._ended, self._clock = name, stop, ended, clock
-        self._errors = SurvivedErrors(_log, f"{name} stop")
+        self._errors = SuppressedErrors(_log, f"{name} stop")
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._is_closing = False
@@ -48,7 +48,7 @@ class StopThread:
         self._thread.start()
 
     @property
-    def requested(self) -> int:
+    def requested_run(self) -> int:
         """Number of the newest reserved run; 0 before the first."""
         return self._requested
 
@@ -89,7 +89,7 @@ class StopThread:
                 self._thread.start()
 
     def _run(self, run: int) -> None:
-        error: str | None = _(MAY_MOVE).format(robot=self._name, why=_("the stop command failed"))
+        error: str | None = _(MAY_MOVE_MESSAGE).format(robot=self._name, why=_("the stop command failed"))
         try:
             error = self._call_stop()
         finally:
@@ -101,10 +101,10 @@ class StopThread:
         try:
             self._stop()
         except Failed as failed:
-            why = bounded_str(failed, ERROR_MOST)
+            why = bounded_str(failed, MAX_ERROR_LENGTH)
         except BaseException as failed:  # noqa: BLE001 - also SystemExit: a stop must always be answered
             _log.warning("%s: its stop broke off", self._name, exc_info=True)
-            why = _("the stop command failed: {error}").format(error=bounded_str(failed, ERROR_MOST))
+            why = _("the stop command failed: {error}").format(error=bounded_str(failed, MAX_ERROR_LENGTH))
         else:
             return None
-        return _(MAY_MOVE).format(robot=self._name, why=why)
+        return _(MAY_MOVE_MESSAGE).format(robot=self._name, why=why)

@@ -13,7 +13,7 @@ State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "cancel
 
 
 @dataclass(frozen=True)
-class Answer:
+class TaskReply:
     """State of a task. ``error`` is a message for the user.
 
     An accepted task may have to wait for other actions (`waits_for`), or have replaced them (`replaces`).
@@ -74,7 +74,7 @@ class Task:
     id: str
     action: str
     run: Callable[[Call], object]
-    answer: Callable[[Answer], None]
+    reply: Callable[[TaskReply], None]
     uses: tuple[str, ...] = ()
     on_busy: str = "queue"
     timeout_s: float | None = None
@@ -82,23 +82,23 @@ class Task:
     title: str = ""
     program: ProgramId | None = None
     publisher: int | None = None
-    goes_on: bool = False
+    continues_after_success: bool = False
     epoch: int | None = None
     call: Call | None = None
     thread: threading.Thread | None = None
-    due_s: float | None = None
-    ending: Answer | None = None
-    answered: bool = False
-    stopped: bool = False
+    deadline_s: float | None = None
+    final_reply: TaskReply | None = None
+    has_replied: bool = False
+    is_stopped: bool = False
 
-    def end(self, how: Answer) -> None:
+    def request_end(self, how: TaskReply) -> None:
         """Ask the running function to end. ``how`` is the final reply, whatever the function returns."""
-        self.ending = self.ending or how
+        self.final_reply = self.final_reply or how
         if self.call is not None:
             self.call.cancel()
 
-    def finish(self, answer: Answer) -> None:
+    def finish(self, answer: TaskReply) -> None:
         """Send the final reply, unless one was already sent."""
-        if not self.answered:
-            self.answered = True
-            self.answer(answer)
+        if not self.has_replied:
+            self.has_replied = True
+            self.reply(answer)

@@ -17,14 +17,14 @@ from typing import NamedTuple
 from app.robots.driver.call import Call, Canceled, Clock, Failed
 from app.robots.driver.dispatcher import Dispatcher
 from app.robots.driver.stop_thread import StopThread
-from app.robots.driver.task import Answer, ProgramId, Task
-from app.robots.identity import ERROR_MOST, MAY_MOVE
+from app.robots.driver.task import ProgramId, Task, TaskReply
+from app.robots.identity import MAX_ERROR_LENGTH, MAY_MOVE_MESSAGE
 from nep.i18n import _, lazy, ngettext, number
 from nep.text import bounded_str
 
-BEAT_S = 0.5
+HEARTBEAT_INTERVAL_S = 0.5
 """Maximum interval of heartbeats while a task is running or queued."""
-STOP_ANSWER_S = 0.5
+STOP_REPLY_TIMEOUT_S = 0.5
 """Maximum time until the reply to a stop, even if a function keeps running.
 
 The ``within_s`` of the robot applies if it is longer. This is well below the time after which Studio treats a
@@ -35,8 +35,8 @@ _GRACE_S = 1.0
 _MAX_QUEUED = 50
 _MAX_RUNNING = 50
 """Maximum number of running actions. Actions without resources run in parallel, each in its own thread."""
-THE_STOP = lazy("the stop function")
-NOTHING_RUNS = lazy("no running task has this id")
+STOP_LABEL = lazy("the stop function")
+NO_SUCH_TASK = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
 _JOIN_TIMEOUT_S = 2.0
 _log = logging.getLogger(__name__)
@@ -54,7 +54,7 @@ class Watchdog:
         self._heard: dict[ProgramId, float] = {}
         self._going_on: dict[str, ProgramId] = {}  # resource -> the program that left it in motion
 
-    def hear(self, program: ProgramId, now: float, *, watch: bool) -> None:
+    def record_heartbeat(self, program: ProgramId, now: float, *, watch: bool) -> None:
         """Record a heartbeat.
 
         ``watch`` is True if further ones are expected (the program requested an action).
@@ -62,14 +62,14 @@ class Watchdog:
         if self.patience_s is not None and (watch or program in self._heard):
             self._heard[program] = now
 
-    def begins(self, task: Task) -> None:
+    def record_start(self, task: Task) -> None:
         """Record that a task uses its resources, so that an earlier motion of them no longer continues."""
         for used in task.uses:
             self._going_on.pop(used, None)
 
-    def ends_well(self, task: Task) -> None:
+    def record_success(self, task: Task) -> None:
         """Record that a task succeeded. After a speed, its resources continue to move."""
-        if task.goes_on and task.program is not None:
+        if task.continues_after_success and task.program is not None:
             self._going_on |= dict.fromkeys(task.uses, task.program)
 
     def reset(self) -> None:
@@ -77,11 +77,11 @@ class Watchdog:
         self._heard.clear()
         self._going_on.clear()
 
-    def due(self) -> list[float]:
+    def deadlines(self) -> list[float]:
         """Return the times at which programs count as silent."""
         return [] if self.patience_s is None else [seen + self.patience_s for seen in self._heard.values()]
 
-    def bites(self, now: float, acting: Collection[ProgramId | None]) -> bool:
+    def check_expired(self, now: float, acting: Collection[ProgramId | None]) -> bool:
         """Return True if the robot must stop; ``acting`` are the programs of running and queued tasks.
 
         Silent programs without a task are removed: they may have ended long ago.
@@ -100,7 +100,7 @@ class _PendingStop(NamedTuple):
     run: int
     """Number of the run of the stop function that the stop waits for."""
     limit_s: float
-    answer: Callable[[Answer], None]
+    reply: Callable[[TaskReply], None]
 
 
 class Tasks:
@@ -133,16 +133,16 @@ class Tasks:
         self._reported_not_ended: tuple[tuple[str, ...], str | None] = ((), None)
         self._stop_is_late = False
         self._unasked_stop_error: str | None = None  # error of the last failed stop that nobody had requested
-        self._patience_s = max(STOP_ANSWER_S, within_s)
+        self._patience_s = max(STOP_REPLY_TIMEOUT_S, within_s)
         self._watchdog = Watchdog(watchdog_s)
         self._dispatcher = Dispatcher(
             f"{name} commands",
             clock,
             tick=self._tick,
             next_due_s=self._next_due,
-            on_restart=self._restarted,
+            on_restart=self._on_restart,
         )
-        self._stop_thread = StopThread(name, stop, self._stop_run_ended, clock)
+        self._stop_thread = StopThread(name, stop, self._post_stop_end, clock)
         self._ended_run = 0
         self._ended_error: str | None = None
         self._lock = threading.Lock()
@@ -177,7 +177,7 @@ class Tasks:
         """Number of stops so far. Commands received in an earlier epoch are not executed."""
         return self._epoch
 
-    def stop(self, answer: Callable[[Answer], None] | None, why: str = "stopped") -> None:
+    def stop(self, answer: Callable[[TaskReply], None] | None, why: str = "stopped") -> None:
         """Stop the robot immediately and end all tasks. Thread-safe; does not block. Starts a new `epoch`.
 
         ``answer`` is called in the thread of the tasks when the robot stands still and every function has
@@ -193,9 +193,9 @@ class Tasks:
         run = self._stop_thread.reserve()
         try:
             if self._dispatcher.is_current:
-                self._begin_stop(run, answer, why)
+                self._start_stop(run, answer, why)
             elif self._dispatcher.urgent_backlog < _MAX_PENDING_STOPS:
-                self._dispatcher.post_urgent(partial(self._begin_stop, run, answer, why))
+                self._dispatcher.post_urgent(partial(self._start_stop, run, answer, why))
         finally:
             self._stop_thread.wake()
 
@@ -203,8 +203,8 @@ class Tasks:
         """Stop the robot, end all tasks and join the threads. A function that never ends is abandoned."""
         stopped = threading.Event()
 
-        def take(answer: Answer) -> None:
-            self._note_unasked_stop(answer)
+        def take(answer: TaskReply) -> None:
+            self._record_unrequested_stop(answer)
             stopped.set()
 
         self.stop(take, _("the driver is shutting down"))
@@ -220,43 +220,43 @@ class Tasks:
         If they are in use, the task is rejected or replaces other tasks, as its ``on_busy`` requires.
         """
         if task.epoch is not None and task.epoch < self._epoch:
-            self._give_answer(task.finish, _stopped_before())
+            self._send_reply(task.finish, _stopped_reply())
             return
-        refused = self._refusal()
+        refused = self._rejection_reason()
         if refused is not None:
-            self._give_answer(task.finish, Answer("failed", error=f"{task.action}: {refused}"))
+            self._send_reply(task.finish, TaskReply("failed", error=f"{task.action}: {refused}"))
             return
         clashing = [other for other in (*self._running, *self._queue) if set(other.uses) & set(task.uses)]
         if clashing and task.on_busy == "reject":
             busy = _("{action}: {robot} is busy with {other}").format(
                 action=task.action, robot=self._name, other=clashing[0].title or clashing[0].action
             )
-            self._give_answer(task.finish, Answer("failed", error=busy))
+            self._send_reply(task.finish, TaskReply("failed", error=busy))
             return
         if len(self._running) >= _MAX_RUNNING:
             full = _("{action}: {count} other actions are already running").format(
                 action=task.action, count=_MAX_RUNNING
             )
-            self._give_answer(task.finish, Answer("failed", error=full))
+            self._send_reply(task.finish, TaskReply("failed", error=full))
             return
         if len(self._queue) >= _MAX_QUEUED:
             full = _("{action}: {count} other actions are already waiting").format(
                 action=task.action, count=_MAX_QUEUED
             )
-            self._give_answer(task.finish, Answer("failed", error=full))
+            self._send_reply(task.finish, TaskReply("failed", error=full))
             return
         ended = []
         if task.on_busy == "replace":
             ended = [other for other in clashing if other.cancellable or other in self._queue]
         waits_for = tuple(dict.fromkeys(other.action for other in clashing if other not in ended))
         replaces = tuple(dict.fromkeys(other.action for other in ended))
-        self._give_answer(task.answer, Answer("accepted", waits_for=waits_for, replaces=replaces))
-        replaced = Answer(
+        self._send_reply(task.reply, TaskReply("accepted", waits_for=waits_for, replaces=replaces))
+        replaced = TaskReply(
             "canceled", error=_("replaced by {action}").format(action=task.title or task.action)
         )
-        self._drop([other for other in ended if other in self._queue], replaced)
+        self._drop_queued([other for other in ended if other in self._queue], replaced)
         for other in ended:
-            self._end(other, replaced)
+            self._end_task(other, replaced)
         self._queue.append(task)
         self._start_ready()
 
@@ -267,52 +267,52 @@ class Tasks:
         """
         found = [task for task in (*self._running, *self._queue) if wanted(task)]
         if not found:
-            return NOTHING_RUNS
+            return NO_SUCH_TASK
         stubborn = [task for task in found if task in self._running and not task.cancellable]
         if stubborn:
             return _("{action} can't be cancelled; it ends on its own").format(action=stubborn[0].action)
-        self._drop([task for task in found if task in self._queue], Answer("canceled"))
+        self._drop_queued([task for task in found if task in self._queue], TaskReply("canceled"))
         for task in found:
-            self._end(task, Answer("canceled"))
+            self._end_task(task, TaskReply("canceled"))
         return None
 
-    def sign_of_life(self, program: ProgramId, *, watch: bool) -> None:
+    def record_heartbeat(self, program: ProgramId, *, watch: bool) -> None:
         """Record a heartbeat.
 
         ``watch`` is True if further ones are expected (the program requested an action).
         """
-        self._watchdog.hear(program, self._clock.now(), watch=watch)
+        self._watchdog.record_heartbeat(program, self._clock.now(), watch=watch)
 
     # ---- the deciding thread ----------------------------------------------------------------------
 
-    def _begin_stop(self, run: int, answer: Callable[[Answer], None] | None, why: str) -> None:
+    def _start_stop(self, run: int, answer: Callable[[TaskReply], None] | None, why: str) -> None:
         limit = self._clock.now() + self._patience_s
         if answer is not None:
             self._pending_stops.append(_PendingStop(run, limit, answer))
         self._watchdog.reset()
-        ended = Answer("canceled", error=why)
-        self._drop(list(self._queue), ended)
+        ended = TaskReply("canceled", error=why)
+        self._drop_queued(list(self._queue), ended)
         for task in self._running:
-            if task.ending is None:
-                task.end(ended)
-                task.due_s = limit
-            elif task.due_s is not None:
-                task.due_s = min(task.due_s, limit)
-            task.stopped = True
+            if task.final_reply is None:
+                task.request_end(ended)
+                task.deadline_s = limit
+            elif task.deadline_s is not None:
+                task.deadline_s = min(task.deadline_s, limit)
+            task.is_stopped = True
         if run <= self._ended_run:  # a concurrent stop's run has already ended
-            self._stop_ended(self._ended_run, self._ended_error)
+            self._handle_stop_end(self._ended_run, self._ended_error)
 
-    def _restarted(self) -> None:
-        self.stop(self._note_unasked_stop, _("its driver had an internal error"))
+    def _on_restart(self) -> None:
+        self.stop(self._record_unrequested_stop, _("its driver had an internal error"))
 
-    def _give_answer(self, answer: Callable[[Answer], None], told: Answer) -> None:
+    def _send_reply(self, answer: Callable[[TaskReply], None], told: TaskReply) -> None:
         self._dispatcher.call(partial(answer, told))
 
     def _next_due(self) -> float | None:
-        due = [task.due_s for task in self._running if task.due_s is not None]
+        due = [task.deadline_s for task in self._running if task.deadline_s is not None]
         due += [pending.limit_s for pending in self._pending_stops]
-        due += self._watchdog.due()
-        if self._beat is not None and self._needs_beat:
+        due += self._watchdog.deadlines()
+        if self._beat is not None and self._needs_heartbeat:
             due.append(self._next_beat_s)
         return max(0.0, min(due) - self._clock.now()) if due else None
 
@@ -322,85 +322,91 @@ class Tasks:
 
     @property
     def _is_stopping(self) -> bool:
-        return self._stop_thread.requested > self._ended_run
+        return self._stop_thread.requested_run > self._ended_run
 
     @property
-    def _needs_beat(self) -> bool:
+    def _needs_heartbeat(self) -> bool:
         return self._is_busy or self._unasked_stop_error is not None
 
-    def _refusal(self) -> str | None:
-        stopped = [task for task in self._running if task.stopped]
-        if self._stop_is_late or any(task.answered for task in stopped):
-            return still_moving(self._name, self._not_ended())
+    def _rejection_reason(self) -> str | None:
+        stopped = [task for task in self._running if task.is_stopped]
+        if self._stop_is_late or any(task.has_replied for task in stopped):
+            return still_moving_message(self._name, self._unfinished_actions())
         return _("{robot} is stopping").format(robot=self._name) if self._is_stopping or stopped else None
 
-    def _not_ended(self) -> tuple[str, ...]:
-        names = [task.action for task in self._running if task.answered]
-        return tuple(names + [THE_STOP] * self._stop_is_late)
+    def _unfinished_actions(self) -> tuple[str, ...]:
+        names = [task.action for task in self._running if task.has_replied]
+        return tuple(names + [STOP_LABEL] * self._stop_is_late)
 
-    def _still_moving(self) -> tuple[tuple[str, ...], str | None]:
-        not_ended = self._not_ended()
+    def _unfinished_report(self) -> tuple[tuple[str, ...], str | None]:
+        not_ended = self._unfinished_actions()
         if not_ended:
-            return not_ended, still_moving(self._name, not_ended)
-        return ((THE_STOP,) if self._unasked_stop_error is not None else ()), self._unasked_stop_error
+            return not_ended, still_moving_message(self._name, not_ended)
+        return ((STOP_LABEL,) if self._unasked_stop_error is not None else ()), self._unasked_stop_error
 
-    def _send_beat(self) -> None:
+    def _send_heartbeat(self) -> None:
         if self._beat is None:
             return
         now = self._clock.now()
-        told = self._still_moving()
-        if (self._needs_beat and now >= self._next_beat_s) or told != self._reported_not_ended:
-            self._next_beat_s, self._reported_not_ended = now + BEAT_S, told
+        told = self._unfinished_report()
+        if (self._needs_heartbeat and now >= self._next_beat_s) or told != self._reported_not_ended:
+            self._next_beat_s, self._reported_not_ended = now + HEARTBEAT_INTERVAL_S, told
             self._beat(*told)
 
     def _tick(self) -> None:
-        for step in (self._end_overdue, self._answer_late_stops, self._watch_programs, self._send_beat):
+        for step in (
+            self._end_overdue,
+            self._reply_to_late_stops,
+            self._watch_programs,
+            self._send_heartbeat,
+        ):
             self._dispatcher.call(step)
 
     def _end_overdue(self) -> None:
         now = self._clock.now()
         for task in list(self._running):
-            if task.due_s is not None and now >= task.due_s:
-                self._overdue(task)
+            if task.deadline_s is not None and now >= task.deadline_s:
+                self._handle_timeout(task)
 
-    def _answer_late_stops(self) -> None:
+    def _reply_to_late_stops(self) -> None:
         now = self._clock.now()
         late = [pending for pending in self._pending_stops if now >= pending.limit_s]
         self._pending_stops = [pending for pending in self._pending_stops if now < pending.limit_s]
         if any(pending.run > self._ended_run for pending in late):
             self._stop_is_late = True
         for pending in late:
-            self._give_answer(
-                pending.answer, Answer("failed", error=still_moving(self._name, self._not_ended()))
+            self._send_reply(
+                pending.reply,
+                TaskReply("failed", error=still_moving_message(self._name, self._unfinished_actions())),
             )
 
     def _watch_programs(self) -> None:
         acting = [task.program for task in (*self._running, *self._queue)]
-        if self._watchdog.bites(self._clock.now(), acting):
+        if self._watchdog.check_expired(self._clock.now(), acting):
             self.stop(
-                self._note_unasked_stop,
+                self._record_unrequested_stop,
                 _("its program hasn't responded for {seconds} s").format(
                     seconds=number(self._watchdog.patience_s or 0.0)
                 ),
             )
 
-    def _note_unasked_stop(self, answer: Answer) -> None:
+    def _record_unrequested_stop(self, answer: TaskReply) -> None:
         if answer.state == "failed":
             if answer.error != self._unasked_stop_error:  # log repeated failures once
                 _log.error("%s", answer.error)
             self._unasked_stop_error = answer.error
 
-    def _end(self, task: Task, how: Answer) -> None:
+    def _end_task(self, task: Task, how: TaskReply) -> None:
         # A function that keeps running is reported after `_GRACE_S`.
-        if task.ending is None:
-            task.end(how)
-            task.due_s = self._clock.now() + _GRACE_S
+        if task.final_reply is None:
+            task.request_end(how)
+            task.deadline_s = self._clock.now() + _GRACE_S
 
-    def _overdue(self, task: Task) -> None:
-        if task.ending is None:
-            self._end(
+    def _handle_timeout(self, task: Task) -> None:
+        if task.final_reply is None:
+            self._end_task(
                 task,
-                Answer(
+                TaskReply(
                     "failed",
                     error=_("{action} took longer than {seconds} s").format(
                         action=task.action, seconds=number(task.timeout_s or 0.0)
@@ -408,15 +414,15 @@ class Tasks:
                 ),
             )
             return
-        task.due_s = None
-        why = "" if task.stopped or task.ending.error is None else f" ({task.ending.error})"
-        goes_on = still_moving(self._name, [task.action])
-        self._give_answer(task.finish, Answer("failed", error=f"{goes_on}{why}"))
+        task.deadline_s = None
+        why = "" if task.is_stopped or task.final_reply.error is None else f" ({task.final_reply.error})"
+        goes_on = still_moving_message(self._name, [task.action])
+        self._send_reply(task.finish, TaskReply("failed", error=f"{goes_on}{why}"))
 
-    def _drop(self, tasks: list[Task], how: Answer) -> None:
+    def _drop_queued(self, tasks: list[Task], how: TaskReply) -> None:
         self._queue = [task for task in self._queue if task not in tasks]
         for task in tasks:
-            self._give_answer(task.finish, how)
+            self._send_reply(task.finish, how)
 
     def _start_ready(self) -> None:
         taken = {used for task in self._running for used in task.uses}
@@ -428,7 +434,7 @@ class Tasks:
 
     def _start(self, task: Task) -> None:
         def report(values: Mapping[str, object]) -> None:
-            self.call_soon(partial(self._progress, task, dict(values)))
+            self.call_soon(partial(self._report_progress, task, dict(values)))
 
         call = Call(task.action, self._clock, report)
         with self._lock:  # either a concurrent stop sees the call, or the task sees the new epoch
@@ -437,103 +443,109 @@ class Tasks:
                 task.call = call
                 self._running.append(task)
         if is_stopped:
-            self._give_answer(task.finish, _stopped_before())
+            self._send_reply(task.finish, _stopped_reply())
             return
-        task.due_s = None if task.timeout_s is None else self._clock.now() + task.timeout_s
-        self._watchdog.begins(task)
-        self._give_answer(task.answer, Answer("running"))
+        task.deadline_s = None if task.timeout_s is None else self._clock.now() + task.timeout_s
+        self._watchdog.record_start(task)
+        self._send_reply(task.reply, TaskReply("running"))
         name = f"{self._name} {task.action}"
-        task.thread = threading.Thread(target=self._work, args=(task, call), name=name, daemon=True)
+        task.thread = threading.Thread(target=self._run_task, args=(task, call), name=name, daemon=True)
         try:
             task.thread.start()
         except (RuntimeError, MemoryError) as error:  # out of threads
             task.thread = None
-            self._ended(task, Answer("failed", error=self._broke_off(task, error)))
+            self._finish_task(task, TaskReply("failed", error=self._failure_message(task, error)))
 
-    def _progress(self, task: Task, values: dict[str, object]) -> None:
-        if not task.answered:
-            self._give_answer(task.answer, Answer("running", feedback=values))
+    def _report_progress(self, task: Task, values: dict[str, object]) -> None:
+        if not task.has_replied:
+            self._send_reply(task.reply, TaskReply("running", feedback=values))
 
-    def _work(self, task: Task, call: Call) -> None:
-        done = Answer("failed", error=task.action)
+    def _run_task(self, task: Task, call: Call) -> None:
+        done = TaskReply("failed", error=task.action)
         try:
             done = self._outcome(task, call)
             call.close()
         finally:
-            self.call_soon(partial(self._ended, task, done))
+            self.call_soon(partial(self._finish_task, task, done))
 
-    def _outcome(self, task: Task, call: Call) -> Answer:
+    def _outcome(self, task: Task, call: Call) -> TaskReply:
         try:
             if call.canceled:  # by a stop before this thread started
                 raise Canceled
             output = task.run(call)
         except Canceled:
-            return Answer("canceled")
+            return TaskReply("canceled")
         except Failed as failed:
-            return Answer("failed", error=bounded_str(failed, ERROR_MOST))
+            return TaskReply("failed", error=bounded_str(failed, MAX_ERROR_LENGTH))
         except BaseException as error:  # noqa: BLE001 - also SystemExit: a task must always be answered
             _log.warning("%s: %s broke off", self._name, task.action, exc_info=True)
-            return Answer("failed", error=self._broke_off(task, error))
-        return Answer("succeeded", output=output if isinstance(output, Mapping) else {})
+            return TaskReply("failed", error=self._failure_message(task, error))
+        return TaskReply("succeeded", output=output if isinstance(output, Mapping) else {})
 
-    def _broke_off(self, task: Task, error: BaseException) -> str:
-        return _("{action} failed: {error}").format(action=task.action, error=bounded_str(error, ERROR_MOST))
+    def _failure_message(self, task: Task, error: BaseException) -> str:
+        return _("{action} failed: {error}").format(
+            action=task.action, error=bounded_str(error, MAX_ERROR_LENGTH)
+        )
 
-    def _ended(self, task: Task, done: Answer) -> None:
+    def _finish_task(self, task: Task, done: TaskReply) -> None:
         if task.thread is not None:
             task.thread.join(_JOIN_TIMEOUT_S)
         with self._lock:
             self._running.remove(task)
-        if done.state == "succeeded" and task.ending is None:
-            self._watchdog.ends_well(task)
-        if task.stopped and not self._is_stopping:
+        if done.state == "succeeded" and task.final_reply is None:
+            self._watchdog.record_success(task)
+        if task.is_stopped and not self._is_stopping:
             # It may have moved the robot after the stop, so the robot is stopped again.
-            self._stop_is_late = task.answered
+            self._stop_is_late = task.has_replied
             run = self._stop_thread.reserve()
             self._stop_thread.wake()
             self._pending_stops = [pending._replace(run=run) for pending in self._pending_stops]
         # A function that was asked to end may return normally; the requested ending counts.
-        self._give_answer(task.finish, done if task.ending is None or done.state == "failed" else task.ending)
+        self._send_reply(
+            task.finish, done if task.final_reply is None or done.state == "failed" else task.final_reply
+        )
         self._start_ready()
-        self._settle()
+        self._complete_stops()
 
-    def _stop_run_ended(self, run: int, error: str | None) -> None:
+    def _post_stop_end(self, run: int, error: str | None) -> None:
         # Runs in the thread of the stop function.
-        self._dispatcher.post_urgent(partial(self._stop_ended, run, error))
+        self._dispatcher.post_urgent(partial(self._handle_stop_end, run, error))
 
-    def _stop_ended(self, run: int, error: str | None) -> None:
+    def _handle_stop_end(self, run: int, error: str | None) -> None:
         self._ended_run, self._ended_error = run, error
         self._stop_is_late = False
         if error is None:
             self._unasked_stop_error = None
-            self._settle()
+            self._complete_stops()
             return
-        failed = Answer("failed", error=error)
+        failed = TaskReply("failed", error=error)
         waiting = [pending for pending in self._pending_stops if pending.run <= run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > run]
         if not waiting:
-            self._note_unasked_stop(failed)  # the requester already got the answer that it had not ended
+            self._record_unrequested_stop(
+                failed
+            )  # the requester already got the answer that it had not ended
         elif self._unasked_stop_error is not None:
             self._unasked_stop_error = error
         for pending in waiting:
-            self._give_answer(pending.answer, failed)
+            self._send_reply(pending.reply, failed)
 
-    def _settle(self) -> None:
+    def _complete_stops(self) -> None:
         # Answers the stops whose run of the stop function has ended, once no task runs.
         if self._running:
             return
         stopped = [pending for pending in self._pending_stops if pending.run <= self._ended_run]
         self._pending_stops = [pending for pending in self._pending_stops if pending.run > self._ended_run]
         for pending in stopped:
-            self._give_answer(pending.answer, Answer("succeeded"))
+            self._send_reply(pending.reply, TaskReply("succeeded"))
 
 
-def _stopped_before() -> Answer:
-    return Answer("canceled", error=_("the robot was stopped before this started"))
+def _stopped_reply() -> TaskReply:
+    return TaskReply("canceled", error=_("the robot was stopped before this started"))
 
 
-def still_moving(name: str, actions: Sequence[str]) -> str:
+def still_moving_message(name: str, actions: Sequence[str]) -> str:
     """Return the message about functions that keep running although they were asked to end."""
     why = ngettext("{actions} is still running", "{actions} are still running", len(actions))
-    told = ", ".join(_(THE_STOP) if each == THE_STOP else each for each in actions)
-    return _(MAY_MOVE).format(robot=name, why=why.format(actions=told))
+    told = ", ".join(_(STOP_LABEL) if each == STOP_LABEL else each for each in actions)
+    return _(MAY_MOVE_MESSAGE).format(robot=name, why=why.format(actions=told))

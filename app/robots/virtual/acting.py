@@ -17,26 +17,26 @@ from app.robots.virtual.simulation import Simulation
 from app.robots.virtual.vision import angles_to
 from nep.i18n import _
 
-_HEAD = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
-_HEAD |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
-FEEDBACK_S = 0.2
+_HEAD_ANGLES = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
+_HEAD_ANGLES |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
+FEEDBACK_INTERVAL_S = 0.2
 """Interval between feedback messages in seconds."""
 
-Place: TypeAlias = Literal["head", "left_hand", "right_hand"]
+TouchablePart: TypeAlias = Literal["head", "left_hand", "right_hand"]
 
 
-def _touch(text: str, title: str, rize_value: int) -> EventSpec:
+def _touch_event(text: str, title: str, rize_value: int) -> EventSpec:
     return event(
         text,
         title=title,
         icon="hand",
-        fields={"place": Place},
+        fields={"place": TouchablePart},
         choose=("place",),
         rize=lambda data: ("touched", {str(data["place"]): rize_value}),
     )
 
 
-def _face(text: str, title: str, rize_word: str) -> EventSpec:
+def _face_event(text: str, title: str, rize_word: str) -> EventSpec:
     return event(
         text,
         title=title,
@@ -46,7 +46,7 @@ def _face(text: str, title: str, rize_word: str) -> EventSpec:
     )
 
 
-class Senses:
+class SensorDeclarations:
     """Declarations of sensors and events.
 
     :class:`~app.robots.virtual.simulation.Simulation` publishes them.
@@ -64,10 +64,10 @@ class Senses:
     balls = detections(title="balls", camera="camera", icon="scan", rate_hz=5)
     markers = detections(title="markers", camera="camera", icon="scan-line", rate_hz=5)
 
-    touched = _touch("when %robot %place is touched", "touched", 1)
-    released = _touch("when %robot %place is released", "released", 0)
-    face_seen = _face("when %robot sees a face", "face seen", "yes")
-    face_lost = _face("when %robot loses the face", "face lost", "no")
+    touched = _touch_event("when %robot %place is touched", "touched", 1)
+    released = _touch_event("when %robot %place is released", "released", 0)
+    face_seen = _face_event("when %robot sees a face", "face seen", "yes")
+    face_lost = _face_event("when %robot loses the face", "face lost", "no")
     heard = event(
         "when %robot hears %word",
         title="heard",
@@ -86,25 +86,25 @@ class Senses:
     )
 
 
-class Acting(Senses):
+class SimulatedActions(SensorDeclarations):
     """Simulation of the virtual Pepper, and the helpers of its actions."""
 
     start_room: ClassVar[Room] = Room()
 
     def __init__(self, link: Link) -> None:
         self._simulation = Simulation(Body(room=self.start_room), link, MonotonicClock())
-        link.on_world(self._simulation.act)
+        link.on_world(self._simulation.apply_change)
         self._simulation.start()
 
     def close(self) -> None:
         """Stop the threads of the simulation."""
         self._simulation.close()
 
-    def _roll(self, call: Call, start: Callable[[Body], Motion]) -> Motion:
+    def _run_motion(self, call: Call, start: Callable[[Body], Motion]) -> Motion:
         with self._simulation.changed:
             motion = start(self._simulation.body)
         try:
-            while not call.until(lambda: motion.done, for_s=FEEDBACK_S):
+            while not call.until(lambda: motion.done, for_s=FEEDBACK_INTERVAL_S):
                 call.feedback(to_go=round(abs(motion.remaining), 2))
         except Canceled:
             self._brake(motion)
@@ -119,13 +119,15 @@ class Acting(Senses):
 
     def _turn_head(self, call: Call, yaw: float, pitch: float) -> None:
         with self._simulation.changed:
-            self._simulation.body.head_yaw.aim(yaw)
-            self._simulation.body.head_pitch.aim(pitch)
-        self._until(call, lambda: self._simulation.body.joints_still, self._simulation.body.hold_joints)
+            self._simulation.body.head_yaw.set_target(yaw)
+            self._simulation.body.head_pitch.set_target(pitch)
+        self._wait_until(
+            call, lambda: self._simulation.body.are_joints_at_target, self._simulation.body.hold_joints
+        )
 
-    def _direction_of(self, target: str) -> tuple[float, float]:
-        if target in _HEAD:
-            return _HEAD[target]
+    def _head_angles_to(self, target: str) -> tuple[float, float]:
+        if target in _HEAD_ANGLES:
+            return _HEAD_ANGLES[target]
         found = self._simulation.seen.get("faces" if target == "face" else "balls", [])
         if not found:
             raise Failed(
@@ -133,11 +135,11 @@ class Acting(Senses):
                 if target == "face"
                 else _("look at: no ball in the picture")
             )
-        left, down = angles_to(lens_of(self._simulation.body), found[0].middle)
+        left, down = angles_to(lens_of(self._simulation.body), found[0].centre)
         body = self._simulation.body
         return body.head_yaw.angle + left, body.head_pitch.angle + down
 
-    def _until(self, call: Call, done: Callable[[], bool], halt: Callable[[], None]) -> None:
+    def _wait_until(self, call: Call, done: Callable[[], bool], halt: Callable[[], None]) -> None:
         try:
             call.until(done)
         except Canceled:

@@ -12,17 +12,17 @@ from app.robots.virtual.sounds import Notes, Sound
 
 RADIUS, HEIGHT = 0.27, 1.2
 EYE_HEIGHT = 1.12
-START = (-0.5, 0.0, 0.0)
+START_POSE = (-0.5, 0.0, 0.0)
 START_PITCH = 8.0
-EYES = "#35b0fa"
-SHOULDERS = "#3ab5ff"
-FULL_RANGE = 5.0
+DEFAULT_EYE_COLOUR = "#35b0fa"
+DEFAULT_SHOULDER_COLOUR = "#3ab5ff"
+MAX_DISTANCE_M = 5.0
 _SECONDS_PER_CHARACTER = 0.06
 _MIN_SPEECH_S = 0.6
 _MAX_STEP_S = 0.02
-TOUCH_LEAST_S = 0.3
+MIN_TOUCH_S = 0.3
 """Minimum duration of a touch, so that programs that poll notice a tap."""
-HEARD_FOR_S = 4.0
+HEARD_DISPLAY_S = 4.0
 """Time for which the room shows what the user said to the robot."""
 _DRAIN_PER_S = 1 / 180  # % of the battery, standing
 _DRAIN_MOVING_PER_S = 1 / 60
@@ -41,12 +41,12 @@ class Speech:
     """Text being spoken; ``done`` is True after the last word."""
 
     text: str
-    seconds: float
+    duration_s: float
     spoken_s: float = 0.0
     done: bool = False
 
     @classmethod
-    def of(cls, text: str, speed_percent: float = 100.0) -> Speech:
+    def from_text(cls, text: str, speed_percent: float = 100.0) -> Speech:
         """Return a speech with a duration that depends on the length of the text."""
         return cls(text, max(_MIN_SPEECH_S, len(text) * _SECONDS_PER_CHARACTER) * 100.0 / speed_percent)
 
@@ -54,7 +54,7 @@ class Speech:
     def word(self) -> str:
         """Word being spoken now."""
         words = self.text.split()
-        place = int(len(words) * min(0.999, self.spoken_s / self.seconds))
+        place = int(len(words) * min(0.999, self.spoken_s / self.duration_s))
         return words[place] if words else ""
 
 
@@ -63,9 +63,9 @@ class Body:
     """State of the body. Not thread-safe: hold the owner's lock around every call."""
 
     room: Room = field(default_factory=Room)
-    x: float = START[0]
-    y: float = START[1]
-    theta_deg: float = START[2]
+    x: float = START_POSE[0]
+    y: float = START_POSE[1]
+    theta_deg: float = START_POSE[2]
     head_yaw: Joint = field(default_factory=lambda: Joint(120.0, -119.0, 119.0))
     head_pitch: Joint = field(default_factory=lambda: Joint(90.0, -40.0, 36.0, START_PITCH, START_PITCH))
     arms: dict[str, Joint] = field(
@@ -74,22 +74,22 @@ class Body:
     elbows: dict[str, Joint] = field(
         default_factory=lambda: {side: Joint(220.0, 0.0, 90.0) for side in ("left", "right")}
     )
-    eyes: str = EYES
-    shoulders: str = SHOULDERS
+    eyes: str = DEFAULT_EYE_COLOUR
+    shoulders: str = DEFAULT_SHOULDER_COLOUR
     emotion: str = "neutral"
     battery: float = 84.4
     touched: dict[str, float] = field(default_factory=dict)
     """Touched places, and the duration of each touch in seconds."""
-    heard: str = ""
-    listened_s: float = HEARD_FOR_S
+    last_word: str = ""
+    since_last_word_s: float = HEARD_DISPLAY_S
     """Seconds since the robot heard `heard`."""
     volume: int = 60
     language: str = "en"
-    held: bool = False
+    is_lifted: bool = False
     """True while the user lifts the robot, so that its base doesn't move."""
-    happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
+    events: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
-    _turning: bool = field(default=False, repr=False)
+    _is_turning: bool = field(default=False, repr=False)
     sound: Sound | None = None
     """Sound being played."""
     _sounds: int = field(default=0, repr=False)
@@ -110,16 +110,16 @@ class Body:
     def _start(self, motion: Motion, *, turning: bool) -> Motion:
         if self._base is not None:
             self._base.block()
-        self._base, self._turning = motion, turning
+        self._base, self._is_turning = motion, turning
         return motion
 
     def speak(self, text: str, speed_percent: float = 100.0) -> Speech:
         """Start to speak; a current speech or sound ends."""
-        self.hush()
-        self._speech = Speech.of(text, speed_percent)
+        self.stop_audio()
+        self._speech = Speech.from_text(text, speed_percent)
         return self._speech
 
-    def hush(self) -> None:
+    def stop_audio(self) -> None:
         """Stop speech and sound."""
         if self._speech is not None:
             self._speech.done = True
@@ -130,7 +130,7 @@ class Body:
 
     def play(self, title: str, notes: Notes) -> Sound:
         """Start to play notes; a current speech or sound ends."""
-        self.hush()
+        self.stop_audio()
         self._sounds += 1
         self.sound = Sound(self._sounds, title, notes)
         return self.sound
@@ -144,8 +144,8 @@ class Body:
     def stand(self) -> None:
         """Lower the arms and look straight ahead."""
         for joint in (*self.arms.values(), *self.elbows.values(), self.head_yaw):
-            joint.aim(0.0)
-        self.head_pitch.aim(START_PITCH)
+            joint.set_target(0.0)
+        self.head_pitch.set_target(START_PITCH)
 
     def halt(self) -> None:
         """Stop everything: the base brakes in the next steps, all other movements end immediately."""
@@ -154,7 +154,7 @@ class Body:
         for wave in self._waves:
             wave.halt()
         self.hold_joints()
-        self.hush()
+        self.stop_audio()
         self.emotion = "neutral"
 
     def hold_joints(self) -> None:
@@ -168,19 +168,19 @@ class Body:
         if self._base is not None:
             self._base.block()
         self._base = None
-        self.room, self.held = room, False
-        self.x, self.y = room.nearest_free(*START[:2], RADIUS)
-        self.theta_deg = START[2]
-        self.eyes, self.shoulders = EYES, SHOULDERS
-        self.touched = dict.fromkeys(self.touched, TOUCH_LEAST_S)
+        self.room, self.is_lifted = room, False
+        self.x, self.y = room.nearest_free(*START_POSE[:2], RADIUS)
+        self.theta_deg = START_POSE[2]
+        self.eyes, self.shoulders = DEFAULT_EYE_COLOUR, DEFAULT_SHOULDER_COLOUR
+        self.touched = dict.fromkeys(self.touched, MIN_TOUCH_S)
         for place in sorted(self.touched):
             self.touch(place, down=False)
         self.stand()
 
     @property
-    def joints_still(self) -> bool:
+    def are_joints_at_target(self) -> bool:
         """True when head and arms have reached their targets."""
-        return all(joint.arrived for joint in self._joints())
+        return all(joint.is_at_target for joint in self._joints())
 
     @property
     def speech(self) -> str | None:
@@ -188,25 +188,25 @@ class Body:
         return None if self._speech is None else self._speech.text
 
     @property
-    def spoken(self) -> float:
+    def spoken_fraction(self) -> float:
         """Spoken part of the text, 0 to 1."""
-        return 0.0 if self._speech is None else min(1.0, self._speech.spoken_s / self._speech.seconds)
+        return 0.0 if self._speech is None else min(1.0, self._speech.spoken_s / self._speech.duration_s)
 
     @property
-    def rolling(self) -> bool:
+    def is_rolling(self) -> bool:
         """True while the base moves."""
         return self._base is not None and not self._base.done
 
     @property
-    def still(self) -> bool:
+    def is_still(self) -> bool:
         """True when nothing moves."""
-        return not self.rolling and not self._waves and self.joints_still
+        return not self.is_rolling and not self._waves and self.are_joints_at_target
 
     @property
     def distance(self) -> float:
         """Distance from the edge of the base to the next obstacle ahead, at most 5 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
-        return min(FULL_RANGE, max(0.0, ahead))
+        return min(MAX_DISTANCE_M, max(0.0, ahead))
 
     # ---- the user's actions ------------------------------------------------------------------------
 
@@ -216,7 +216,7 @@ class Body:
             self._ending_touches.discard(place)
             if place not in self.touched:
                 self.touched[place] = 0.0
-                self.happenings.append(BodyEvent("touched", {"place": place}))
+                self.events.append(BodyEvent("touched", {"place": place}))
         elif place in self.touched:
             self._ending_touches.add(place)
             self._end_touches()
@@ -224,30 +224,30 @@ class Body:
     def _end_touches(self) -> None:
         # Ends touches that have lasted long enough.
         for place in sorted(self._ending_touches):
-            if self.touched[place] >= TOUCH_LEAST_S:
+            if self.touched[place] >= MIN_TOUCH_S:
                 self._ending_touches.discard(place)
                 del self.touched[place]
-                self.happenings.append(BodyEvent("released", {"place": place}))
+                self.events.append(BodyEvent("released", {"place": place}))
 
-    def hold(self, *, held: bool) -> None:
+    def set_lifted(self, *, held: bool) -> None:
         """Lift the robot or put it down. Interrupted movements continue afterwards."""
-        self.held = held
+        self.is_lifted = held
 
     def carry(self, x: float, y: float) -> None:
         """Move the robot to a place if that is free. Walls limit the movement."""
-        place = self.room.carried(x, y, RADIUS, (self.x, self.y))
+        place = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
         if place is not None:
-            self.place(*place)
+            self.set_position(*place)
 
-    def place(self, x: float, y: float) -> None:
+    def set_position(self, x: float, y: float) -> None:
         """Set the position of the robot."""
         self.x, self.y = x, y
-        self.room = self.room.pushed_ball(x, y, RADIUS)
+        self.room = self.room.with_pushed_ball(x, y, RADIUS)
 
     def hear(self, word: str) -> None:
         """Process a word that the user said."""
-        self.heard, self.listened_s = word, 0.0
-        self.happenings.append(BodyEvent("heard", {"word": word}))
+        self.last_word, self.since_last_word_s = word, 0.0
+        self.events.append(BodyEvent("heard", {"word": word}))
 
     # ---- time -------------------------------------------------------------------------------------
 
@@ -259,14 +259,14 @@ class Body:
             self._step(dt)
 
     @property
-    def just_heard(self) -> str:
+    def recent_word(self) -> str:
         """Word heard recently, or ""."""
-        return self.heard if self.listened_s < HEARD_FOR_S else ""
+        return self.last_word if self.since_last_word_s < HEARD_DISPLAY_S else ""
 
     def _step(self, dt: float) -> None:
-        self.listened_s += dt
-        if self._base is not None and not (self.held and self._base.hold()):
-            self._roll(self._base, dt)
+        self.since_last_word_s += dt
+        if self._base is not None and not (self.is_lifted and self._base.pause()):
+            self._advance_base(self._base, dt)
         for wave in self._waves:
             wave.step()
         self._waves = [wave for wave in self._waves if not wave.done]
@@ -276,28 +276,28 @@ class Body:
         self._end_touches()
         if self._speech is not None:
             self._speech.spoken_s += dt
-            if self._speech.spoken_s >= self._speech.seconds:
-                self.hush()
+            if self._speech.spoken_s >= self._speech.duration_s:
+                self.stop_audio()
         if self.sound is not None:
             self.sound.step(dt)
             if self.sound.done:
                 self.sound = None
-        self.battery = max(0.0, self.battery - dt * (_DRAIN_PER_S if self.still else _DRAIN_MOVING_PER_S))
+        self.battery = max(0.0, self.battery - dt * (_DRAIN_PER_S if self.is_still else _DRAIN_MOVING_PER_S))
 
-    def _roll(self, motion: Motion, dt: float) -> None:
+    def _advance_base(self, motion: Motion, dt: float) -> None:
         way = motion.step(dt)
-        if self._turning:
-            self.theta_deg = _wrapped(self.theta_deg + way)
+        if self._is_turning:
+            self.theta_deg = _wrap_angle(self.theta_deg + way)
         elif way:
             x = self.x + way * math.cos(math.radians(self.theta_deg))
             y = self.y + way * math.sin(math.radians(self.theta_deg))
-            if self.room.free(x, y, RADIUS, (self.x, self.y)):
+            if self.room.is_free(x, y, RADIUS, (self.x, self.y)):
                 self.x, self.y = x, y
-                self.room = self.room.pushed_ball(x, y, RADIUS)
+                self.room = self.room.with_pushed_ball(x, y, RADIUS)
             else:
                 motion.moved -= way
                 motion.block()
-                self.happenings.append(BodyEvent("bumped", {"side": "front" if way > 0 else "back"}))
+                self.events.append(BodyEvent("bumped", {"side": "front" if way > 0 else "back"}))
         if motion.done:
             self._base = None
 
@@ -305,5 +305,5 @@ class Body:
         return (self.head_yaw, self.head_pitch, *self.arms.values(), *self.elbows.values())
 
 
-def _wrapped(angle_deg: float) -> float:
+def _wrap_angle(angle_deg: float) -> float:
     return (angle_deg + 180.0) % 360.0 - 180.0

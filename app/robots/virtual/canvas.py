@@ -21,7 +21,7 @@ class Texture:
     def __init__(self, picture: Picture) -> None:
         self.has_alpha = picture.shape[2] == 4
         if self.has_alpha:
-            picture = _multiplied(picture)
+            picture = _premultiply_alpha(picture)
         self.levels = [picture]
         while min(picture.shape[:2]) > 8 and len(self.levels) < 6:
             size = (max(1, picture.shape[1] // 2), max(1, picture.shape[0] // 2))
@@ -34,7 +34,7 @@ class Texture:
         return self.levels[min(int(level), len(self.levels) - 1)]
 
 
-def _multiplied(picture: Picture) -> Picture:
+def _premultiply_alpha(picture: Picture) -> Picture:
     alpha = picture[:, :, 3:].astype(np.uint16)
     colour = (picture[:, :, :3].astype(np.uint16) * alpha + 127) // 255
     return np.concatenate([colour, alpha], axis=2).astype(np.uint8)
@@ -51,15 +51,15 @@ class Canvas:
         """Draw a polygon in room coordinates in one colour."""
         outline = self.lens.outline(points)
         if len(outline) >= 3:
-            cv2.fillConvexPoly(self.picture, _fixed(outline), colour, cv2.LINE_AA, _SHIFT)
+            cv2.fillConvexPoly(self.picture, _to_fixed_point(outline), colour, cv2.LINE_AA, _SHIFT)
 
-    def put(
+    def draw_texture(
         self, texture: Texture, corner: Sequence[float], across: Sequence[float], along: Sequence[float]
     ) -> None:
         """Draw a texture on a parallelogram: its upper left `corner` and its sides in metres."""
         start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, across, along))
         outline = self.lens.outline(np.stack([start, start + right, start + right + down, start + down]))
-        box = self._box(outline)
+        box = self._clipped_bounds(outline)
         if box is None:
             return
         x0, y0, x1, y1 = box
@@ -76,13 +76,13 @@ class Canvas:
         )
         target = self.picture[y0:y1, x0:x1]
         mask = np.zeros(target.shape[:2], dtype=np.uint8)
-        cv2.fillConvexPoly(mask, _fixed(outline - (x0, y0)), 255, cv2.LINE_8, _SHIFT)
+        cv2.fillConvexPoly(mask, _to_fixed_point(outline - (x0, y0)), 255, cv2.LINE_8, _SHIFT)
         if texture.has_alpha:
             _blend(target, np.asarray(cv2.copyTo(warped, mask), dtype=np.uint8))
         else:
             cv2.copyTo(warped, mask, target)
 
-    def _box(self, outline: Matrix) -> tuple[int, int, int, int] | None:
+    def _clipped_bounds(self, outline: Matrix) -> tuple[int, int, int, int] | None:
         if len(outline) < 3:
             return None
         low, high = np.floor(outline.min(axis=0)), np.ceil(outline.max(axis=0)) + 1
@@ -97,7 +97,7 @@ def _blend(target: Picture, over: Picture) -> None:
     cv2.add(under, over[:, :, :3], dst=target)
 
 
-def _fixed(outline: Matrix) -> NDArray[np.int32]:
+def _to_fixed_point(outline: Matrix) -> NDArray[np.int32]:
     # Clip: OpenCV uses 16.16 fixed point; the near plane keeps visible corners below this.
     limited = np.clip(outline, -32000.0, 32000.0)
     return np.round(limited * (1 << _SHIFT)).astype(np.int32)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Matrix: TypeAlias = NDArray[np.float64]
-NEAR = 0.06
+NEAR_PLANE_M = 0.06
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Lens:
     ``yaw_deg`` is positive to the left, ``pitch_deg`` positive down.
     """
 
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     yaw_deg: float
     pitch_deg: float
     width: int = 320
@@ -43,7 +43,7 @@ class Lens:
 
     def to_camera(self, points: Matrix) -> Matrix:
         """Transform points (n, 3) from room to camera coordinates: right, down, forward in metres."""
-        seen: Matrix = (points - np.asarray(self.place)) @ self.rotation.T
+        seen: Matrix = (points - np.asarray(self.position)) @ self.rotation.T
         return seen
 
     def to_pixels(self, seen: Matrix) -> Matrix:
@@ -56,30 +56,30 @@ class Lens:
 
         Empty if there is none.
         """
-        clipped = _clipped(self.to_camera(points))
+        clipped = _clip_to_near_plane(self.to_camera(points))
         return self.to_pixels(clipped) if len(clipped) else np.empty((0, 2))
 
     def texture_to_pixels(
         self, corner: Matrix, across: Matrix, along: Matrix, size: tuple[int, int]
     ) -> Matrix:
         """Return the homography from a texture (width, height) on a parallelogram in the room to pixels."""
-        columns = [across / size[0], along / size[1], corner - np.asarray(self.place)]
+        columns = [across / size[0], along / size[1], corner - np.asarray(self.position)]
         seen = self.rotation @ np.stack(columns, axis=1)
         half = np.array([[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]])
         made: Matrix = half @ seen
         return made
 
 
-def _clipped(seen: Matrix) -> Matrix:
-    if seen[:, 2].min() >= NEAR:
+def _clip_to_near_plane(seen: Matrix) -> Matrix:
+    if seen[:, 2].min() >= NEAR_PLANE_M:
         return seen
-    if seen[:, 2].max() < NEAR:
+    if seen[:, 2].max() < NEAR_PLANE_M:
         return np.empty((0, 3))
     kept = []
     for here, there in zip(seen, np.roll(seen, -1, axis=0), strict=True):
-        if here[2] >= NEAR:
+        if here[2] >= NEAR_PLANE_M:
             kept.append(here)
-        if (here[2] >= NEAR) != (there[2] >= NEAR):
-            part = (NEAR - here[2]) / (there[2] - here[2])
+        if (here[2] >= NEAR_PLANE_M) != (there[2] >= NEAR_PLANE_M):
+            part = (NEAR_PLANE_M - here[2]) / (there[2] - here[2])
             kept.append(here + part * (there - here))
     return np.array(kept)

@@ -29,9 +29,9 @@ class Motion:
     braking: float
     moved: float = 0.0
     done: bool = False
-    blocked: bool = False
+    is_blocked: bool = False
     _velocity: float = field(default=0.0, repr=False)
-    _halting: bool = field(default=False, repr=False)
+    _is_halting: bool = field(default=False, repr=False)
 
     @classmethod
     def walk(cls, distance: float, speed: float) -> Motion:
@@ -50,25 +50,25 @@ class Motion:
 
     def halt(self) -> None:
         """Brake hard and end the movement."""
-        self._halting = True
+        self._is_halting = True
         self.done = self.done or self._velocity == 0.0
 
     def block(self) -> None:
         """End the movement immediately because of an obstacle."""
-        self.blocked = True
+        self.is_blocked = True
         self.done = True
         self._velocity = 0.0
 
-    def hold(self) -> bool:
+    def pause(self) -> bool:
         """Pause the movement immediately; return False if it is braking and must not be paused."""
         self._velocity = 0.0
-        return not self._halting
+        return not self._is_halting
 
     def step(self, dt: float) -> float:
         """Advance by ``dt`` seconds and return the signed distance."""
         if self.done:
             return 0.0
-        if self._halting:
+        if self._is_halting:
             self._velocity = max(0.0, self._velocity - self.braking * dt)
             self.done = self._velocity == 0.0
         else:
@@ -77,7 +77,7 @@ class Motion:
         way = math.copysign(min(self._velocity * dt, abs(self.remaining)), self.remaining)
         # Snap to the target: the speed approaches 0 with the remaining distance.
         if abs(self.remaining - way) < 0.002 * max(1.0, abs(self.acceleration)):
-            way = self.remaining if not self._halting else way
+            way = self.remaining if not self._is_halting else way
             self.done = True
         self.moved += way
         if self.done:
@@ -95,7 +95,7 @@ class Joint:
     angle: float = 0.0
     target: float = 0.0
 
-    def aim(self, target: float) -> None:
+    def set_target(self, target: float) -> None:
         """Set the target, clamped to the limits."""
         self.target = min(max(target, self.low), self.high)
 
@@ -104,7 +104,7 @@ class Joint:
         self.target = self.angle
 
     @property
-    def arrived(self) -> bool:
+    def is_at_target(self) -> bool:
         """True if the joint has reached its target."""
         return self.angle == self.target
 
@@ -128,14 +128,14 @@ class Wave:
 
     def step(self) -> None:
         """Set the next pose as target once both joints have arrived; the body advances the joints."""
-        if self.done or not (self.arm.arrived and self.elbow.arrived):
+        if self.done or not (self.arm.is_at_target and self.elbow.is_at_target):
             return
         if not self._poses:
             self.done = True
             return
         arm, elbow = self._poses.pop(0)
-        self.arm.aim(arm)
-        self.elbow.aim(elbow)
+        self.arm.set_target(arm)
+        self.elbow.set_target(elbow)
 
     def halt(self) -> None:
         """Stop the arm at its current angles."""

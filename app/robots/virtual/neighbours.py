@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Collection, Mapping
 
 from app.robots.driver.call import Clock
-from app.robots.virtual.room import Other
+from app.robots.virtual.room import OtherRobot
 
-GONE_AFTER_S = 1.5
+PRESENCE_TIMEOUT_S = 1.5
 """Time without messages after which a robot counts as gone."""
-CALM_S = 0.2
+IDLE_PUBLISH_INTERVAL_S = 0.2
 """Interval of position messages of a robot that doesn't move."""
 MAX_COUNT = 12
 
@@ -22,13 +22,13 @@ class Neighbours:
     def __init__(self, name: str, clock: Clock, began_ns: int | None = None) -> None:
         self._name, self._clock = name, clock
         self.began_ns = time.time_ns() if began_ns is None else began_ns
-        self._seen: dict[str, tuple[Other, float, int]] = {}
-        self._told: Other | None = None
+        self._seen: dict[str, tuple[OtherRobot, float, int]] = {}
+        self._told: OtherRobot | None = None
         self._told_s = -math.inf
 
-    def hear(self, message: Mapping[str, object]) -> None:
+    def receive(self, message: Mapping[str, object]) -> None:
         """Process a position message; invalid messages and those of this robot are ignored."""
-        other = _parsed(message)
+        other = _parse_position(message)
         if other is None or other.name == self._name:
             return
         if other.name not in self._seen and len(self._seen) >= MAX_COUNT:
@@ -36,13 +36,13 @@ class Neighbours:
         began = message.get("began_ns")
         self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)
 
-    def others(self) -> tuple[Other, ...]:
+    def present_robots(self) -> tuple[OtherRobot, ...]:
         """Return the robots that are currently present."""
-        since = self._clock.now() - GONE_AFTER_S
+        since = self._clock.now() - PRESENCE_TIMEOUT_S
         self._seen = {name: seen for name, seen in self._seen.items() if seen[1] >= since}
         return tuple(other for other, _at, _began in self._seen.values())
 
-    def makes_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
+    def must_give_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
         """Return True if this robot overlaps another one (not ``ignored``) that was there first."""
         return any(
             other.name not in ignored
@@ -51,10 +51,10 @@ class Neighbours:
             for other, _at, began in self._seen.values()
         )
 
-    def publish_position(self, me: Other, publish: Callable[[Mapping[str, object]], None]) -> None:
+    def publish_position(self, me: OtherRobot, publish: Callable[[Mapping[str, object]], None]) -> None:
         """Publish the position of this robot: immediately if it changed, otherwise at intervals."""
         now = self._clock.now()
-        if me != self._told or now - self._told_s >= CALM_S:
+        if me != self._told or now - self._told_s >= IDLE_PUBLISH_INTERVAL_S:
             self._told, self._told_s = me, now
             publish(
                 {
@@ -65,7 +65,7 @@ class Neighbours:
             )
 
 
-def _parsed(message: Mapping[str, object]) -> Other | None:
+def _parse_position(message: Mapping[str, object]) -> OtherRobot | None:
     name, figure = message.get("robot"), message.get("figure")
     numbers = [message.get(key) for key in ("x", "y", "theta_deg", "radius", "height")]
     if not isinstance(name, str) or not 0 < len(name) < 200 or not isinstance(figure, str):
@@ -74,4 +74,4 @@ def _parsed(message: Mapping[str, object]) -> Other | None:
         return None
     x, y, theta, radius, height = (float(n) for n in numbers)  # type: ignore[arg-type]
     good = 0.0 < radius < 1.0 and 0.0 < height < 3.0
-    return Other(name, x, y, theta, radius, height, figure) if good else None
+    return OtherRobot(name, x, y, theta, radius, height, figure) if good else None

@@ -117,7 +117,7 @@ class Marker:
 
 
 @dataclass(frozen=True)
-class Other:
+class OtherRobot:
     """Another robot in the room: an upright cylinder that blocks this one and is visible to it."""
 
     name: str
@@ -130,7 +130,7 @@ class Other:
 
 
 Thing: TypeAlias = Ball | Person | Marker | Box
-_Round: TypeAlias = Person | Other
+_Round: TypeAlias = Person | OtherRobot
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class Room:
     balls: tuple[Ball, ...] = (Ball("ball", 1.95, -0.78, 0.15),)
     people: tuple[Person, ...] = (Person("Aiko", 0.88, 0.1, 1.24),)
     markers: tuple[Marker, ...] = (Marker(7, 1.0, 2.49, 1.15, 0.36, -90.0),)
-    others: tuple[Other, ...] = ()
+    other_robots: tuple[OtherRobot, ...] = ()
 
     @property
     def things(self) -> tuple[Thing, ...]:
@@ -177,7 +177,7 @@ class Room:
         }
         return named or next(iter(kinds.get(name, ())), None)
 
-    def free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
+    def is_free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
         """Return True if a disc on the floor is free of obstacles, except balls, which roll away.
 
         If the position ``before`` overlaps an obstacle, movements away from the obstacle are allowed.
@@ -187,7 +187,7 @@ class Room:
             and self.y_min + radius <= y <= self.y_max - radius
         ):
             return False
-        rounds: tuple[_Round, ...] = (*self.people, *self.others)
+        rounds: tuple[_Round, ...] = (*self.people, *self.other_robots)
         for each in rounds:
             gap = math.hypot(x - each.x, y - each.y)
             if gap < radius + each.radius and (
@@ -202,26 +202,29 @@ class Room:
 
     def nearest_free(self, x: float, y: float, radius: float) -> tuple[float, float]:
         """Return the free position nearest to a point, or the point itself if there is none."""
-        x, y = self.inside(x, y, radius)
+        x, y = self.clamped_position(x, y, radius)
         for away in range(60):
             for turn in range(1 if away == 0 else 16):
                 angle = math.tau * turn / 16
-                place = self.inside(
+                place = self.clamped_position(
                     x + 0.08 * away * math.cos(angle), y + 0.08 * away * math.sin(angle), radius
                 )
-                if self.free(*place, radius):
+                if self.is_free(*place, radius):
                     return place
         return x, y
 
     def distance_ahead(self, x: float, y: float, theta_deg: float) -> float:
         """Return the distance to the nearest wall, person, robot or furniture in a direction."""
         dx, dy = math.cos(math.radians(theta_deg)), math.sin(math.radians(theta_deg))
-        rounds: tuple[_Round, ...] = (*self.people, *self.others)
-        hits = [self._to_walls(x, y, dx, dy), *(_to_circle(x, y, dx, dy, each) for each in rounds)]
-        hits += [_to_box(x, y, dx, dy, box) for box in self.boxes]
+        rounds: tuple[_Round, ...] = (*self.people, *self.other_robots)
+        hits = [
+            self._distance_to_walls(x, y, dx, dy),
+            *(_distance_to_circle(x, y, dx, dy, each) for each in rounds),
+        ]
+        hits += [_distance_to_box(x, y, dx, dy, box) for box in self.boxes]
         return min(hits)
 
-    def hidden(self, eye: tuple[float, float, float], target: tuple[float, float, float]) -> bool:
+    def is_hidden(self, eye: tuple[float, float, float], target: tuple[float, float, float]) -> bool:
         """Return True if furniture or a robot is between two points."""
         ex, ey, ez = eye
         dx, dy, dz = target[0] - ex, target[1] - ey, target[2] - ez
@@ -229,16 +232,16 @@ class Room:
         if length < 1e-6:
             return False
         for box in self.boxes:
-            hit = _to_box(ex, ey, dx / length, dy / length, box)
+            hit = _distance_to_box(ex, ey, dx / length, dy / length, box)
             if hit < length and ez + dz * hit / length < box.height:
                 return True
-        for other in self.others:
-            hit = _to_circle(ex, ey, dx / length, dy / length, other)
+        for other in self.other_robots:
+            hit = _distance_to_circle(ex, ey, dx / length, dy / length, other)
             if hit < length and ez + dz * hit / length < other.height:
                 return True
         return False
 
-    def moved(self, name: str, x: float, y: float) -> Room:
+    def with_moved(self, name: str, x: float, y: float) -> Room:
         """Return the room with an object moved, within the walls; unchanged if the object doesn't exist.
 
         A marker near a wall is attached to the wall.
@@ -246,24 +249,24 @@ class Room:
         thing = self.thing(name)
         match thing:
             case Ball():
-                at = self.inside(x, y, thing.radius)
+                at = self.clamped_position(x, y, thing.radius)
                 moved = replace(thing, x=at[0], y=at[1])
-                return replace(self, balls=_exchanged(self.balls, thing, moved))
+                return replace(self, balls=_with_replaced(self.balls, thing, moved))
             case Person():
-                at = self.inside(x, y, thing.radius)
+                at = self.clamped_position(x, y, thing.radius)
                 stands = replace(thing, x=at[0], y=at[1])
-                return replace(self, people=_exchanged(self.people, thing, stands))
+                return replace(self, people=_with_replaced(self.people, thing, stands))
             case Box():
-                at = self.inside(x, y, thing.width / 2, thing.depth / 2)
+                at = self.clamped_position(x, y, thing.width / 2, thing.depth / 2)
                 put = replace(thing, x=at[0], y=at[1])
-                return replace(self, boxes=_exchanged(self.boxes, thing, put))
+                return replace(self, boxes=_with_replaced(self.boxes, thing, put))
             case Marker():
                 return replace(
-                    self, markers=_exchanged(self.markers, thing, self._attached_to_wall(thing, x, y))
+                    self, markers=_with_replaced(self.markers, thing, self._attached_to_wall(thing, x, y))
                 )
         return self
 
-    def pushed_ball(self, x: float, y: float, radius: float) -> Room:
+    def with_pushed_ball(self, x: float, y: float, radius: float) -> Room:
         """Return the room after a disc at (x, y) has pushed overlapping balls aside."""
         room = self
         for ball in self.balls:
@@ -274,12 +277,12 @@ class Room:
                 continue
             if gap < 1e-6:
                 away_x, away_y, gap = 1.0, 0.0, 1.0
-            room = room.moved(ball.name, x + away_x / gap * reach, y + away_y / gap * reach)
+            room = room.with_moved(ball.name, x + away_x / gap * reach, y + away_y / gap * reach)
         return room
 
     def _attached_to_wall(self, card: Marker, x: float, y: float) -> Marker:
         half = card.size / 2
-        x, y = self.inside(x, y, _WALL_GAP_M)
+        x, y = self.clamped_position(x, y, _WALL_GAP_M)
         walls = (
             (x - self.x_min, 0.0, (self.x_min + _WALL_GAP_M, y)),
             (self.x_max - x, 180.0, (self.x_max - _WALL_GAP_M, y)),
@@ -288,24 +291,26 @@ class Room:
         )
         away, facing, place = min(walls)
         if away > _WALL_SNAP_M:
-            x, y = self.inside(x, y, half)
+            x, y = self.clamped_position(x, y, half)
             return replace(card, x=x, y=y, facing_deg=None)
         return replace(card, x=place[0], y=place[1], facing_deg=facing)
 
-    def carried(
+    def carried_position(
         self, x: float, y: float, radius: float, at: tuple[float, float]
     ) -> tuple[float, float] | None:
         """Return where a body at position ``at`` ends up when it is carried to (x, y); None if it is blocked.
 
         The body stops at walls and slides along obstacles.
         """
-        place = self.inside(x, y, radius)
+        place = self.clamped_position(x, y, radius)
         for to in (place, (place[0], at[1]), (at[0], place[1])):
-            if self.free(*to, radius, at):
+            if self.is_free(*to, radius, at):
                 return to
         return None
 
-    def inside(self, x: float, y: float, half: float, deep: float | None = None) -> tuple[float, float]:
+    def clamped_position(
+        self, x: float, y: float, half: float, deep: float | None = None
+    ) -> tuple[float, float]:
         """Return the nearest position at which an object of this half size is within the walls."""
         deep = half if deep is None else deep
         return (
@@ -313,7 +318,7 @@ class Room:
             min(max(y, self.y_min + deep), self.y_max - deep),
         )
 
-    def _to_walls(self, x: float, y: float, dx: float, dy: float) -> float:
+    def _distance_to_walls(self, x: float, y: float, dx: float, dy: float) -> float:
         hits = []
         if abs(dx) > 1e-9:
             hits.append(((self.x_max if dx > 0 else self.x_min) - x) / dx)
@@ -322,11 +327,11 @@ class Room:
         return max(0.0, min(hits))
 
 
-def _exchanged(things: tuple[T, ...], old: T, new: T) -> tuple[T, ...]:
+def _with_replaced(things: tuple[T, ...], old: T, new: T) -> tuple[T, ...]:
     return tuple(new if thing is old else thing for thing in things)
 
 
-def _to_circle(x: float, y: float, dx: float, dy: float, round_one: _Round) -> float:
+def _distance_to_circle(x: float, y: float, dx: float, dy: float, round_one: _Round) -> float:
     along = (round_one.x - x) * dx + (round_one.y - y) * dy
     aside = abs((round_one.x - x) * dy - (round_one.y - y) * dx)
     if along <= 0 or aside > round_one.radius:
@@ -334,7 +339,7 @@ def _to_circle(x: float, y: float, dx: float, dy: float, round_one: _Round) -> f
     return max(0.0, along - math.sqrt(round_one.radius**2 - aside**2))
 
 
-def _to_box(x: float, y: float, dx: float, dy: float, box: Box) -> float:
+def _distance_to_box(x: float, y: float, dx: float, dy: float, box: Box) -> float:
     near, far = 0.0, math.inf
     for position, step, middle, size in ((x, dx, box.x, box.width), (y, dy, box.y, box.depth)):
         low, high = middle - size / 2, middle + size / 2

@@ -11,23 +11,23 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
-from app.robots.description.json_access import finite
+from app.robots.description.json_access import finite_float
 from app.robots.virtual.room import Ball, Box, Marker, Person, Room, Thing
 
 TOPIC = "/room"
 ROBOTS_TOPIC = "/room/robots"
 KINDS = ("ball", "person", "marker", "table", "shelf")
 MAX_COUNT = 60
-MAX_OF_A_KIND = 8
+MAX_PER_KIND = 8
 MAX_NAME_LENGTH = 40
-COLOURS = ("#e0474c", "#e2b33c", "#4f8fd0", "#4aa564")
-PEOPLE = ("Aiko", "Ben", "Chloe", "Dario", "Emma", "Femi", "Gita", "Hugo")
-FIRST_MARKER = 7
-_FARTHEST = 100.0
+BALL_COLOURS = ("#e0474c", "#e2b33c", "#4f8fd0", "#4aa564")
+PERSON_NAMES = ("Aiko", "Ben", "Chloe", "Dario", "Emma", "Femi", "Gita", "Hugo")
+FIRST_MARKER_ID = 7
+_MAX_COORDINATE_M = 100.0
 
 
 @dataclass(frozen=True, slots=True)
-class ThingPlace:
+class MapEntry:
     """Object in the map: kind, position (m), ``gone`` if it was removed, and the time of the change (ns)."""
 
     name: str
@@ -38,7 +38,7 @@ class ThingPlace:
     gone: bool = False
 
     @property
-    def order(self) -> tuple[int, bool, float, float]:
+    def merge_key(self) -> tuple[int, bool, float, float]:
         """Merge key: of two entries for the same object, the greater one wins."""
         return self.changed_ns, self.gone, self.x, self.y
 
@@ -64,7 +64,7 @@ class RoomMap:
         self._clock_ns = clock_ns
         first_ns = 0 if self.start == Room() else clock_ns()  # a custom start counts as a change
         self._things = {
-            thing.name: ThingPlace(thing.name, kind_of(thing), thing.x, thing.y, first_ns)
+            thing.name: MapEntry(thing.name, kind_of(thing), thing.x, thing.y, first_ns)
             for thing in self.start.things
         }
         self.revision = 0
@@ -73,16 +73,16 @@ class RoomMap:
 
     def move(self, name: str, x: float, y: float) -> bool:
         """Move an object within the walls; return True if anything changed."""
-        moved = self.room().moved(name, x, y)
-        return self.follow(moved)
+        moved = self.room().with_moved(name, x, y)
+        return self.update_positions(moved)
 
-    def follow(self, room: Room) -> bool:
+    def update_positions(self, room: Room) -> bool:
         """Copy the positions of all objects in a room; return True if anything changed."""
         changed = False
         for thing in room.things:
             known = self._things.get(thing.name)
             if known is not None and not known.gone and (known.x, known.y) != (thing.x, thing.y):
-                self._put(replace(known, x=thing.x, y=thing.y))
+                self._set_entry(replace(known, x=thing.x, y=thing.y))
                 changed = True
         return changed
 
@@ -92,7 +92,7 @@ class RoomMap:
         free = [name for name in _names(kind) if name not in there]
         if not free:
             return None
-        self._put(ThingPlace(free[0], kind, x, y))
+        self._set_entry(MapEntry(free[0], kind, x, y))
         self.move(free[0], x, y)
         return free[0]
 
@@ -101,20 +101,20 @@ class RoomMap:
         known = self._things.get(name)
         if known is None or known.gone:
             return False
-        self._put(replace(known, gone=True))
+        self._set_entry(replace(known, gone=True))
         return True
 
-    def put_back(self) -> None:
+    def restore_start(self) -> None:
         """Restore the initial state; objects that were added are removed."""
         first = {thing.name: thing for thing in self.start.things}
         for known in list(self._things.values()):
             thing = first.get(known.name)
             if thing is None:
-                self._put(replace(known, gone=True))
+                self._set_entry(replace(known, gone=True))
             else:
-                self._put(replace(known, x=thing.x, y=thing.y, gone=False))
+                self._set_entry(replace(known, x=thing.x, y=thing.y, gone=False))
 
-    def _put(self, thing: ThingPlace) -> None:
+    def _set_entry(self, thing: MapEntry) -> None:
         before = self._things.get(thing.name)
         newest = before.changed_ns + 1 if before is not None else 1
         self._things[thing.name] = replace(thing, changed_ns=max(self._clock_ns(), newest))
@@ -126,11 +126,11 @@ class RoomMap:
         """Merge newer entries of another map; return True if any changed. Invalid entries are ignored."""
         told = message.get("things")
         changed = False
-        for thing in _parsed(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
+        for thing in _parse_entries(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
             known = self._things.get(thing.name)
             if known is None and len(self._things) >= MAX_COUNT:
                 continue
-            if known is None or (thing.kind == known.kind and thing.order > known.order):
+            if known is None or (thing.kind == known.kind and thing.merge_key > known.merge_key):
                 self._things[thing.name] = thing
                 changed = True
         self.revision += changed
@@ -145,7 +145,7 @@ class RoomMap:
     def room(self) -> Room:
         """Return the room with every object at its current place."""
         balls, people, markers, boxes = [], [], [], []
-        for made in filter(None, map(self._made, self._things.values())):
+        for made in filter(None, map(self._create_thing, self._things.values())):
             match made:
                 case Ball():
                     balls.append(made)
@@ -160,25 +160,25 @@ class RoomMap:
         )
         for name in [thing.name for thing in empty.things]:
             placed = self._things[name]
-            empty = empty.moved(name, placed.x, placed.y)
+            empty = empty.with_moved(name, placed.x, placed.y)
         return empty
 
-    def _made(self, placed: ThingPlace) -> Thing | None:
+    def _create_thing(self, placed: MapEntry) -> Thing | None:
         if placed.gone:
             return None
         like = self.start.thing(placed.name)
         if like is not None and like.name == placed.name:
             return replace(like, x=placed.x, y=placed.y)
-        return _new(placed)
+        return _create_added_thing(placed)
 
 
-def _new(placed: ThingPlace) -> Thing | None:
-    number = _number(placed.name)
+def _create_added_thing(placed: MapEntry) -> Thing | None:
+    number = _number_in_name(placed.name)
     match placed.kind:
         case "ball":
-            return Ball(placed.name, placed.x, placed.y, 0.15, COLOURS[(number - 1) % len(COLOURS)])
+            return Ball(placed.name, placed.x, placed.y, 0.15, BALL_COLOURS[(number - 1) % len(BALL_COLOURS)])
         case "person":
-            at = PEOPLE.index(placed.name) if placed.name in PEOPLE else number
+            at = PERSON_NAMES.index(placed.name) if placed.name in PERSON_NAMES else number
             return Person(placed.name, placed.x, placed.y, 1.24 + 0.1 * (at % 3))
         case "marker":
             return Marker(number % 50, placed.x, placed.y, 1.15, 0.36, None)
@@ -189,20 +189,20 @@ def _new(placed: ThingPlace) -> Thing | None:
     return None
 
 
-def _number(name: str) -> int:
+def _number_in_name(name: str) -> int:
     last = name.rpartition(" ")[2]
     return int(last) if last.isdecimal() and len(last) < 4 else 1
 
 
 def _names(kind: str) -> Sequence[str]:
     if kind == "person":
-        return PEOPLE
+        return PERSON_NAMES
     if kind == "marker":
-        return [f"marker {number}" for number in range(FIRST_MARKER, FIRST_MARKER + MAX_OF_A_KIND)]
-    return [kind, *(f"{kind} {number}" for number in range(2, MAX_OF_A_KIND + 1))] if kind in KINDS else []
+        return [f"marker {number}" for number in range(FIRST_MARKER_ID, FIRST_MARKER_ID + MAX_PER_KIND)]
+    return [kind, *(f"{kind} {number}" for number in range(2, MAX_PER_KIND + 1))] if kind in KINDS else []
 
 
-def _parsed(told: Sequence[object]) -> Iterator[ThingPlace]:
+def _parse_entries(told: Sequence[object]) -> Iterator[MapEntry]:
     for one in told[:MAX_COUNT]:
         if not isinstance(one, Mapping):
             continue
@@ -213,14 +213,14 @@ def _parsed(told: Sequence[object]) -> Iterator[ThingPlace]:
             and 0 < len(name) <= MAX_NAME_LENGTH
             and isinstance(kind, str)
             and kind in KINDS
-            and _is_place(x)
-            and _is_place(y)
+            and _is_coordinate(x)
+            and _is_coordinate(y)
             and isinstance(changed_ns, int)
             and 0 <= changed_ns < 1 << 62
         ):
-            yield ThingPlace(name, kind, float(x), float(y), changed_ns, one.get("gone") is True)  # type: ignore[arg-type]
+            yield MapEntry(name, kind, float(x), float(y), changed_ns, one.get("gone") is True)  # type: ignore[arg-type]
 
 
-def _is_place(value: object) -> bool:
-    place = finite(value)
-    return place is not None and abs(place) < _FARTHEST
+def _is_coordinate(value: object) -> bool:
+    place = finite_float(value)
+    return place is not None and abs(place) < _MAX_COORDINATE_M

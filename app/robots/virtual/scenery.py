@@ -11,13 +11,13 @@ import numpy as np
 from app.robots.virtual.canvas import Picture, Texture
 from app.robots.virtual.room import Opening, Room, Wall
 
-PER_M = 110  # pixels of a wall's picture per metre
+PIXELS_PER_M = 110  # pixels of a wall's picture per metre
 Colour = tuple[int, int, int]
 
-_FINE = 2  # supersampling factor
-FIGURE = (340, 720)  # width, height of the person's image; the head touches its upper edge
+_SUPERSAMPLING = 2  # supersampling factor
+FIGURE_SIZE_PX = (340, 720)  # width, height of the person's image; the head touches its upper edge
 FACE_ROWS = (0.0, 0.21)  # face from hair to chin, as parts of the figure's height
-FIGURE_WIDTH = FIGURE[0] / FIGURE[1]  # of its height
+FIGURE_ASPECT_RATIO = FIGURE_SIZE_PX[0] / FIGURE_SIZE_PX[1]  # of its height
 
 
 def bgr(colour: str) -> Colour:
@@ -32,7 +32,7 @@ def gradient(height: int, width: int, top: str, bottom: str) -> Picture:
     return np.repeat(rows, width, axis=1).astype(np.uint8)
 
 
-def _rect(picture: Picture, left: float, top: float, right: float, bottom: float, colour: str) -> None:
+def _paint_rect(picture: Picture, left: float, top: float, right: float, bottom: float, colour: str) -> None:
     cv2.rectangle(picture, (round(left), round(top)), (round(right), round(bottom)), bgr(colour), cv2.FILLED)
 
 
@@ -42,20 +42,20 @@ def _rect(picture: Picture, left: float, top: float, right: float, bottom: float
 def wall(room: Room, side: Wall) -> Texture:
     """Return a wall with its openings as seen from inside."""
     length = room.y_max - room.y_min if side in {"east", "west"} else room.x_max - room.x_min
-    width, height = round(length * PER_M), round(room.height * PER_M)
+    width, height = round(length * PIXELS_PER_M), round(room.height * PIXELS_PER_M)
     picture = gradient(height, width, "#b9bdc0", "#d5d6d4")
     shade = {"east": 1.0, "west": 1.03, "north": 0.94, "south": 0.95}[side]
     light = shade * (0.9 + 0.1 * np.sin(np.linspace(0.15, np.pi - 0.15, width)))[None, :, None]
     picture = np.clip(picture * light, 0, 255).astype(np.uint8)
-    _rect(picture, 0, height - 0.09 * PER_M, width, height, "#eceae5")
-    _rect(picture, 0, height - 0.095 * PER_M, width, height - 0.088 * PER_M, "#b3b0a9")
+    _paint_rect(picture, 0, height - 0.09 * PIXELS_PER_M, width, height, "#eceae5")
+    _paint_rect(picture, 0, height - 0.095 * PIXELS_PER_M, width, height - 0.088 * PIXELS_PER_M, "#b3b0a9")
     for opening in room.openings:
         if opening.wall == side:
-            _open(picture, room, opening)
+            _paint_opening(picture, room, opening)
     return Texture(picture)
 
 
-def _open(picture: Picture, room: Room, opening: Opening) -> None:
+def _paint_opening(picture: Picture, room: Room, opening: Opening) -> None:
     # Seen from inside, x and y grow to the right on north and west walls, to the left on the others.
     along = {
         "east": room.y_max - opening.at,
@@ -63,44 +63,44 @@ def _open(picture: Picture, room: Room, opening: Opening) -> None:
         "north": opening.at - room.x_min,
         "south": room.x_max - opening.at,
     }[opening.wall]
-    left = (along - opening.width / 2) * PER_M
-    top = (room.height - opening.bottom - opening.height) * PER_M
-    right, bottom = left + opening.width * PER_M, top + opening.height * PER_M
+    left = (along - opening.width / 2) * PIXELS_PER_M
+    top = (room.height - opening.bottom - opening.height) * PIXELS_PER_M
+    right, bottom = left + opening.width * PIXELS_PER_M, top + opening.height * PIXELS_PER_M
     painters: dict[str, Callable[[Picture, float, float, float, float], None]] = {
-        "door": _door,
-        "board": _board,
-        "window": _window,
-        "picture": _painting,
+        "door": _paint_door,
+        "board": _paint_board,
+        "window": _paint_window,
+        "picture": _paint_picture,
     }
     painters[opening.kind](picture, left, top, right, bottom)
 
 
-def _door(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
-    _rect(picture, left - 9, top - 9, right + 9, bottom, "#7d6044")
-    _rect(picture, left, top, right, bottom, "#8d6e50")
+def _paint_door(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
+    _paint_rect(picture, left - 9, top - 9, right + 9, bottom, "#7d6044")
+    _paint_rect(picture, left, top, right, bottom, "#8d6e50")
     for upper, lower in ((0.07, 0.46), (0.54, 0.94)):
         y0, y1 = top + (bottom - top) * upper, top + (bottom - top) * lower
-        _rect(picture, left + 13, y0, right - 13, y1, "#7b5d42")
-        _rect(picture, left + 16, y0 + 3, right - 15, y1 - 2, "#86684b")
+        _paint_rect(picture, left + 13, y0, right - 13, y1, "#7b5d42")
+        _paint_rect(picture, left + 16, y0 + 3, right - 15, y1 - 2, "#86684b")
     middle = (round(left + 10), round((top + bottom) / 2 + 6))
     cv2.circle(picture, middle, 5, bgr("#d9c48c"), cv2.FILLED, cv2.LINE_AA)
 
 
-def _board(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
-    _rect(picture, left - 4, top - 4, right + 4, bottom + 4, "#9aa0a5")
-    _rect(picture, left, top, right, bottom, "#f6f7f7")
+def _paint_board(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
+    _paint_rect(picture, left - 4, top - 4, right + 4, bottom + 4, "#9aa0a5")
+    _paint_rect(picture, left, top, right, bottom, "#f6f7f7")
     for row, length in enumerate((0.36, 0.6, 0.48)):
         y = top + (bottom - top) * (0.25 + 0.2 * row)
-        _rect(picture, left + 16, y, left + 16 + (right - left - 32) * length, y + 5, "#4e79b8")
+        _paint_rect(picture, left + 16, y, left + 16 + (right - left - 32) * length, y + 5, "#4e79b8")
     chart = [(0.70, 0.72), (0.78, 0.50), (0.86, 0.60), (0.93, 0.32)]
     points = [(round(left + (right - left) * x), round(top + (bottom - top) * y)) for x, y in chart]
     for start, end in itertools.pairwise(points):
         cv2.line(picture, start, end, bgr("#3a9a62"), 3, cv2.LINE_AA)
-    _rect(picture, left + 10, bottom + 1, right - 10, bottom + 8, "#a9aeb2")
+    _paint_rect(picture, left + 10, bottom + 1, right - 10, bottom + 8, "#a9aeb2")
 
 
-def _window(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
-    _rect(picture, left - 9, top - 9, right + 9, bottom + 9, "#fbfaf7")
+def _paint_window(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
+    _paint_rect(picture, left - 9, top - 9, right + 9, bottom + 9, "#fbfaf7")
     x0, y0, x1, y1 = round(left), round(top), round(right), round(bottom)
     view = gradient(y1 - y0, x1 - x0, "#a9cdec", "#e6f1f6")
     height, width = view.shape[:2]
@@ -111,14 +111,14 @@ def _window(picture: Picture, left: float, top: float, right: float, bottom: flo
         )
         cv2.ellipse(view, middle, radii, 0, 0, 360, bgr(colour), cv2.FILLED, cv2.LINE_AA)
     picture[y0:y1, x0:x1] = view
-    _rect(picture, (left + right) / 2 - 4, top, (left + right) / 2 + 4, bottom, "#fbfaf7")
-    _rect(picture, left, (top + bottom) / 2 - 4, right, (top + bottom) / 2 + 4, "#fbfaf7")
-    _rect(picture, left - 14, bottom + 9, right + 14, bottom + 16, "#e3e1da")
+    _paint_rect(picture, (left + right) / 2 - 4, top, (left + right) / 2 + 4, bottom, "#fbfaf7")
+    _paint_rect(picture, left, (top + bottom) / 2 - 4, right, (top + bottom) / 2 + 4, "#fbfaf7")
+    _paint_rect(picture, left - 14, bottom + 9, right + 14, bottom + 16, "#e3e1da")
 
 
-def _painting(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
-    _rect(picture, left, top, right, bottom, "#2f3742")
-    _rect(picture, left + 7, top + 7, right - 7, bottom - 7, "#3d4754")
+def _paint_picture(picture: Picture, left: float, top: float, right: float, bottom: float) -> None:
+    _paint_rect(picture, left, top, right, bottom, "#2f3742")
+    _paint_rect(picture, left + 7, top + 7, right - 7, bottom - 7, "#3d4754")
     base = bottom - 14
     for x, peak in ((0.36, 0.35), (0.66, 0.5)):
         tip = (left + (right - left) * x, top + (bottom - top) * peak)
@@ -132,10 +132,13 @@ def _painting(picture: Picture, left: float, top: float, right: float, bottom: f
 
 def floor(room: Room) -> Texture:
     """Return a floor of wooden boards along the x axis, darker near the walls."""
-    width, depth = round((room.x_max - room.x_min) * PER_M), round((room.y_max - room.y_min) * PER_M)
+    width, depth = (
+        round((room.x_max - room.x_min) * PIXELS_PER_M),
+        round((room.y_max - room.y_min) * PIXELS_PER_M),
+    )
     shades = np.random.default_rng(5)  # the same boards at every start
     picture = np.zeros((depth, width, 3), dtype=np.uint8)
-    board = round(0.16 * PER_M)
+    board = round(0.16 * PIXELS_PER_M)
     for row in range(0, depth, board):
         start = -int(shades.integers(0, 200))
         while start < width:
@@ -146,8 +149,8 @@ def floor(room: Room) -> Texture:
             cv2.line(picture, (start, row), (start, row + board - 1), bgr("#957757"), 1)
             start += length
         cv2.line(picture, (0, row), (width, row), bgr("#8f7152"), 2)
-    x = np.minimum(np.arange(width), np.arange(width)[::-1])[None, :] / PER_M
-    y = np.minimum(np.arange(depth), np.arange(depth)[::-1])[:, None] / PER_M
+    x = np.minimum(np.arange(width), np.arange(width)[::-1])[None, :] / PIXELS_PER_M
+    y = np.minimum(np.arange(depth), np.arange(depth)[::-1])[:, None] / PIXELS_PER_M
     light = 1.04 - 0.24 * np.exp(-np.minimum(x, y) / 0.35)
     return Texture(np.clip(picture * light[:, :, None], 0, 255).astype(np.uint8))
 
@@ -177,14 +180,14 @@ def marker(number: int) -> Texture:
     return Texture(np.asarray(cv2.cvtColor(rimmed, cv2.COLOR_GRAY2BGR), dtype=np.uint8))
 
 
-MARKER_RIM = 8 / 6  # the card is this much wider than its printed square
+MARKER_CARD_SCALE = 8 / 6  # the card is this much wider than its printed square
 
 
-class _Paint:
+class _Painter:
     """Draws shapes on a transparent image; positions are fractions of the width and height of the figure."""
 
     def __init__(self, width: int, height: int) -> None:
-        self.width, self.height = width * _FINE, height * _FINE
+        self.width, self.height = width * _SUPERSAMPLING, height * _SUPERSAMPLING
         self.colour = np.zeros((self.height, self.width, 3), dtype=np.uint8)
         self.alpha = np.zeros((self.height, self.width), dtype=np.uint8)
 
@@ -218,13 +221,13 @@ class _Paint:
 
     def done(self) -> Picture:
         both = np.dstack([self.colour, self.alpha])
-        size = (self.width // _FINE, self.height // _FINE)
+        size = (self.width // _SUPERSAMPLING, self.height // _SUPERSAMPLING)
         return np.asarray(cv2.resize(both, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
 def person() -> Texture:
     """Return a person, from head to feet."""
-    paint = _Paint(*FIGURE)
+    paint = _Painter(*FIGURE_SIZE_PX)
     for x in (0.40, 0.60):  # legs and shoes
         paint.shape([(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658")
         paint.oval((x, 0.975), (0.1, 0.022), "#e8e6e1")
@@ -240,11 +243,11 @@ def person() -> Texture:
     paint.shape([(0.175, 0.33), (0.825, 0.33), (0.76, 0.66), (0.24, 0.66)], "#3f7db8")
     paint.shape([(0.42, 0.18), (0.58, 0.18), (0.6, 0.255), (0.4, 0.255)], "#d99f78")
     paint.oval((0.5, 0.247), (0.125, 0.024), "#d99f78")
-    _head(paint)
+    _paint_head(paint)
     return Texture(paint.done())
 
 
-def _head(paint: _Paint) -> None:
+def _paint_head(paint: _Painter) -> None:
     for x in (0.315, 0.685):
         paint.oval((x, 0.125), (0.035, 0.022), "#dca27b")
     paint.oval((0.5, 0.085), (0.205, 0.085), "#4b2f24")
@@ -265,12 +268,12 @@ def _head(paint: _Paint) -> None:
 
 def robot(small: bool, *, faces: bool) -> Texture:
     """Return another robot, the large white or the small green one, from the front or from behind."""
-    paint = _Paint(*(FIGURE if not small else (400, 300)))
-    (_small_robot if small else _large_robot)(paint, faces=faces)
+    paint = _Painter(*(FIGURE_SIZE_PX if not small else (400, 300)))
+    (_paint_small_robot if small else _paint_large_robot)(paint, faces=faces)
     return Texture(paint.done())
 
 
-def _large_robot(paint: _Paint, *, faces: bool) -> None:
+def _paint_large_robot(paint: _Painter, *, faces: bool) -> None:
     paint.shape([(0.3, 0.55), (0.7, 0.55), (0.86, 0.97), (0.14, 0.97)], "#e9edf4")
     paint.oval((0.5, 0.965), (0.36, 0.03), "#c8ccd8")
     for side in (-1, 1):
@@ -293,7 +296,7 @@ def _large_robot(paint: _Paint, *, faces: bool) -> None:
     paint.arc((0.5, 0.21), (0.1, 0.03), "#4e5566", (20, 160))
 
 
-def _small_robot(paint: _Paint, *, faces: bool) -> None:
+def _paint_small_robot(paint: _Painter, *, faces: bool) -> None:
     for x in (0.1, 0.9):
         paint.oval((x, 0.78), (0.07, 0.2), "#2b2d33")
     paint.shape([(0.1, 0.5), (0.9, 0.5), (0.9, 0.88), (0.1, 0.88)], "#5a7f76")

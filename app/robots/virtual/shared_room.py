@@ -9,14 +9,14 @@ from typing import Protocol
 
 from app.robots.driver.call import Clock, Link
 from app.robots.virtual.neighbours import Neighbours
-from app.robots.virtual.room import Other, Room
+from app.robots.virtual.room import OtherRobot, Room
 from app.robots.virtual.room_map import ROBOTS_TOPIC, TOPIC, RoomMap
 
-ARRIVES_S = 3.0
+ARRIVAL_PERIOD_S = 3.0
 """Time after its start in which a robot moves away from a place where another robot already stood."""
 
 
-class InRoom(Protocol):
+class RoomBody(Protocol):
     """Part of the interface of a body that is used here."""
 
     room: Room
@@ -25,10 +25,10 @@ class InRoom(Protocol):
     theta_deg: float
 
     @property
-    def still(self) -> bool:
+    def is_still(self) -> bool:
         """True if nothing moves."""
 
-    def place(self, x: float, y: float) -> None:
+    def set_position(self, x: float, y: float) -> None:
         """Set the position."""
 
     def reset(self, room: Room) -> None:
@@ -39,73 +39,73 @@ class SharedRoom:
     """Synchronizes the room of a body with the other robots; ``lock`` guards the body."""
 
     def __init__(
-        self, link: Link, clock: Clock, body: InRoom, lock: AbstractContextManager[object], like: Other
+        self, link: Link, clock: Clock, body: RoomBody, lock: AbstractContextManager[object], like: OtherRobot
     ) -> None:
         self._body, self._lock, self._like, self._clock = body, lock, replace(like, name=link.name), clock
         self._map = RoomMap(body.room)
         self._neighbours = Neighbours(link.name, clock)
         self._revision = self._map.revision
         self._is_new = body.room != Room()
-        self._arrives_until_s = clock.now() + ARRIVES_S
+        self._arrives_until_s = clock.now() + ARRIVAL_PERIOD_S
         self._start = body.x, body.y
         self._went_back_with: frozenset[str] = frozenset()
-        self._tell_room = link.share(TOPIC, self._hear_room, latched=True)
-        self._tell_robots = link.share(ROBOTS_TOPIC, self._hear_robot)
+        self._tell_room = link.share(TOPIC, self._receive_room, latched=True)
+        self._tell_robots = link.share(ROBOTS_TOPIC, self._receive_robot)
 
-    def _hear_room(self, message: Mapping[str, object]) -> None:
+    def _receive_room(self, message: Mapping[str, object]) -> None:
         with self._lock:
             self._map.merge(message)
 
-    def _hear_robot(self, message: Mapping[str, object]) -> None:
+    def _receive_robot(self, message: Mapping[str, object]) -> None:
         with self._lock:
-            self._neighbours.hear(message)
+            self._neighbours.receive(message)
 
     # -- call with the lock held ------------------------------------------------------------------------
 
-    def take_over(self) -> None:
+    def update_body(self) -> None:
         """Update the room of the body and the other robots in it."""
-        body, others = self._body, self._neighbours.others()
+        body, others = self._body, self._neighbours.present_robots()
         if self._map.revision != self._revision:
             self._revision = self._map.revision
-            body.room = replace(self._map.room(), others=others)
-        elif others != body.room.others:
-            body.room = replace(body.room, others=others)
-        if self._clock.now() < self._arrives_until_s and body.still:
+            body.room = replace(self._map.room(), other_robots=others)
+        elif others != body.room.other_robots:
+            body.room = replace(body.room, other_robots=others)
+        if self._clock.now() < self._arrives_until_s and body.is_still:
             radius = self._like.radius
-            if self._neighbours.makes_way(body.x, body.y, radius, self._went_back_with):
-                body.place(*body.room.nearest_free(body.x, body.y, radius))
+            if self._neighbours.must_give_way(body.x, body.y, radius, self._went_back_with):
+                body.set_position(*body.room.nearest_free(body.x, body.y, radius))
                 self._start = body.x, body.y
 
-    def follow(self) -> None:
+    def update_map(self) -> None:
         """Publish the positions of objects that the body has pushed."""
-        if self._map.follow(self._body.room):
+        if self._map.update_positions(self._body.room):
             self._revision, self._is_new = self._map.revision, True
 
     def move(self, name: str, x: float, y: float) -> None:
         """Move an object on behalf of the user."""
         self._is_new = self._map.move(name, x, y) or self._is_new
-        self.take_over()
+        self.update_body()
 
-    def to_start(self, together: object) -> None:
+    def return_to_start(self, together: object) -> None:
         """Move the body to its start position; the objects in the room are not moved.
 
         ``together`` are the names of the robots that return at the same time, whose positions become free.
         Other robots at the start position are avoided.
         """
-        self.take_over()
+        self.update_body()
         names = together if isinstance(together, list) else []
         body, leaving = self._body, frozenset(name for name in names if isinstance(name, str))
         self._went_back_with = leaving  # their reported positions may still be the old ones
         body.reset(body.room)
-        staying = tuple(other for other in body.room.others if other.name not in leaving)
-        room = replace(body.room, others=staying)
-        body.place(*room.nearest_free(*self._start, self._like.radius))
+        staying = tuple(other for other in body.room.other_robots if other.name not in leaving)
+        room = replace(body.room, other_robots=staying)
+        body.set_position(*room.nearest_free(*self._start, self._like.radius))
 
-    def put_back(self) -> Room:
+    def restore_start(self) -> Room:
         """Restore the initial state of the room and return it."""
-        self._map.put_back()
+        self._map.restore_start()
         self._is_new = True
-        self.take_over()
+        self.update_body()
         return self._body.room
 
     # -- call without the lock -------------------------------------------------------------------------

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import cv2
 
-from app.robots.description.json_access import finite
+from app.robots.description.json_access import finite_float
 from app.robots.driver.call import Clock, Link
 from app.robots.virtual.body import HEIGHT, RADIUS, Body, BodyEvent
 from app.robots.virtual.camera import Camera, lens_of
 from app.robots.virtual.canvas import Picture
 from app.robots.virtual.lens import Lens
-from app.robots.virtual.room import Ball, Other, Person, Room, Thing
+from app.robots.virtual.room import Ball, OtherRobot, Person, Room, Thing
 from app.robots.virtual.room_map import kind_of
 from app.robots.virtual.shared_room import SharedRoom
 from app.robots.virtual.vision import Detection, ObjectDetector, message
@@ -30,9 +30,9 @@ _MAX_STEP_S = 0.25  # after a suspend the simulation continues from where it was
 _SMALL_STEP_S = 0.004  # used while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
 _JOIN_TIMEOUT_S = 2.0
-ITSELF = "robot"
+ROBOT_ITSELF = "robot"
 """Name with which the user moves the robot itself."""
-PLACES = ("head", "left_hand", "right_hand")
+TOUCHABLE_PARTS = ("head", "left_hand", "right_hand")
 _log = logging.getLogger(__name__)
 
 
@@ -43,7 +43,7 @@ class _View:
     room: Room
     lens: Lens
     picture: Picture
-    seen: Mapping[str, list[Detection]]
+    detections: Mapping[str, list[Detection]]
 
 
 class Simulation:
@@ -55,7 +55,7 @@ class Simulation:
         self.seen: Mapping[str, list[Detection]] = {}
         self._link, self._clock = link, clock
         self._camera, self._eyes = Camera(body.room), ObjectDetector()
-        like = Other(link.name, body.x, body.y, body.theta_deg, RADIUS, HEIGHT)
+        like = OtherRobot(link.name, body.x, body.y, body.theta_deg, RADIUS, HEIGHT)
         self._shared = SharedRoom(link, clock, body, self.changed, like)
         self._view: _View | None = None
         self._ended = threading.Event()
@@ -93,9 +93,9 @@ class Simulation:
     def _advance_locked(self) -> None:
         # Call with the lock held. Simulates the time since the last step.
         now = self._clock.now()
-        self._shared.take_over()
+        self._shared.update_body()
         self.body.step(min(max(0.0, now - self._stepped_s), _MAX_STEP_S))
-        self._shared.follow()
+        self._shared.update_map()
         self._stepped_s = now
 
     # ---- body thread --------------------------------------------------------------------------------
@@ -103,11 +103,11 @@ class Simulation:
     def _run_body(self) -> None:
         with self.changed:
             self._stepped_s = self._clock.now()
-        for step, _ in enumerate(self._beat(BODY_HZ)):
+        for step, _ in enumerate(self._ticker(BODY_HZ)):
             with self.changed:
                 self._advance_locked()
-                happenings = list(self.body.happenings)
-                self.body.happenings.clear()
+                happenings = list(self.body.events)
+                self.body.events.clear()
                 self.changed.notify_all()
             self.publish_step(happenings, step)
             self._shared.publish_changes()
@@ -119,9 +119,9 @@ class Simulation:
             if happening.event in {"touched", "released"}:
                 self._link.sense("head_touched", "head" in self.body.touched)
             elif happening.event == "heard":
-                self._link.sense("heard_word", self.body.heard)
+                self._link.sense("heard_word", self.body.last_word)
         with self.changed:
-            state, distance = drawable(self.body), self.body.distance
+            state, distance = drawing_state(self.body), self.body.distance
             pose = {"x": state["x"], "y": state["y"], "theta": state["theta_deg"]}
         self._link.tell("state", state)
         if step % _SLOW_PERIOD_STEPS == 0:
@@ -130,12 +130,12 @@ class Simulation:
         if step % _CALM_PERIOD_STEPS == 0:
             self._link.sense("battery", int(self.body.battery))
             self._link.sense("head_touched", "head" in self.body.touched)
-            self._link.sense("heard_word", self.body.heard)
+            self._link.sense("heard_word", self.body.last_word)
 
     # ---- camera thread --------------------------------------------------------------------------------
 
     def _run_camera(self) -> None:
-        for count, _ in enumerate(self._beat(CAMERA_HZ)):
+        for count, _ in enumerate(self._ticker(CAMERA_HZ)):
             is_watched = self._link.watchers("camera") > 0
             is_turn = count % _DETECTION_PERIOD_IMAGES == 0
             # subscribers get boxes that belong to the same image
@@ -147,8 +147,8 @@ class Simulation:
         with self.changed:
             room, lens = self.body.room, lens_of(self.body)
         if self._view is None or (self._view.room, self._view.lens) != (room, lens):
-            self._view = self._painted(room, lens)
-        picture, seen = self._view.picture, self._view.seen
+            self._view = self._render(room, lens)
+        picture, seen = self._view.picture, self._view.detections
         if publish:
             self._link.sense("camera", picture)
         with self.changed:
@@ -157,9 +157,9 @@ class Simulation:
             self._link.sense(sensor, message(found, lens))
         self._link.sense("sees_face", bool(seen["faces"]))
         self._link.sense("sees_ball", bool(seen["balls"]))
-        self._notice_face(seen["faces"])
+        self._update_seen_face(seen["faces"])
 
-    def _painted(self, room: Room, lens: Lens) -> _View:
+    def _render(self, room: Room, lens: Lens) -> _View:
         picture = self._camera.picture(room, lens)
         picture.flags.writeable = False  # reused until something moves
         seen = {
@@ -169,7 +169,7 @@ class Simulation:
         }
         return _View(room, lens, picture, seen)
 
-    def _notice_face(self, faces: list[Detection]) -> None:
+    def _update_seen_face(self, faces: list[Detection]) -> None:
         now = self._clock.now()
         name = faces[0].name if faces else None
         if name is not None:
@@ -183,39 +183,39 @@ class Simulation:
 
     # ---- time and the user's actions -----------------------------------------------------------------------
 
-    def _beat(self, rate_hz: float) -> Beat:
-        return Beat(self._clock, self._ended, 1 / rate_hz)
+    def _ticker(self, rate_hz: float) -> Ticker:
+        return Ticker(self._clock, self._ended, 1 / rate_hz)
 
-    def act(self, change: Mapping[str, object]) -> None:
+    def apply_change(self, change: Mapping[str, object]) -> None:
         """Apply a change of the world by the user.
 
         Changes are touch, move, say, hold, reset, start, and a simulated event.
         """
         place, moved, word = change.get("touch"), change.get("move"), change.get("say")
-        x, y = finite(change.get("x")), finite(change.get("y"))
+        x, y = finite_float(change.get("x")), finite_float(change.get("y"))
         with self.changed:
-            if place in PLACES:
+            if place in TOUCHABLE_PARTS:
                 self.body.touch(str(place), down=change.get("down") is not False)
             if isinstance(change.get("hold"), bool):
-                self.body.hold(held=change["hold"] is True)
+                self.body.set_lifted(held=change["hold"] is True)
             if isinstance(moved, str) and x is not None and y is not None:
-                if moved == ITSELF:
+                if moved == ROBOT_ITSELF:
                     self.body.carry(x, y)
                 else:
                     self._shared.move(moved, x, y)
             if isinstance(word, str) and word.strip():
                 self.body.hear(word.strip())
             if change.get("reset") is True:
-                self.body.reset(self._shared.put_back())
+                self.body.reset(self._shared.restore_start())
             if "start" in change:
-                self._shared.to_start(change["start"])
+                self._shared.return_to_start(change["start"])
         if isinstance(change.get("happen"), str):
             self._simulate_event(change)
 
     def _simulate_event(self, change: Mapping[str, object]) -> None:
-        event, given = told_event(change)
+        event, given = parse_event(change)
         data = {**self._default_event_data(event), **given}
-        if not may_happen(self._link, event, data):
+        if not is_valid_event(self._link, event, data):
             return
         with self.changed:
             if event == "heard":
@@ -232,14 +232,14 @@ class Simulation:
         return {"name": people[0].name if people else "Aiko"} if "face" in event else {}
 
 
-class Beat:
+class Ticker:
     """Iterator over regular times until an event is set. If it is late, times are skipped."""
 
     def __init__(self, clock: Clock, ended: threading.Event, period_s: float) -> None:
         self._clock, self._ended, self._period_s = clock, ended, period_s
         self._next = clock.now()
 
-    def __iter__(self) -> Beat:
+    def __iter__(self) -> Ticker:
         return self
 
     def __next__(self) -> float:
@@ -250,12 +250,12 @@ class Beat:
         return now
 
 
-def told_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
+def parse_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
     """Return name and data of a simulated event, such as ``{"happen": "bumped", "side": "front"}``."""
     return bounded_str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
 
 
-def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
+def is_valid_event(link: Link, event: str, data: Mapping[str, object]) -> bool:
     """Return True if a simulated event matches the description; otherwise log the differences."""
     wrong = link.wrong_in(event, data)
     if wrong:
@@ -263,7 +263,7 @@ def may_happen(link: Link, event: str, data: Mapping[str, object]) -> bool:
     return not wrong
 
 
-def drawable(body: Body) -> dict[str, object]:
+def drawing_state(body: Body) -> dict[str, object]:
     """Return the state of the body for drawing, in metres and degrees.
 
     Head pitch is positive down; arms hang at 0 and point up at 180.
@@ -275,24 +275,24 @@ def drawable(body: Body) -> dict[str, object]:
         "head_yaw_deg": round(body.head_yaw.angle, 1),
         "head_pitch_deg": round(body.head_pitch.angle, 1),
         "speech": body.speech,
-        "spoken": round(body.spoken, 2),
-        "heard": body.just_heard,
+        "spoken": round(body.spoken_fraction, 2),
+        "heard": body.recent_word,
         "language": body.language,
         "volume": body.volume,
-        "sound": body.sound.drawable() if body.sound is not None else None,
+        "sound": body.sound.drawing_state() if body.sound is not None else None,
         "eyes": body.eyes,
         "shoulders": body.shoulders,
         "emotion": body.emotion,
         **{f"arm_{side}_deg": round(joint.angle, 1) for side, joint in body.arms.items()},
         **{f"elbow_{side}_deg": round(joint.angle, 1) for side, joint in body.elbows.items()},
-        "moving": not body.still,
+        "moving": not body.is_still,
         "touched": sorted(body.touched),
-        "held": body.held,
-        **surroundings(body.room),
+        "held": body.is_lifted,
+        **room_state(body.room),
     }
 
 
-def surroundings(room: Room) -> dict[str, object]:
+def room_state(room: Room) -> dict[str, object]:
     """Return the room and its objects for drawing."""
     return {
         "objects": _objects(room),
@@ -310,11 +310,12 @@ def surroundings(room: Room) -> dict[str, object]:
 
 def _objects(room: Room) -> list[dict[str, object]]:
     return [
-        {"kind": kind_of(thing), "name": thing.name, **_more(thing), **vars(thing)} for thing in room.things
+        {"kind": kind_of(thing), "name": thing.name, **_extra_fields(thing), **vars(thing)}
+        for thing in room.things
     ]
 
 
-def _more(thing: Thing) -> dict[str, object]:
+def _extra_fields(thing: Thing) -> dict[str, object]:
     match thing:
         case Ball():
             return {"z": thing.z}

@@ -30,20 +30,20 @@ class Sound:
     done: bool = False
 
     @property
-    def seconds(self) -> float:
+    def duration_s(self) -> float:
         """Total duration in seconds."""
         return sum(seconds for _hz, seconds in self.notes)
 
     def step(self, seconds: float) -> None:
         """Advance by a number of seconds."""
         self.played_s += seconds
-        self.done = self.done or self.played_s >= self.seconds
+        self.done = self.done or self.played_s >= self.duration_s
 
-    def drawable(self) -> dict[str, object]:
+    def drawing_state(self) -> dict[str, object]:
         """Return the state for Studio. ``played`` is the progress from 0 to 1."""
         return {
             "number": self.number,
             "title": self.title,
-            "played": round(min(1.0, self.played_s / self.seconds), 2),
+            "played": round(min(1.0, self.played_s / self.duration_s), 2),
             "notes": [list(note) for note in self.notes],
         }

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.robots.virtual.camera import looking_across
+from app.robots.virtual.camera import right_vector
 from app.robots.virtual.canvas import Picture
-from app.robots.virtual.lens import NEAR, Lens
+from app.robots.virtual.lens import NEAR_PLANE_M, Lens
 from app.robots.virtual.room import Person, Room
 
 _MIN_BALL_AREA_PX = 24  # pixels of area
@@ -40,7 +40,7 @@ class Detection:
     box: tuple[int, int, int, int]
 
     @property
-    def middle(self) -> tuple[float, float]:
+    def centre(self) -> tuple[float, float]:
         """Centre of the box in pixels."""
         x, y, width, height = self.box
         return x + width / 2, y + height / 2
@@ -102,11 +102,11 @@ class ObjectDetector:
 
 def _face(room: Room, person: Person, lens: Lens) -> Detection | None:
     middle = np.array([person.x, person.y, person.face_z])
-    half_across = looking_across(lens, person.x, person.y) * person.face_width / 2
+    half_across = right_vector(lens, person.x, person.y) * person.face_width / 2
     half_down = np.array([0.0, 0.0, person.face_height / 2])
     corners = np.array([middle + a * half_across + d * half_down for a in (-1, 1) for d in (-1, 1)])
     seen = lens.to_camera(corners)
-    if seen[:, 2].min() < NEAR or room.hidden(lens.place, (person.x, person.y, person.face_z)):
+    if seen[:, 2].min() < NEAR_PLANE_M or room.is_hidden(lens.position, (person.x, person.y, person.face_z)):
         return None
     pixels = lens.to_pixels(seen)
     low, high = pixels.min(axis=0), pixels.max(axis=0)

@@ -10,15 +10,15 @@ from app.robots.virtual.body import BodyEvent
 from app.robots.virtual.room import Room
 
 RADIUS, HEIGHT = 0.17, 0.34
-START = (-0.9, -0.9, 35.0)
-LIGHT = "#35c26b"
-FULL_RANGE = 4.0
+START_POSE = (-0.9, -0.9, 35.0)
+DEFAULT_LIGHT_COLOUR = "#35c26b"
+MAX_DISTANCE_M = 4.0
 ACCELERATION, BRAKING = 1.5, 20.0  # m/s²
 TURNING, TURN_BRAKING = 360.0, 4000.0  # °/s²
 _MAX_STEP_S = 0.01
 _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
-_ASIDE_DEG = 50.0
-PRESS_S = 0.3
+_BUMPER_ANGLE_DEG = 50.0
+PRESS_DURATION_S = 0.3
 """Time for which a bumper stays pressed after the user pressed it."""
 
 
@@ -27,19 +27,19 @@ class WheelBody:
     """Position and speeds of the robot. Not thread-safe: hold the owner's lock around every call."""
 
     room: Room = field(default_factory=Room)
-    x: float = START[0]
-    y: float = START[1]
-    theta_deg: float = START[2]
+    x: float = START_POSE[0]
+    y: float = START_POSE[1]
+    theta_deg: float = START_POSE[2]
     speed: float = 0.0
     turn_speed: float = 0.0
-    light: str = LIGHT
+    light: str = DEFAULT_LIGHT_COLOUR
     battery: float = 91.3
-    bumped: str = ""
-    happenings: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
+    pressed_bumper: str = ""
+    events: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _target: tuple[float, float] = (0.0, 0.0)
-    held: bool = False
+    is_lifted: bool = False
     """True while the user lifts the robot, so that it doesn't move."""
-    driven: float = 0.0
+    driven_m: float = 0.0
     """Metres rolled, forwards and backwards."""
     _pressed_s: float = 0.0
 
@@ -51,7 +51,7 @@ class WheelBody:
         self._target = (speed, turn_speed)
 
     @property
-    def still(self) -> bool:
+    def is_still(self) -> bool:
         """True if nothing moves and the target speeds are 0."""
         return self._target == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
 
@@ -59,34 +59,39 @@ class WheelBody:
     def distance(self) -> float:
         """Distance from the edge of the robot to the next obstacle ahead, at most 4 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
-        return min(FULL_RANGE, max(0.0, ahead))
+        return min(MAX_DISTANCE_M, max(0.0, ahead))
 
     def press(self, side: str) -> None:
         """Press a bumper. The robot stops as after a collision."""
         self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
-        self.bumped, self._pressed_s = side, PRESS_S
-        self.happenings.append(BodyEvent("bump", {"side": side}))
+        self.pressed_bumper, self._pressed_s = side, PRESS_DURATION_S
+        self.events.append(BodyEvent("bump", {"side": side}))
 
     def reset(self, room: Room) -> None:
         """Stop and return to the start position in this room."""
         self.room, self._target, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
-        self.x, self.y = room.nearest_free(*START[:2], RADIUS)
-        self.theta_deg, self.light, self.bumped, self.held = START[2], LIGHT, "", False
+        self.x, self.y = room.nearest_free(*START_POSE[:2], RADIUS)
+        self.theta_deg, self.light, self.pressed_bumper, self.is_lifted = (
+            START_POSE[2],
+            DEFAULT_LIGHT_COLOUR,
+            "",
+            False,
+        )
 
-    def hold(self, *, held: bool) -> None:
+    def set_lifted(self, *, held: bool) -> None:
         """Lift the robot or put it down. The commanded speeds apply again afterwards."""
-        self.held = held
+        self.is_lifted = held
 
     def carry(self, x: float, y: float) -> None:
         """Move the robot to a place if that is free. Walls limit the movement."""
-        place = self.room.carried(x, y, RADIUS, (self.x, self.y))
+        place = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
         if place is not None:
-            self.place(*place)
+            self.set_position(*place)
 
-    def place(self, x: float, y: float) -> None:
+    def set_position(self, x: float, y: float) -> None:
         """Set the position of the robot."""
         self.x, self.y = x, y
-        self.room = self.room.pushed_ball(x, y, RADIUS)
+        self.room = self.room.with_pushed_ball(x, y, RADIUS)
 
     def step(self, seconds: float) -> None:
         """Advance the simulation in small steps, so that the robot can't pass through objects."""
@@ -96,48 +101,48 @@ class WheelBody:
             self._step(dt)
 
     def _step(self, dt: float) -> None:
-        speed, turn_speed = (0.0, 0.0) if self.held else self._target
+        speed, turn_speed = (0.0, 0.0) if self.is_lifted else self._target
         self.speed = _approach(self.speed, speed, ACCELERATION * dt, BRAKING * dt)
         self.turn_speed = _approach(self.turn_speed, turn_speed, TURNING * dt, TURN_BRAKING * dt)
         if self._pressed_s > 0.0:
             self._pressed_s -= dt
-            self.bumped = self.bumped if self._pressed_s > 0.0 else ""
+            self.pressed_bumper = self.pressed_bumper if self._pressed_s > 0.0 else ""
         self.theta_deg = (self.theta_deg + self.turn_speed * dt + 180.0) % 360.0 - 180.0
         if self.speed:
-            self._roll(self.speed * dt)
-        drain = _DRAIN_PER_S if self.still else _DRAIN_MOVING_PER_S
+            self._advance(self.speed * dt)
+        drain = _DRAIN_PER_S if self.is_still else _DRAIN_MOVING_PER_S
         self.battery = max(0.0, self.battery - dt * drain)
 
-    def _roll(self, way: float) -> None:
+    def _advance(self, way: float) -> None:
         x = self.x + way * math.cos(math.radians(self.theta_deg))
         y = self.y + way * math.sin(math.radians(self.theta_deg))
-        if self.room.free(x, y, RADIUS, (self.x, self.y)):
+        if self.room.is_free(x, y, RADIUS, (self.x, self.y)):
             self.x, self.y = x, y
-            self.driven += abs(way)
-            self.bumped = self.bumped if self._pressed_s > 0.0 else ""
-            self.room = self.room.pushed_ball(x, y, RADIUS)
+            self.driven_m += abs(way)
+            self.pressed_bumper = self.pressed_bumper if self._pressed_s > 0.0 else ""
+            self.room = self.room.with_pushed_ball(x, y, RADIUS)
             return
         self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
-        side = self._side(way)
-        if side != self.bumped:
-            self.bumped = side
-            self.happenings.append(BodyEvent("bump", {"side": side}))
+        side = self._touching_side(way)
+        if side != self.pressed_bumper:
+            self.pressed_bumper = side
+            self.events.append(BodyEvent("bump", {"side": side}))
 
-    def _side(self, way: float) -> str:
+    def _touching_side(self, way: float) -> str:
         if way < 0:
             return "back"
         touches = {
-            side: not self._free_towards(self.theta_deg + aside)
-            for side, aside in (("left", _ASIDE_DEG), ("right", -_ASIDE_DEG))
+            side: not self._is_free_towards(self.theta_deg + aside)
+            for side, aside in (("left", _BUMPER_ANGLE_DEG), ("right", -_BUMPER_ANGLE_DEG))
         }
         if touches["left"] == touches["right"]:
             return "front"
         return "left" if touches["left"] else "right"
 
-    def _free_towards(self, direction_deg: float) -> bool:
+    def _is_free_towards(self, direction_deg: float) -> bool:
         x = self.x + 0.03 * math.cos(math.radians(direction_deg))
         y = self.y + 0.03 * math.sin(math.radians(direction_deg))
-        return self.room.free(x, y, RADIUS)
+        return self.room.is_free(x, y, RADIUS)
 
 
 def _approach(now: float, wanted: float, faster: float, slower: float) -> float:

@@ -13,39 +13,41 @@ from PySide6.QtGui import QGuiApplication
 from app.core.storage import deep_json
 
 Json = dict[str, object]
-COPIED = '{"nepStudio":'
+CLIPBOARD_PREFIX = '{"nepStudio":'
 """Prefix of copied blocks in the clipboard's text (`clipboard.ts`)."""
-MAX_COPIED_CHARS = 5_000_000
+MAX_CLIPBOARD_CHARS = 5_000_000
 
 
 class BlocklyBridge(QObject):
     """QWebChannel object ``bridge`` of the page. The page calls its slots; its signals notify the view."""
 
     told = Signal(str, str)  # to the page: a command and its JSON
-    came_up = Signal()
+    page_ready = Signal()
     edited = Signal(str, int, str)  # a tab's key, generation of the program loaded there, workspace as JSON
     undo_changed = Signal(bool, bool)
-    block_chosen = Signal(str)
-    answered = Signal(int, str)  # token of a flush, workspace as JSON
-    went_wrong = Signal(str)
+    block_selected = Signal(str)
+    workspace_flushed = Signal(int, str)  # token of a flush, workspace as JSON
+    error_reported = Signal(str)
     field_opened = Signal()  # field requested by a command has the focus
-    try_asked = Signal(str)  # script to try, as JSON
+    try_requested = Signal(str)  # script to try, as JSON
     block_focused = Signal(bool)  # True if a block has the focus
-    command_wanted = Signal(str)  # id of a window command, for variables or the picture of the blocks
-    drawn = Signal(int, str)  # token of a picture, the picture as text; "" if there are no blocks
-    values_watched = Signal(str)  # ids of the variables whose values the page shows, as JSON list
-    sensors_offered = Signal(str)  # sensors in the open toolbox as JSON: [[robot, sensor], …]
-    wanted = Signal(str)  # name of the pressed button of the empty canvas: "robot" or "examples"
-    pinned = Signal(bool)  # True if the flyout stays open after a block was dragged out of it
+    command_requested = Signal(str)  # id of a window command, for variables or the picture of the blocks
+    picture_rendered = Signal(int, str)  # token of a picture, the picture as text; "" if there are no blocks
+    watched_variables_changed = Signal(str)  # ids of the variables whose values the page shows, as JSON list
+    visible_sensors_changed = Signal(str)  # sensors in the open toolbox as JSON: [[robot, sensor], …]
+    canvas_button_pressed = Signal(
+        str
+    )  # name of the pressed button of the empty canvas: "robot" or "examples"
+    flyout_pinned = Signal(bool)  # True if the flyout stays open after a block was dragged out of it
     removed = Signal(int)  # number of blocks that the user deleted at once
     # True with x, y while blocks of this tab are dragged outside the page; False when they return
-    carried_out = Signal(int, int, bool, str)
+    blocks_dragged_outside = Signal(int, int, bool, str)
     # picture of the dragged blocks: a PNG as `data:` URL, and its device pixels per page pixel
-    carried_seen = Signal(str, float)
-    let_go_outside = Signal(int, int)  # position where the blocks were dropped outside the page
+    drag_picture_rendered = Signal(str, float)
+    blocks_dropped_outside = Signal(int, int)  # position where the blocks were dropped outside the page
     # number of blocks brought into this tab, "moved", "copied" or "added", and key of their former tab
-    carried_over = Signal(int, str, str)
-    backpack_asked = Signal(str)  # backpack operation as JSON (`backpack.ts`)
+    blocks_transferred = Signal(int, str, str)
+    backpack_requested = Signal(str)  # backpack operation as JSON (`backpack.ts`)
 
     def __init__(self, begin: Callable[[], Json], parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -62,7 +64,7 @@ class BlocklyBridge(QObject):
 
     @Slot()
     def ready(self) -> None:
-        self.came_up.emit()
+        self.page_ready.emit()
 
     @Slot(str, int, str)
     def changed(self, key: str, generation: int, workspace: str) -> None:
@@ -74,19 +76,19 @@ class BlocklyBridge(QObject):
 
     @Slot(str)
     def selected(self, block: str) -> None:
-        self.block_chosen.emit(block)
+        self.block_selected.emit(block)
 
     @Slot(int, str)
     def flushed(self, token: int, workspace: str) -> None:
-        self.answered.emit(token, workspace)
+        self.workspace_flushed.emit(token, workspace)
 
     @Slot(int, str)
     def pictured(self, token: int, data: str) -> None:
-        self.drawn.emit(token, data)
+        self.picture_rendered.emit(token, data)
 
     @Slot(str)
     def tries(self, stack: str) -> None:
-        self.try_asked.emit(stack)
+        self.try_requested.emit(stack)
 
     @Slot()
     def opened(self) -> None:
@@ -98,11 +100,11 @@ class BlocklyBridge(QObject):
 
     @Slot(str)
     def offers(self, sensors: str) -> None:
-        self.sensors_offered.emit(sensors)
+        self.visible_sensors_changed.emit(sensors)
 
     @Slot(bool)
     def pin(self, keeps: bool) -> None:
-        self.pinned.emit(keeps)
+        self.flyout_pinned.emit(keeps)
 
     @Slot(int)
     def deleted(self, count: int) -> None:
@@ -110,23 +112,23 @@ class BlocklyBridge(QObject):
 
     @Slot(int, int, bool, str)
     def carried(self, x: int, y: int, out: bool, home: str) -> None:
-        self.carried_out.emit(x, y, out, home)
+        self.blocks_dragged_outside.emit(x, y, out, home)
 
     @Slot(str, float)
     def pictureOfCarried(self, data: str, ratio: float) -> None:
-        self.carried_seen.emit(data, ratio)
+        self.drag_picture_rendered.emit(data, ratio)
 
     @Slot(int, int)
     def dropped(self, x: int, y: int) -> None:
-        self.let_go_outside.emit(x, y)
+        self.blocks_dropped_outside.emit(x, y)
 
     @Slot(int, str, str)
     def brought(self, count: int, how: str, home: str) -> None:
-        self.carried_over.emit(count, how, home)
+        self.blocks_transferred.emit(count, how, home)
 
     @Slot(str)
     def backpack(self, what: str) -> None:
-        self.backpack_asked.emit(what)
+        self.backpack_requested.emit(what)
 
     @Slot(str)
     def copy(self, blocks: str) -> None:
@@ -140,21 +142,21 @@ class BlocklyBridge(QObject):
         Return "" for other contents, which the page must not read.
         """
         text = QGuiApplication.clipboard().text()
-        return text if text.startswith(COPIED) and len(text) <= MAX_COPIED_CHARS else ""
+        return text if text.startswith(CLIPBOARD_PREFIX) and len(text) <= MAX_CLIPBOARD_CHARS else ""
 
     @Slot(str)
     def command(self, name: str) -> None:
         if name.startswith(("variable.", "picture.", "print.")):
-            self.command_wanted.emit(name)
+            self.command_requested.emit(name)
 
     @Slot(str)
     def watches(self, variables: str) -> None:
-        self.values_watched.emit(variables)
+        self.watched_variables_changed.emit(variables)
 
     @Slot(str)
     def wants(self, what: str) -> None:
-        self.wanted.emit(what)
+        self.canvas_button_pressed.emit(what)
 
     @Slot(str)
     def failed(self, sentence: str) -> None:
-        self.went_wrong.emit(sentence)
+        self.error_reported.emit(sentence)

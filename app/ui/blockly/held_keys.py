@@ -7,7 +7,7 @@ from collections.abc import Callable
 from PySide6.QtCore import QCoreApplication, QEvent, QObject
 
 _KEYS = (QEvent.Type.KeyPress, QEvent.Type.KeyRelease)
-_ELSEWHERE = (QEvent.Type.MouseButtonPress, QEvent.Type.FocusOut)
+_RELEASE_EVENTS = (QEvent.Type.MouseButtonPress, QEvent.Type.FocusOut)
 
 
 class HeldKeys:
@@ -27,18 +27,18 @@ class HeldKeys:
         if self._kept is None:
             self._kept = []
 
-    def keeps(self, event: QEvent) -> bool:
+    def hold_event(self, event: QEvent) -> bool:
         """Return True if the event was held. A click or loss of focus releases the held keys."""
         if self._kept is None:
             return False
         if event.type() in _KEYS:
             self._kept.append(event.clone())
             return True
-        if event.type() in _ELSEWHERE:
-            self.let_go()
+        if event.type() in _RELEASE_EVENTS:
+            self.release()
         return False
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Send the held keys to the page in the order they were pressed."""
         kept, self._kept = self._kept or [], None
         for event in kept:
@@ -46,6 +46,6 @@ class HeldKeys:
             if keyboard is not None:
                 QCoreApplication.sendEvent(keyboard, event)
 
-    def forget(self) -> None:
+    def discard_all(self) -> None:
         """Discard the held keys because the page they were typed for no longer exists."""
         self._kept = None

@@ -22,16 +22,16 @@ from app import resources
 from app.core.reports.crash import crash_extra
 from app.ui.blockly.bridge import BlocklyBridge, Json
 from app.ui.blockly.held_keys import HeldKeys
-from app.ui.blockly.scheme import PAGE, SCHEME, RequestBlocker, SchemeHandler, register_scheme
-from app.ui.widgets.keyboard import keyboard_leads, proxy_of
+from app.ui.blockly.scheme import PAGE_URL, SCHEME, RequestBlocker, SchemeHandler, register_scheme
+from app.ui.widgets.keyboard import focus_proxy, is_keyboard_navigation
 from nep import i18n
 
 _log = logging.getLogger(__name__)
-_RESTART_MS = (0, 500, 2000, 5000)
-_STABLE_S = 60.0
+_RESTART_DELAYS_MS = (0, 500, 2000, 5000)
+_STABLE_AFTER_S = 60.0
 _FUNCTION_KEYS = range(Qt.Key.Key_F1, Qt.Key.Key_F12 + 1)
 _Attribute = QWebEngineSettings.WebAttribute
-_OFF = (
+_DISABLED_ATTRIBUTES = (
     _Attribute.JavascriptCanOpenWindows, _Attribute.LocalContentCanAccessRemoteUrls,
     _Attribute.LocalContentCanAccessFileUrls, _Attribute.PluginsEnabled, _Attribute.PdfViewerEnabled,
     _Attribute.HyperlinkAuditingEnabled, _Attribute.FullScreenSupportEnabled, _Attribute.ErrorPageEnabled,
@@ -74,7 +74,7 @@ class BlocklyWeb:
         profile.installUrlSchemeHandler(SCHEME, self._handler)
         self.page = BlocklyPage(profile, self.view)
         self.page.setBackgroundColor(background)
-        for attribute in _OFF:
+        for attribute in _DISABLED_ATTRIBUTES:
             self.page.settings().setAttribute(attribute, False)
         channel = QWebChannel(self.page)
         channel.registerObject("bridge", bridge)
@@ -85,7 +85,7 @@ class BlocklyWeb:
 
     def start(self) -> None:
         """Load the editor; also used to reload it after its process was killed."""
-        self.page.load(QUrl(PAGE))
+        self.page.load(QUrl(PAGE_URL))
 
     def close(self) -> None:
         """Schedule deletion of the view, its page and then the profile in the event loop."""
@@ -94,7 +94,7 @@ class BlocklyWeb:
 
     def keyboard(self) -> QObject | None:
         """Return the widget that receives key presses while the page has the focus."""
-        return proxy_of(self.view)
+        return focus_proxy(self.view)
 
 
 class BlocklyHost(QWidget):
@@ -115,14 +115,14 @@ class BlocklyHost(QWidget):
         self._deaths = 0
         self._had_died = False
         self._up_since = 0.0
-        self._bridge = BlocklyBridge(self._beginning, self)
-        self._bridge.came_up.connect(self._came_up)
+        self._bridge = BlocklyBridge(self._initial_settings, self)
+        self._bridge.page_ready.connect(self._on_page_ready)
         self._keys = HeldKeys(lambda: self._web.keyboard() if self._web is not None else None)
         self._asked_for = ""  # requested field: "find" or "search"; "" when it has the focus
-        self._bridge.field_opened.connect(self._field_opened)
+        self._bridge.field_opened.connect(self._on_field_opened)
         self._on_block = False
-        self._bridge.block_focused.connect(self._block_focused)
-        self._bridge.went_wrong.connect(lambda sentence: _log.error("block editor: %s", sentence))
+        self._bridge.block_focused.connect(self._on_block_focused)
+        self._bridge.error_reported.connect(lambda sentence: _log.error("block editor: %s", sentence))
         self._layout = QVBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
 
@@ -156,11 +156,11 @@ class BlocklyHost(QWidget):
 
     # -- for the view -----------------------------------------------------------------------------
 
-    def _page_came(self) -> None:
+    def _on_page_loaded(self) -> None:
         # Overridden by subclasses: the page is loaded and has no state yet.
         ...
 
-    def _page_went(self) -> None:
+    def _on_page_lost(self) -> None:
         # Overridden by subclasses: the page and its state are lost.
         ...
 
@@ -169,12 +169,12 @@ class BlocklyHost(QWidget):
         if self._up:
             self._bridge.send_command(command, payload)
 
-    def _ask_for(self, field: str) -> None:
+    def _request_field(self, field: str) -> None:
         # Holds keys that are pressed before the field has the focus.
         if self._web is None:
             return
         self._asked_for = field
-        self._watch_keys()
+        self._install_key_filter()
         self._keys.hold()
         self._send_command(field, None)
 
@@ -183,14 +183,14 @@ class BlocklyHost(QWidget):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         if self._web is None:
-            QTimer.singleShot(0, self, self._make_page)  # let the window respond to the user first
+            QTimer.singleShot(0, self, self._create_page)  # let the window respond to the user first
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ChildAdded:
-            self._watch_keys()
-        if self._keys.keeps(event):
+            self._install_key_filter()
+        if self._keys.hold_event(event):
             return True
-        if event.type() == QEvent.Type.FocusIn and keyboard_leads():
+        if event.type() == QEvent.Type.FocusIn and is_keyboard_navigation():
             self._send_command("keyboard", None)
         overrides = event.type() == QEvent.Type.ShortcutOverride and self._on_block
         if overrides and _is_help(cast("QKeyEvent", event)):
@@ -207,14 +207,14 @@ class BlocklyHost(QWidget):
                 return True
         return super().eventFilter(watched, event)
 
-    def _make_page(self) -> None:
+    def _create_page(self) -> None:
         if self._web is not None or not self.isVisible():
             return
         self._web = BlocklyWeb(self._bridge, self._background(), self)
         self._layout.addWidget(self._web.view)
         self.setFocusProxy(self._web.view)
         self._web.view.installEventFilter(self)
-        self._web.page.renderProcessTerminated.connect(self._died)
+        self._web.page.renderProcessTerminated.connect(self._on_process_terminated)
         self._apply_theme(self._web)
         application = QCoreApplication.instance()
         if application is not None:
@@ -234,7 +234,7 @@ class BlocklyHost(QWidget):
         percent = tokens.get("textPercent")
         web.view.setZoomFactor(percent / 100 if isinstance(percent, int | float) else 1.0)
 
-    def _watch_keys(self) -> None:
+    def _install_key_filter(self) -> None:
         # The web engine creates the widget that receives keys, and a new one for each process.
         keyboard = self._web.keyboard() if self._web is not None else None
         if self._web is not None:
@@ -247,36 +247,36 @@ class BlocklyHost(QWidget):
             if isinstance(keyboard, QWidget):
                 keyboard.setAcceptDrops(False)  # the window handles dropped files
 
-    def _beginning(self) -> Json:
+    def _initial_settings(self) -> Json:
         if not self._theme:
             tokens = json.loads(resources.path("theme", "tokens.json").read_text("utf-8"))
             self._theme = {"tokens": tokens, "dark": False}
         return {
             "language": self._language,
-            "words": dict(i18n.editor_words()),
+            "words": dict(i18n.editor_translations()),
             "reduced": self._reduced_motion,
             "pinned": self._pinned,
             "theme": self._theme,
         }
 
     def _background(self) -> QColor:
-        tokens = cast("Mapping[str, Mapping[str, object]]", self._beginning()["theme"])["tokens"]
+        tokens = cast("Mapping[str, Mapping[str, object]]", self._initial_settings()["theme"])["tokens"]
         colours = cast("Mapping[str, object]", tokens["colour"])
         mode = colours.get("dark" if self._theme["dark"] else "light", colours)
         return QColor(str(cast("Mapping[str, object]", mode)["workspace"]))
 
-    def _field_opened(self) -> None:
+    def _on_field_opened(self) -> None:
         self._asked_for = ""
-        self._keys.let_go()
+        self._keys.release()
 
-    def _block_focused(self, has: bool) -> None:
+    def _on_block_focused(self, has: bool) -> None:
         self._on_block = has
 
-    def _came_up(self) -> None:
+    def _on_page_ready(self) -> None:
         self._up = True
         self._up_since = time.monotonic()
-        self._watch_keys()
-        self._page_came()
+        self._install_key_filter()
+        self._on_page_loaded()
         if self._asked_for:
             self._send_command(self._asked_for, None)
         self.ready.emit()
@@ -284,7 +284,9 @@ class BlocklyHost(QWidget):
             self._had_died = False
             self.recovered.emit()
 
-    def _died(self, status: QWebEnginePage.RenderProcessTerminationStatus, code: int) -> None:
+    def _on_process_terminated(
+        self, status: QWebEnginePage.RenderProcessTerminationStatus, code: int
+    ) -> None:
         is_crash = status != QWebEnginePage.RenderProcessTerminationStatus.NormalTerminationStatus
         how = f"the web process of the block editor ended (code {code}, {status.name})"
         _log.warning(
@@ -295,11 +297,11 @@ class BlocklyHost(QWidget):
         self._up = self._on_block = False
         self._had_died = True
         self._asked_for = ""
-        self._keys.forget()
-        self._page_went()
-        if time.monotonic() - self._up_since > _STABLE_S:
+        self._keys.discard_all()
+        self._on_page_lost()
+        if time.monotonic() - self._up_since > _STABLE_AFTER_S:
             self._deaths = 0
-        delay = _RESTART_MS[min(self._deaths, len(_RESTART_MS) - 1)]
+        delay = _RESTART_DELAYS_MS[min(self._deaths, len(_RESTART_DELAYS_MS) - 1)]
         self._deaths += 1
         if self._web is not None:
             QTimer.singleShot(delay, self._web.page, self._web.start)

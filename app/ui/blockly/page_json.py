@@ -9,18 +9,18 @@ from base64 import b64decode
 from nep.text import bounded_str
 
 
-def texts(text: str) -> tuple[str, ...]:
+def parse_strings(text: str) -> tuple[str, ...]:
     """Return the strings of a JSON list."""
-    return tuple(map(bounded_str, _list(text)))
+    return tuple(map(bounded_str, _parse_list(text)))
 
 
-def pairs(text: str) -> tuple[tuple[str, str], ...]:
+def parse_string_pairs(text: str) -> tuple[tuple[str, str], ...]:
     """Return the pairs of strings, such as robot and sensor, of a JSON list of lists."""
-    found = (each for each in _list(text) if isinstance(each, list) and len(each) == 2)
+    found = (each for each in _parse_list(text) if isinstance(each, list) and len(each) == 2)
     return tuple((bounded_str(first), bounded_str(second)) for first, second in found)
 
 
-def data_url(text: str) -> bytes:
+def decode_data_url(text: str) -> bytes:
     """Return the decoded bytes of a base64 ``data:`` URL."""
     try:
         return b64decode(text.partition(",")[2].encode("ascii", "replace"))
@@ -28,7 +28,7 @@ def data_url(text: str) -> bytes:
         return b""
 
 
-def _list(text: str) -> list[object]:
+def _parse_list(text: str) -> list[object]:
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):

@@ -22,15 +22,15 @@ from app import resources
 
 SCHEME = b"app"
 HOST = "blocks"
-PAGE = f"{SCHEME.decode()}://{HOST}/index.html"
-ALLOWED = frozenset({"app", "data", "blob"})
+PAGE_URL = f"{SCHEME.decode()}://{HOST}/index.html"
+ALLOWED_SCHEMES = frozenset({"app", "data", "blob"})
 
-_TYPES = {
+_MEDIA_TYPES = {
     ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json",
     ".svg": "image/svg+xml", ".png": "image/png", ".gif": "image/gif", ".cur": "image/x-icon",
     ".otf": "font/otf", ".ttf": "font/ttf", ".txt": "text/plain",
 }  # fmt: skip
-_WEIGHTS = {"Regular": 400, "Medium": 500, "SemiBold": 600, "Bold": 700}
+_FONT_WEIGHTS = {"Regular": 400, "Medium": 500, "SemiBold": 600, "Bold": 700}
 
 
 def register_scheme() -> None:
@@ -59,7 +59,7 @@ def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
         return "text/javascript", _qwebchannel()
     base, name = (root / "fonts", path[7:]) if path.startswith("/fonts/") else (root / "blockly", path[1:])
     file = (base / name).resolve()
-    kind = _TYPES.get(file.suffix)
+    kind = _MEDIA_TYPES.get(file.suffix)
     if kind is None or not file.is_relative_to(base.resolve()) or not file.is_file():
         return None
     return kind, file.read_bytes()
@@ -68,7 +68,7 @@ def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
 def _font_faces(folder: Path) -> str:
     # One `@font-face` for each bundled weight of Inter and M PLUS 1p; empty without fonts.
     return "\n".join(
-        f'@font-face{{font-family:"{family}";font-weight:{_WEIGHTS[file.stem.partition("-")[2]]};'
+        f'@font-face{{font-family:"{family}";font-weight:{_FONT_WEIGHTS[file.stem.partition("-")[2]]};'
         f'src:url("fonts/{file.name}");font-display:block}}'
         for family, prefix in (("Inter", "Inter"), ("M PLUS 1p", "MPLUS1p"))
         for file in sorted(folder.glob(f"{prefix}-*.[ot]tf"))
@@ -115,7 +115,7 @@ class RequestBlocker(QWebEngineUrlRequestInterceptor):
 
     def interceptRequest(self, info: QWebEngineUrlRequestInfo) -> None:
         info.block(True)  # blocked first, so that an exception below can't let the request through
-        if info.requestUrl().scheme() in ALLOWED:
+        if info.requestUrl().scheme() in ALLOWED_SCHEMES:
             info.block(False)
             return
         if len(self.blocked) < 100:

@@ -14,7 +14,7 @@ class Tab:
     key: str
     program: WorkspaceJson
     generation: int
-    in_page: bool = False  # loaded in the page, with undo stack, zoom and scroll position
+    is_loaded: bool = False  # loaded in the page, with undo stack, zoom and scroll position
     states: dict[str, object] = field(default_factory=dict)
 
 
@@ -27,7 +27,7 @@ class Tabs:
     def __init__(self) -> None:
         self._generations = 0
         self._tabs: dict[str, Tab] = {}
-        self.shown = self._make("", WorkspaceJson.of(EMPTY))
+        self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY))
 
     def __getitem__(self, key: str) -> Tab | None:
         return self._tabs.get(key)
@@ -39,7 +39,7 @@ class Tabs:
             The key of the placeholder if it was removed, else None.
         """
         before = self.shown
-        self.shown = self._tabs.get(key) or self._make(key, program)
+        self.shown = self._tabs.get(key) or self._create_tab(key, program)
         if before.key or before is self.shown:
             return None
         del self._tabs[""]
@@ -49,7 +49,7 @@ class Tabs:
         """Remove a tab. Return False if it doesn't exist."""
         gone = self._tabs.pop(key, None)
         if gone is not None and gone is self.shown:
-            self.shown = self._make("", WorkspaceJson.of(EMPTY))
+            self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY))
         return gone is not None
 
     def replace(self, program: WorkspaceJson) -> None:
@@ -59,7 +59,7 @@ class Tabs:
         self.shown.program = program
         self.shown.states.clear()
 
-    def edited(self, key: str, generation: int) -> Tab | None:
+    def tab_for_edit(self, key: str, generation: int) -> Tab | None:
         """Return the tab that an edit belongs to, or None.
 
         It is None if the tab was closed or its program replaced in the meantime.
@@ -67,12 +67,12 @@ class Tabs:
         tab = self._tabs.get(key)
         return tab if tab is not None and tab.generation == generation else None
 
-    def page_gone(self) -> None:
+    def mark_unloaded(self) -> None:
         """Mark all tabs as not loaded because the page was lost."""
         for tab in self._tabs.values():
-            tab.in_page = False
+            tab.is_loaded = False
 
-    def _make(self, key: str, program: WorkspaceJson) -> Tab:
+    def _create_tab(self, key: str, program: WorkspaceJson) -> Tab:
         self._generations += 1
         self._tabs[key] = Tab(key, program, self._generations)
         return self._tabs[key]

@@ -15,16 +15,18 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app.core.documents.workspace_json import WorkspaceJson
 from app.ui.blockly.bridge import Json
 from app.ui.blockly.host import BlocklyHost
-from app.ui.blockly.page_json import data_url, pairs, texts
+from app.ui.blockly.page_json import decode_data_url, parse_string_pairs, parse_strings
 from app.ui.blockly.scheme import register_scheme as register_scheme
 from app.ui.blockly.tabs import Tabs
 from nep import i18n
 
 _PIXELS_PER_INCH = 96.0  # CSS pixels
-_EDGE_INCH = 0.45
-PAGE_EDITS = {"cut": "Cut", "copy": "Copy", "paste": "Paste", "selectAll": "SelectAll"}
+_MIN_MARGIN_INCH = 0.45
+PAGE_EDIT_ACTIONS = {"cut": "Cut", "copy": "Copy", "paste": "Paste", "selectAll": "SelectAll"}
 """Actions of `QWebEnginePage.WebAction` for editing text fields of the page, by command."""
-TYPES = "(e => !!e && (e.isContentEditable || /^(INPUT|TEXTAREA)$/.test(e.tagName)))(document.activeElement)"
+IS_TEXT_FIELD_FOCUSED_JS = (
+    "(e => !!e && (e.isContentEditable || /^(INPUT|TEXTAREA)$/.test(e.tagName)))(document.activeElement)"
+)
 """JavaScript expression that is true if a text field of the page has the focus."""
 
 
@@ -38,23 +40,25 @@ class BlocklyView(BlocklyHost):
     changed = Signal(str, object)  # key of a tab and its newest program (WorkspaceJson), 150 ms after an edit
     history_changed = Signal(bool, bool)  # can undo, can redo; in the shown tab
     block_selected = Signal(str)  # id of the selected block; "" if none is selected
-    wanted = Signal(str)  # name of the pressed button of the empty canvas: "robot" or "examples"
-    try_asked = Signal(str)  # script to try, as JSON (`app.blocks.compiler.stack`)
-    sensors_offered = Signal(tuple)  # (robot, sensor) of each sensor block in the open flyout
-    command_wanted = Signal(str)  # id of a window command such as "variable.rename:ID"
-    values_watched = Signal(tuple)  # ids of the variables whose values the page shows
+    canvas_button_pressed = Signal(
+        str
+    )  # name of the pressed button of the empty canvas: "robot" or "examples"
+    try_requested = Signal(str)  # script to try, as JSON (`app.blocks.compiler.stack`)
+    visible_sensors_changed = Signal(tuple)  # (robot, sensor) of each sensor block in the open flyout
+    command_requested = Signal(str)  # id of a window command such as "variable.rename:ID"
+    watched_variables_changed = Signal(tuple)  # ids of the variables whose values the page shows
     toolbox_pinned = Signal(bool)  # True if the flyout stays open after a block was dragged out of it
     blocks_deleted = Signal(int)  # number of blocks deleted at once in the shown tab
     # position on the screen (QPoint) while blocks of that tab are dragged outside the page, None when they
     # return
-    block_carried = Signal(object, str)
+    blocks_dragged_outside = Signal(object, str)
     # picture of the dragged blocks: a PNG, and its device pixels per screen pixel
-    carried_seen = Signal(bytes, float)
+    drag_picture_rendered = Signal(bytes, float)
     # position where blocks were dropped outside the page; without `bring_blocks` they return to their place
-    block_dropped = Signal(QPoint)
+    blocks_dropped_outside = Signal(QPoint)
     # number of blocks brought into the shown tab, "moved", "copied" or "added", and key of their former tab
-    blocks_brought = Signal(int, str, str)
-    backpack_asked = Signal(str)  # backpack operation as JSON: `BackpackKeeper`
+    blocks_transferred = Signal(int, str, str)
+    backpack_requested = Signal(str)  # backpack operation as JSON: `BackpackKeeper`
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
@@ -69,25 +73,35 @@ class BlocklyView(BlocklyHost):
         self._waiting: dict[int, Callable[[WorkspaceJson], None]] = {}
         self._pictures: dict[int, Callable[[bytes], None]] = {}
         self._tokens = 0
-        self._bridge.edited.connect(self._edited)
+        self._bridge.edited.connect(self._on_edited)
         self._bridge.undo_changed.connect(self.history_changed)
-        self._bridge.block_chosen.connect(self.block_selected)
-        self._bridge.answered.connect(self._answered)
-        self._bridge.drawn.connect(self._drawn)
-        self._bridge.command_wanted.connect(self.command_wanted)
-        self._bridge.values_watched.connect(lambda text: self.values_watched.emit(texts(text)))
-        self._bridge.wanted.connect(self.wanted)
-        self._bridge.try_asked.connect(self.try_asked)
-        self._bridge.pinned.connect(self._toolbox_pinned)
-        self._bridge.removed.connect(self.blocks_deleted)
-        self._bridge.carried_out.connect(
-            lambda x, y, out, home: self.block_carried.emit(self._on_screen(x, y) if out else None, home)
+        self._bridge.block_selected.connect(self.block_selected)
+        self._bridge.workspace_flushed.connect(self._on_workspace_flushed)
+        self._bridge.picture_rendered.connect(self._on_picture_rendered)
+        self._bridge.command_requested.connect(self.command_requested)
+        self._bridge.watched_variables_changed.connect(
+            lambda text: self.watched_variables_changed.emit(parse_strings(text))
         )
-        self._bridge.carried_seen.connect(lambda data, ratio: self.carried_seen.emit(data_url(data), ratio))
-        self._bridge.let_go_outside.connect(lambda x, y: self.block_dropped.emit(self._on_screen(x, y)))
-        self._bridge.carried_over.connect(self.blocks_brought)
-        self._bridge.backpack_asked.connect(self.backpack_asked)
-        self._bridge.sensors_offered.connect(lambda text: self.sensors_offered.emit(pairs(text)))
+        self._bridge.canvas_button_pressed.connect(self.canvas_button_pressed)
+        self._bridge.try_requested.connect(self.try_requested)
+        self._bridge.flyout_pinned.connect(self._on_flyout_pinned)
+        self._bridge.removed.connect(self.blocks_deleted)
+        self._bridge.blocks_dragged_outside.connect(
+            lambda x, y, out, home: self.blocks_dragged_outside.emit(
+                self._to_screen(x, y) if out else None, home
+            )
+        )
+        self._bridge.drag_picture_rendered.connect(
+            lambda data, ratio: self.drag_picture_rendered.emit(decode_data_url(data), ratio)
+        )
+        self._bridge.blocks_dropped_outside.connect(
+            lambda x, y: self.blocks_dropped_outside.emit(self._to_screen(x, y))
+        )
+        self._bridge.blocks_transferred.connect(self.blocks_transferred)
+        self._bridge.backpack_requested.connect(self.backpack_requested)
+        self._bridge.visible_sensors_changed.connect(
+            lambda text: self.visible_sensors_changed.emit(parse_string_pairs(text))
+        )
 
     # -- program ----------------------------------------------------------------------------------
 
@@ -106,7 +120,7 @@ class BlocklyView(BlocklyHost):
 
         ``workspace`` is used only if the tab is new.
         """
-        gone = self._tabs.show(key, WorkspaceJson.of(workspace))
+        gone = self._tabs.show(key, WorkspaceJson.from_blocks(workspace))
         self._send_tab()
         if gone is not None:
             self._send_command("close", gone)
@@ -124,13 +138,13 @@ class BlocklyView(BlocklyHost):
 
         Clears the undo stack and discards pending edits of the old program.
         """
-        self._tabs.replace(WorkspaceJson.of(workspace))
-        self._tabs.shown.in_page = False
+        self._tabs.replace(WorkspaceJson.from_blocks(workspace))
+        self._tabs.shown.is_loaded = False
         self._send_tab()
 
-    def change(self, workspace: Mapping[str, object]) -> None:
+    def apply_edit(self, workspace: Mapping[str, object]) -> None:
         """Change the program of the shown tab as one undoable edit; `changed` is not emitted."""
-        self._tabs.shown.program = WorkspaceJson.of(workspace)
+        self._tabs.shown.program = WorkspaceJson.from_blocks(workspace)
         self._send_command("change", workspace)
 
     def flush(self, done: Callable[[WorkspaceJson], None]) -> None:
@@ -158,7 +172,7 @@ class BlocklyView(BlocklyHost):
         self._pictures[self._tokens] = done
         self._bridge.send_command("picture", {"token": self._tokens, "kind": kind, "white": white})
 
-    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         """Render all blocks of the shown tab as a PDF with the title on each page.
 
         `done` is called exactly once, with b"" if there are no blocks or no page.
@@ -169,24 +183,24 @@ class BlocklyView(BlocklyHost):
         self._tokens += 1
         token = self._tokens
 
-        def made(data: QByteArray) -> None:
+        def on_pdf_rendered(data: QByteArray) -> None:
             self._send_command("printed", None)
             waiting = self._pictures.pop(token, None)
             if waiting is not None:
                 waiting(bytes(data.data()))
 
-        def laid(count: bytes) -> None:
+        def on_pages_laid_out(count: bytes) -> None:
             if not count or self.web is None:
                 done(b"")
                 return
             self._pictures[token] = done  # kept until the PDF is created, as the page may die meanwhile
             bare = QPageLayout(layout.pageSize(), layout.orientation(), QMarginsF())
-            self.web.page.printToPdf(made, bare)
+            self.web.page.printToPdf(on_pdf_rendered, bare)
 
         paper = layout.fullRect(QPageLayout.Unit.Inch)
-        edge = max(_EDGE_INCH, *_margins(layout))
+        edge = max(_MIN_MARGIN_INCH, *_margins(layout))
         pixels = {"width": paper.width(), "height": paper.height(), "edge": edge}
-        self._pictures[token] = laid
+        self._pictures[token] = on_pages_laid_out
         settings: Json = {name: inches * _PIXELS_PER_INCH for name, inches in pixels.items()}
         self._bridge.send_command("pages", {"token": token, "title": title, "date": date, **settings})
 
@@ -210,19 +224,19 @@ class BlocklyView(BlocklyHost):
 
     def highlight(self, ids: Sequence[str]) -> None:
         """Highlight exactly these blocks. Fast enough for 30 calls per second."""
-        self._show("highlight", list(ids))
+        self._set_state("highlight", list(ids))
 
     def mark_stopped(self, ids: Sequence[str]) -> None:
         """Outline the blocks at which the program stopped."""
-        self._show("stopped", list(ids))
+        self._set_state("stopped", list(ids))
 
     def set_errors(self, errors: Mapping[str, str]) -> None:
         """Show an error at each of these blocks, as a map from block id to sentence."""
-        self._show("errors", dict(errors))
+        self._set_state("errors", dict(errors))
 
     def set_warnings(self, warnings: Mapping[str, str]) -> None:
         """Show a warning at each of these blocks, as a map from block id to sentence."""
-        self._show("warnings", dict(warnings))
+        self._set_state("warnings", dict(warnings))
 
     def show_value(self, id: str, words: str) -> None:
         """Show a value at a block of the program or the flyout until the next click."""
@@ -230,7 +244,7 @@ class BlocklyView(BlocklyHost):
 
     def set_absent(self, ids: Sequence[str]) -> None:
         """Show these blocks dimmed and dashed because their robot is not connected."""
-        self._show("absent", list(ids))
+        self._set_state("absent", list(ids))
 
     def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None:
         """Set the displayed values of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
@@ -305,11 +319,11 @@ class BlocklyView(BlocklyHost):
         """Restore the blocks that were deleted last, even if other edits followed."""
         self._send_command("undelete", None)
 
-    def bring_blocks(self) -> None:
+    def move_dragged_blocks(self) -> None:
         """Move the blocks dragged last from their tab into the shown one."""
         self._send_command("bring", None)
 
-    def give_blocks_back(self) -> None:
+    def undo_block_move(self) -> None:
         """Undo the last `bring_blocks` in both tabs."""
         self._send_command("giveBack", None)
 
@@ -332,14 +346,14 @@ class BlocklyView(BlocklyHost):
             return
         page = self.web.page
 
-        def act(types: object) -> None:
+        def apply_edit(types: object) -> None:
             if types:
-                page.triggerAction(page.WebAction[PAGE_EDITS[what]])
+                page.triggerAction(page.WebAction[PAGE_EDIT_ACTIONS[what]])
             else:
                 self.setFocus()
                 self._send_command("edit", what)
 
-        page.runJavaScript(TYPES, act)
+        page.runJavaScript(IS_TEXT_FIELD_FOCUSED_JS, apply_edit)
 
     def _has_focus(self) -> bool:
         focus = QApplication.focusWidget()
@@ -359,11 +373,11 @@ class BlocklyView(BlocklyHost):
 
     def open_find(self) -> None:
         """Open the bar for finding blocks in the shown program."""
-        self._ask_for("find")
+        self._request_field("find")
 
     def open_search(self) -> None:
         """Focus the search field of the toolbox."""
-        self._ask_for("search")
+        self._request_field("search")
 
     def show_help(self) -> None:
         """Show the help of the focused block, if there is one."""
@@ -375,28 +389,28 @@ class BlocklyView(BlocklyHost):
 
     # -- page -------------------------------------------------------------------------------------
 
-    def _toolbox_pinned(self, keeps: bool) -> None:
+    def _on_flyout_pinned(self, keeps: bool) -> None:
         self._pinned = keeps
         self.toolbox_pinned.emit(keeps)
 
-    def _on_screen(self, x: int, y: int) -> QPoint:
+    def _to_screen(self, x: int, y: int) -> QPoint:
         # The position may be outside the page.
         zoom = self.web.view.zoomFactor() if self.web is not None else 1.0
         view = self.web.view if self.web is not None else self
         return view.mapToGlobal(QPoint(round(x * zoom), round(y * zoom)))
 
-    def _page_came(self) -> None:
+    def _on_page_loaded(self) -> None:
         self._send_command("definitions", self._definitions)
         self._send_command("alarms", self._alarms)
         self._send_command("begin", self._first_step)
         self._send_command("backpack", self._backpack)
-        self._tabs.page_gone()
+        self._tabs.mark_unloaded()
         self._send_tab()
         pointed, self._pointed = self._pointed, None
         if pointed is not None:
             self._send_command("point", pointed)
 
-    def _page_went(self) -> None:
+    def _on_page_lost(self) -> None:
         pictures, self._pictures = self._pictures, {}
         for without in pictures.values():
             without(b"")
@@ -404,8 +418,8 @@ class BlocklyView(BlocklyHost):
         for done in waiting.values():
             done(self._tabs.shown.program)
         self.history_changed.emit(False, False)
-        self.sensors_offered.emit(())
-        self.values_watched.emit(())
+        self.visible_sensors_changed.emit(())
+        self.watched_variables_changed.emit(())
 
     def _send_tab(self) -> None:
         # Sends the program if the page doesn't have it, and the state of its blocks.
@@ -413,33 +427,33 @@ class BlocklyView(BlocklyHost):
             return
         tab = self._tabs.shown
         here: Json = {"key": tab.key}
-        if not tab.in_page:
+        if not tab.is_loaded:
             here |= {"generation": tab.generation, "workspace": tab.program.blocks}
-            tab.in_page = True
+            tab.is_loaded = True
         self._bridge.send_command("tab", here)
         for name, value in tab.states.items():
             self._bridge.send_command(name, value)
         self._bridge.send_command("live", self._live)
         self._bridge.send_command("values", self._values)
 
-    def _show(self, name: str, value: object) -> None:
+    def _set_state(self, name: str, value: object) -> None:
         states = self._tabs.shown.states
         if states.get(name) != value:
             states[name] = value
             self._send_command(name, value)
 
-    def _edited(self, key: str, generation: int, workspace: str) -> None:
-        tab = self._tabs.edited(key, generation)
+    def _on_edited(self, key: str, generation: int, workspace: str) -> None:
+        tab = self._tabs.tab_for_edit(key, generation)
         if tab is not None:
             tab.program = WorkspaceJson(workspace)
             self.changed.emit(key, tab.program)
 
-    def _drawn(self, token: int, data: str) -> None:
+    def _on_picture_rendered(self, token: int, data: str) -> None:
         done = self._pictures.pop(token, None)
         if done is not None:
-            done(data_url(data) if data.startswith("data:") else data.encode())
+            done(decode_data_url(data) if data.startswith("data:") else data.encode())
 
-    def _answered(self, token: int, workspace: str) -> None:
+    def _on_workspace_flushed(self, token: int, workspace: str) -> None:
         done = self._waiting.pop(token, None)
         if done is not None:
             done(WorkspaceJson(workspace))

@@ -6,7 +6,7 @@ import time
 from typing import TYPE_CHECKING
 
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.widgets import Chip, EmptyState
 from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.lists.scroll_areas import PanelRows
@@ -51,33 +51,33 @@ class AlertsPanel(PanelWidget):
         self.shown = active
         self.rows = [known.pop(each.id) if each.id in known else self._row(each.id) for each in active]
         for row in known.values():
-            self.pages.drop(row)
+            self.pages.remove_row(row)
         for place, (row, alert) in enumerate(zip(self.rows, active, strict=True)):
             row.set_texts(
-                alert.severity, alert.title, alert.detail, note=_since(alert), button=alert.button or ""
+                alert.severity, alert.title, alert.detail, note=_since_text(alert), button=alert.button or ""
             )
-            self.pages.put(place, row)
+            self.pages.insert_row(place, row)
         self.pages.show_rows(bool(active))
         self.chip.set(str(len(active)) if active else "", active[0].severity if active else "ok")
 
     def _row(self, alert_id: str) -> AlertRow:
         row = AlertRow(self.theme)
-        row.button.clicked.connect(lambda: self._next_step(alert_id))
+        row.button.clicked.connect(lambda: self._run_action(alert_id))
         return row
 
-    def _next_step(self, alert_id: str) -> None:
+    def _run_action(self, alert_id: str) -> None:
         action = next((alert.action for alert in self.shown if alert.id == alert_id), None)
         if action is not None:
             self.context.run(action)
 
 
-def _since(alert: ActiveAlert) -> str:
+def _since_text(alert: ActiveAlert) -> str:
     clock = time.localtime(alert.since_s)
     since = f"{clock.tm_hour}:{clock.tm_min:02d}"
     if alert.count < 2:
         return _("since {clock}").format(clock=since)
     said = ngettext("since {clock}, {count} time", "since {clock}, {count} times", alert.count)
-    return said.format(clock=since, count=grouped(alert.count))
+    return said.format(clock=since, count=group_digits(alert.count))
 
 
 PANEL = Panel("alerts", lazy("Alerts"), "bell", (), AlertsPanel)

@@ -22,7 +22,7 @@ from nep.i18n import _, ngettext
 ARMED_MINUTES = (1, 5, 15, 60)
 
 
-def left_words(seconds: float) -> str:
+def remaining_text(seconds: float) -> str:
     """Format a remaining time in minutes and seconds, such as "3:48"."""
     whole = math.ceil(seconds)
     return f"{whole // 60}:{whole % 60:02d}"
@@ -40,7 +40,7 @@ class ArmedStrip(QWidget):
         self._seen: tuple[object, ...] = ()
         self._is_on = False
         self.switch = Switch(self._theme, _("Armed"))
-        self.switch.clicked.connect(self._switched)
+        self.switch.clicked.connect(self._toggle_armed)
         self.words = label("", "small", role="textSecondary")
         self._sends = label(_("sends to"), "small", role="textSecondary")
         self.tokens: list[LinkButton] = []
@@ -85,9 +85,9 @@ class ArmedStrip(QWidget):
         """Update the switch, the targets and the counts."""
         acting = self.acting
         arming, question = acting.arming, acting.question
-        left, replaying = left_words(arming.left_s), self._context.session.is_replaying
+        left, replaying = remaining_text(arming.remaining_s), self._context.session.is_replaying
         targets = arming.targets if arming.is_on else ()
-        more = self.more_words()
+        more = self.summary_text()
         facts = (arming.is_on, left, targets, question, replaying, more)
         if facts == self._seen:
             return
@@ -96,21 +96,21 @@ class ArmedStrip(QWidget):
         self.switch.setChecked(arming.is_on)
         can_arm = self.for_replay or not replaying
         self.switch.setEnabled(can_arm or arming.is_on)
-        nothing = self.off_words() if can_arm else _("Sending is off while a recording is open")
+        nothing = self.disarmed_text() if can_arm else _("Sending is off while a recording is open")
         self.words.setText(_("{time} left").format(time=left) if arming.is_on else nothing)
         set_role(self.words, "warn" if arming.is_on else "textSecondary")
         self._sends.setVisible(bool(targets))
         self.counts.setVisible(bool(more))
         self.counts.setText(more)
         self._show_tokens(targets)
-        said = question.sentence if question is not None else ""
+        said = question.message if question is not None else ""
         self._asks.setVisible(question is not None)
         if said != self.question.text():
             self.question.setText(said)
             paint.announce(self, said)
         self.update()
 
-    def off_words(self) -> str:
+    def disarmed_text(self) -> str:
         """Return the text shown while sending is disarmed."""
         return _("Sending is off")
 
@@ -118,11 +118,11 @@ class ArmedStrip(QWidget):
         """Arm sending. Return the reason if that is not possible, else ""."""
         return self.acting.arm()
 
-    def more_words(self) -> str:
+    def summary_text(self) -> str:
         """Return a summary of the sent messages; panels that show it themselves override this."""
         return ""
 
-    def token_words(self, target: Target) -> str:
+    def token_text(self, target: Target) -> str:
         """Return the text of the token that represents a target."""
         return target.name
 
@@ -135,7 +135,7 @@ class ArmedStrip(QWidget):
             token.deleteLater()
         self.tokens = []
         for target in targets:
-            token = LinkButton(self._theme, self.token_words(target), "x")
+            token = LinkButton(self._theme, self.token_text(target), "x")
             token.setProperty("target", target.name)
             token.setAccessibleName(_("Stop sending to {name}").format(name=target.name))
             token.setToolTip(plain.tip(token.accessibleName()))
@@ -145,7 +145,7 @@ class ArmedStrip(QWidget):
         self._flow.removeWidget(self.counts)
         self._flow.addWidget(self.counts)  # keeps it last
 
-    def _switched(self) -> None:
+    def _toggle_armed(self) -> None:
         if self.acting.arming.is_on:
             self.acting.disarm()
         else:
@@ -175,10 +175,10 @@ class ArmedMinutes(Menu):
             words = ngettext("{count} minute", "{count} minutes", count).format(count=count)
             action = self._choices[count] = self.addAction(words)
             action.setCheckable(True)
-            action.triggered.connect(lambda _on=False, count=count: self._choose(count))
+            action.triggered.connect(lambda _on=False, count=count: self._set_minutes(count))
             group.addAction(action)
 
-    def _choose(self, minutes: int) -> None:
+    def _set_minutes(self, minutes: int) -> None:
         self._acting.armed_s = minutes * 60.0
 
     def entry(self) -> QAction:

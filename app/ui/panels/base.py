@@ -66,15 +66,15 @@ class PanelContext:
     toast: ShowToast
     run: Callable[[str], None]
     files: FileDialogs
-    keys_to_question: Callable[[], None] = lambda: None
+    focus_question: Callable[[], None] = lambda: None
     plot: Callable[[str, str], None] = lambda _topic, _path: None
-    open_beside: Callable[[str], None] = lambda _topic: None
-    why: Callable[[PanelWidget, str], None] = lambda _panel, _topic: None
+    open_to_side: Callable[[str], None] = lambda _topic: None
+    open_doctor: Callable[[PanelWidget, str], None] = lambda _panel, _topic: None
     panels: Callable[[], Sequence[PanelWidget]] = lambda: ()
 
 
 @dataclass(frozen=True, slots=True)
-class Hindrance:
+class Blocker:
     """Reason why a panel does not show new data, with a button that resolves it.
 
     Attributes:
@@ -84,15 +84,15 @@ class Hindrance:
         run: Action of the button.
     """
 
-    sentence: str
+    message: str
     fix: str
     button: str
     run: Callable[[], object]
 
 
-def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
+def paused_blocker(panel: str, go_on: Callable[[], object]) -> Blocker:
     """Return the hindrance of a paused panel; `panel` is its title, and `go_on` resumes it."""
-    return Hindrance(
+    return Blocker(
         _("{panel} is paused and doesn't show new data.").format(panel=panel),
         "",
         _("Resume"),
@@ -100,9 +100,9 @@ def paused_hindrance(panel: str, go_on: Callable[[], object]) -> Hindrance:
     )
 
 
-def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hindrance:
+def filter_blocker(panel: str, words: str, clear: Callable[[], object]) -> Blocker:
     """Return the hindrance of a panel with a filter; `words` is the filter's text and `panel` the title."""
-    return Hindrance(
+    return Blocker(
         _("{panel} only shows entries with “{words}”.").format(panel=panel, words=words),
         "",
         _("Clear the filter"),
@@ -110,7 +110,7 @@ def filter_hindrance(panel: str, words: str, clear: Callable[[], object]) -> Hin
     )
 
 
-def numbered(title: str, number: int) -> str:
+def numbered_title(title: str, number: int) -> str:
     """Return a numbered title, such as "Plot 2"; the number 1 is left out."""
     return title if number < 2 else _("{panel} {number}").format(panel=title, number=number)
 
@@ -133,7 +133,7 @@ class Panel:
     icon: str
     accepts: tuple[str, ...]
     make: Callable[[PanelContext], PanelWidget]
-    several: bool = False
+    allows_multiple: bool = False
 
 
 class PanelWidget(QWidget):
@@ -145,7 +145,7 @@ class PanelWidget(QWidget):
     """
 
     title_changed = Signal()
-    shows_pictures = False
+    shows_video = False
     """True if `refresh` should run 60 times a second, so that no frame of a 30 fps video is skipped."""
 
     def __init__(self, context: PanelContext, title: str) -> None:
@@ -162,7 +162,7 @@ class PanelWidget(QWidget):
         self.setAccessibleName(title)
         self.theme.changed.connect(self.theme_changed)
 
-    def show_one_of(self, *pages: QWidget) -> QStackedWidget:
+    def make_page_stack(self, *pages: QWidget) -> QStackedWidget:
         """Fill the panel, without margins, with a stack of `pages`; the first one is visible.
 
         Return the stack.
@@ -177,7 +177,7 @@ class PanelWidget(QWidget):
 
     def title(self) -> str:
         """Return the displayed title: "Plot", or "Plot 2" for the second panel of a kind."""
-        return numbered(self._title, self._number)
+        return numbered_title(self._title, self._number)
 
     def set_number(self, number: int) -> None:
         """Set the number among the panels of this kind, counted from 1."""
@@ -194,7 +194,7 @@ class PanelWidget(QWidget):
             chip.setProperty("place", "start")
         return [*self.chips, *self.header]
 
-    def replaces_title(self) -> QWidget | None:
+    def title_widget(self) -> QWidget | None:
         """Return a widget to show instead of title and subtitle, or None."""
         return None
 
@@ -247,17 +247,19 @@ class PanelWidget(QWidget):
         """Move the focus to the filter (key `/`); return False if there is none."""
         return False
 
-    def hindrances(self) -> Sequence[Hindrance]:
+    def blockers(self) -> Sequence[Blocker]:
         """Return the reasons within this panel why new data is hidden, such as pause or filter."""
         return ()
 
-    def waits_for(self) -> str:
+    def awaited_topic(self) -> str:
         """Return the topic from which no message has arrived yet; "" if the panel is not waiting for one."""
         return ""
 
-    def why(self, topic: str = "") -> EmptyAction:
+    def doctor_action(self, topic: str = "") -> EmptyAction:
         """Return the action that opens the connection doctor for a topic; "" stands for any topic."""
-        return EmptyAction(_("Why is nothing shown?"), lambda: self.context.why(self, topic), "stethoscope")
+        return EmptyAction(
+            _("Why is nothing shown?"), lambda: self.context.open_doctor(self, topic), "stethoscope"
+        )
 
     def save_state(self) -> dict[str, object]:
         """Return the panel's state for the saved layout, as JSON values."""

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QSize
 
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.no_robot import NoRobot
+from app.ui.panels.no_robot import NoRobotState
 from app.ui.panels.one_robot_panel import OneRobotPanel
-from app.ui.pictures.boxes import boxes_on, camera_of
-from app.ui.pictures.view import SILENT_AFTER_S, PictureView, RateWords
-from app.ui.text.numbers import age_words
+from app.ui.pictures.boxes import boxes_in_camera, camera_of
+from app.ui.pictures.view import STALE_AFTER_S, PictureView, RateText
+from app.ui.text.numbers import age_text
 from app.ui.widgets import Chip, EmptyAction, EmptyState, SteadyLabel
 from nep.i18n import _, lazy
 
@@ -30,7 +30,7 @@ REFRESH_INTERVAL_S = 0.1
 class CameraPanel(OneRobotPanel):
     """Camera of the chosen robot, or of the first robot that has one."""
 
-    shows_pictures = True
+    shows_video = True
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Camera"))
@@ -39,7 +39,7 @@ class CameraPanel(OneRobotPanel):
         # has a fixed width: the topic next to it is elided instead
         self.rate = SteadyLabel("body", "textSecondary", least=110)
         self.header = [self.rate]
-        self._rates = RateWords()
+        self._rates = RateText()
         self._detecting: tuple[str, ...] = ()
         self._seen: tuple[object, ...] = ()
         self._size = QSize()
@@ -54,17 +54,17 @@ class CameraPanel(OneRobotPanel):
         )
         start = EmptyAction(_("Use the virtual robot"), lambda: context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "camera", title, text, [start])
-        self._no_robot = NoRobot(self.empty, title, text, [start])
-        self._no_robot.set_starting(self.session.coming)
-        self.pages = self.show_one_of(self.empty, self.view)
+        self._no_robot = NoRobotState(self.empty, title, text, [start])
+        self._no_robot.set_starting(self.session.starting_robots)
+        self.pages = self.make_page_stack(self.empty, self.view)
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
-            self._no_robot.set_starting(self.session.coming)
+            self._no_robot.set_starting(self.session.starting_robots)
         if self._stream is None or link is None:
             return
         silent_s = self._stream.silent_s
-        seen, size, now = self._seen_now(link, silent_s), self.view.size(), time.monotonic()
+        seen, size, now = self._snapshot(link, silent_s), self.view.size(), time.monotonic()
         if (
             now < self._looks_s
             and size == self._size
@@ -72,29 +72,29 @@ class CameraPanel(OneRobotPanel):
             and all(map(is_, seen, self._seen))
         ):
             return  # called 60 times a second, mostly without a new image
-        self.view.show_image(self._stream, boxes_on(link, self._topic))
-        silent = silent_s is not None and silent_s > SILENT_AFTER_S
-        sentence = self._rates.of(self._stream)
+        self.view.show_image(self._stream, boxes_in_camera(link, self._topic))
+        silent = silent_s is not None and silent_s > STALE_AFTER_S
+        sentence = self._rates.for_stream(self._stream)
         self.rate.setText("" if silent else sentence)
-        self.chip.set(_("silent for {age}").format(age=age_words(silent_s)) if silent else "", "error")
+        self.chip.set(_("silent for {age}").format(age=age_text(silent_s)) if silent else "", "error")
         if self._stream.picture is not None:
             self.pages.setCurrentWidget(self.view)
         self._seen, self._size, self._looks_s = seen, size, now + REFRESH_INTERVAL_S
 
-    def _seen_now(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
+    def _snapshot(self, link: RobotLink, silent_s: float | None) -> tuple[object, ...]:
         # Unchanged items must be the identical objects of the last call.
         found = (link.values.get(name) for name in self._detecting)
         picture = self._stream.picture if self._stream is not None else None
         return (picture, None if silent_s is None else int(silent_s * 2), *found)
 
-    def wanted_robot(self) -> RobotLink | None:
+    def robot_to_show(self) -> RobotLink | None:
         """Return the chosen robot if it has a camera, else the first connected robot with a camera."""
         fleet = self.session.fleet
         shown = fleet.current
-        there = [shown, *fleet.connected] if shown is not None and shown.connected else fleet.connected
+        there = [shown, *fleet.connected] if shown is not None and shown.is_connected else fleet.connected
         return next((link for link in there if camera_of(link) is not None), None)
 
-    def key_of(self, link: RobotLink) -> object:
+    def rebuild_key(self, link: RobotLink) -> object:
         return (link.name, _topic_of(link))
 
     def show_robot(self, link: RobotLink) -> None:

@@ -14,16 +14,16 @@ from PySide6.QtGui import QAction, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout
 
 from app.core.network.topics import split_key
-from app.core.networks.networks import LOOK_COMMAND, lost_words, topic_words
+from app.core.networks.networks import BROWSE_COMMAND, lost_message, topic_label
 from app.core.reports import not_installed
-from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget
+from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyState, IconButton, Separator, label
 from app.ui.widgets.cards import AlertRow
 from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import PanelRows
 from nep.errors import nearest
 from nep.i18n import _, lazy, ngettext, number
-from nep.programs.doctor import Finding, in_order, report
+from nep.programs.doctor import Finding, report_text, sort_findings
 
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
 BAD_SEVERITIES = frozenset({"error", "warning"})
@@ -37,9 +37,9 @@ MAX_TOPICS = 500
 class NextStep:
     """Button of a finding: its text and action."""
 
-    words: str
+    text: str
     run: Callable[[], object]
-    fixes: bool = True
+    is_fix: bool = True
     """True if the step fixes the problem; the doctor then runs its checks again."""
 
 
@@ -52,7 +52,7 @@ class DoctorPanel(PanelWidget):
         self._offered: tuple[object, ...] = ()
         self._master = ""
         self._asker: PanelWidget | None = None
-        self._own: list[Hindrance] = []
+        self._own: list[Blocker] = []
         self._waits: dict[tuple[PanelWidget, str], float] = {}  # start of waiting, by panel and topic
         self._near: dict[str, str | None] = {}
         self._told: tuple[object, ...] = ()
@@ -70,7 +70,7 @@ class DoctorPanel(PanelWidget):
         )
         self.pages = PanelRows(self.empty, _("Connection doctor"))
         self.missed = ComboBox(self.theme, name=_("Missing topic"))
-        self.missed.activated.connect(self._choose_missed)
+        self.missed.activated.connect(self._set_missed_topic)
         self._arrange()
 
     def _arrange(self) -> None:
@@ -85,7 +85,7 @@ class DoctorPanel(PanelWidget):
         top.addWidget(self.looked, 1)
         self.terminal = ElidedLabel("small", "textSecondary", least=40)
         self.copy = Button(self.theme, _("Copy the report"), "copy", size="small")
-        self.copy.let_shrink()
+        self.copy.allow_shrinking()
         self.copy.clicked.connect(self.copy_report)
         foot = QHBoxLayout()
         foot.setContentsMargins(12, 5, 12, 6)
@@ -102,16 +102,16 @@ class DoctorPanel(PanelWidget):
 
     # -- display ------------------------------------------------------------------------------------------
 
-    def begin_for(self, asker: PanelWidget | None) -> None:
+    def check_panel(self, asker: PanelWidget | None) -> None:
         """Include findings about this panel. The caller sets the topic of the doctor before."""
         if self._asker is not None:
-            self._asker.destroyed.disconnect(self._forget_asker)
+            self._asker.destroyed.disconnect(self._clear_asker)
         self._asker = asker
         if asker is not None:
-            asker.destroyed.connect(self._forget_asker)
+            asker.destroyed.connect(self._clear_asker)
         self.refresh()
 
-    def _forget_asker(self) -> None:
+    def _clear_asker(self) -> None:
         self._asker = None
 
     def refresh(self) -> None:
@@ -120,68 +120,66 @@ class DoctorPanel(PanelWidget):
             # the master changed while the panel is open: earlier findings are outdated
             self._master = self.session.master.kind
             doctor.start()
-        elif doctor.told_of != doctor.missed and not doctor.looking:
+        elif doctor.checked_topic != doctor.expected_topic and not doctor.is_running:
             doctor.start()
-        self._offer_topics()
-        own = list(self._hindrances())
-        told = tuple((each.sentence, each.button) for each in own)
-        now = (doctor.revision, doctor.looking, told)
+        self._update_topics()
+        own = list(self._blockers())
+        told = tuple((each.message, each.button) for each in own)
+        now = (doctor.revision, doctor.is_running, told)
         if now == self._seen:
             return
         self._seen = now
-        self.again.setEnabled(not doctor.looking)
-        so_far = doctor.so_far
-        is_new = doctor.looked_s is None or doctor.told_of != doctor.missed
-        if so_far is None and doctor.looked_s is None:
+        self.again.setEnabled(not doctor.is_running)
+        so_far = doctor.partial_findings
+        is_new = doctor.finished_s is None or doctor.checked_topic != doctor.expected_topic
+        if so_far is None and doctor.finished_s is None:
             return
         self._own = own  # earlier findings stay visible until the next check is done
-        found = self._all(own, so_far if so_far is not None and is_new else doctor.findings)
+        found = self._merge_findings(own, so_far if so_far is not None and is_new else doctor.findings)
         if found != self.shown or told != self._told:
             self._told = told
             self._show(found)
-        if doctor.looked_s is not None:
-            self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.looked_s)))
+        if doctor.finished_s is not None:
+            self.set_title(self.title(), time.strftime("%H:%M:%S", time.localtime(doctor.finished_s)))
         self._show_chip(is_done=so_far is None)
-        self._say_looked(is_done=so_far is None)
+        self._update_progress(is_done=so_far is None)
         self.pages.show_rows(bool(self.rows))
 
     @staticmethod
-    def _all(own: Sequence[Hindrance], found: Sequence[Finding]) -> list[Finding]:
-        here = [
-            Finding(f"studio:{place}", "error", each.sentence, each.fix) for place, each in enumerate(own)
-        ]
-        return list(in_order([*here, *found]))
+    def _merge_findings(own: Sequence[Blocker], found: Sequence[Finding]) -> list[Finding]:
+        here = [Finding(f"studio:{place}", "error", each.message, each.fix) for place, each in enumerate(own)]
+        return list(sort_findings([*here, *found]))
 
-    def _hindrances(self) -> Iterator[Hindrance]:
-        session, topic = self.session, self.session.doctor.missed
+    def _blockers(self) -> Iterator[Blocker]:
+        session, topic = self.session, self.session.doctor.expected_topic
         libraries = session.alerts.get(not_installed.ALERT)
         if libraries is not None:
-            yield Hindrance(libraries.title, libraries.detail, "", lambda: None)
+            yield Blocker(libraries.title, libraries.detail, "", lambda: None)
         if session.replay is not None and (topic or self._asker is not None):
-            yield self._replay_hides(topic)
+            yield self._replay_blocker(topic)
         network = session.live.networks.get(split_key(topic)[0])
         if network is not None:
-            yield from self._network_hides(topic, lost_words(network))
+            yield from self._network_blockers(topic, lost_message(network))
         if self._asker is not None:
-            yield from self._asker.hindrances()
-        yield from self._waiting()
+            yield from self._asker.blockers()
+        yield from self._waiting_blockers()
 
-    def _waiting(self) -> Iterator[Hindrance]:
+    def _waiting_blockers(self) -> Iterator[Blocker]:
         # Without the missing topic, which the other findings are about.
-        missed, now = self.session.doctor.missed, time.monotonic()
+        missed, now = self.session.doctor.expected_topic, time.monotonic()
         shown = self.context.panels() if self.session.replay is None else ()
-        waiting = {(panel, topic) for panel in shown if (topic := panel.waits_for()) and topic != missed}
+        waiting = {(panel, topic) for panel in shown if (topic := panel.awaited_topic()) and topic != missed}
         self._waits = {each: self._waits.get(each, now) for each in waiting}
         for panel, topic in sorted(waiting, key=lambda each: (each[0].title(), each[1])):
             if now - self._waits[panel, topic] >= WAIT_REPORT_S:
-                yield self._panel_waits(panel, topic)
+                yield self._waiting_blocker(panel, topic)
 
-    def _panel_waits(self, panel: PanelWidget, topic: str) -> Hindrance:
-        live, names = self.session.live, {"panel": panel.title(), "topic": topic_words(topic)}
-        ask = (_("Why is nothing shown?"), lambda: self.context.why(panel, topic))
+    def _waiting_blocker(self, panel: PanelWidget, topic: str) -> Blocker:
+        live, names = self.session.live, {"panel": panel.title(), "topic": topic_label(topic)}
+        ask = (_("Why is nothing shown?"), lambda: self.context.open_doctor(panel, topic))
         known = live.topics.get(topic)
         if split_key(topic)[0] or (known is not None and known.publisher_nodes):
-            return Hindrance(
+            return Blocker(
                 _("{panel} is waiting for {topic}; no message has arrived.").format(**names), "", *ask
             )
         sentence = _("{panel} is waiting for {topic}, which has no publisher.").format(**names)
@@ -190,30 +188,30 @@ class DoctorPanel(PanelWidget):
             self._near = {topic: nearest(topic, sent[:MAX_TOPICS])}
         near = self._near[topic]
         if near is None:
-            return Hindrance(sentence, "", *ask)
+            return Blocker(sentence, "", *ask)
         fix, use = _("Did you mean {topic}?"), _("Use {topic}")
-        return Hindrance(
+        return Blocker(
             sentence, fix.format(topic=near), use.format(topic=near), lambda: panel.show_topic(near)
         )
 
-    def _replay_hides(self, topic: str) -> Hindrance:
+    def _replay_blocker(self, topic: str) -> Blocker:
         recorded = not topic or self.session.topics.get(topic) is not None
         sentence = _("A recording is open, so panels show recorded data instead of live data.")
         if not recorded:
-            sentence = _("A recording is open and {topic} is not in it.").format(topic=topic_words(topic))
+            sentence = _("A recording is open and {topic} is not in it.").format(topic=topic_label(topic))
         fix = _("The checks below are about the live network.")
-        return Hindrance(sentence, fix, _("Back to live"), lambda: self.context.run("replay.live"))
+        return Blocker(sentence, fix, _("Back to live"), lambda: self.context.run("replay.live"))
 
-    def _network_hides(self, topic: str, lost: str) -> Iterator[Hindrance]:
+    def _network_blockers(self, topic: str, lost: str) -> Iterator[Blocker]:
         # Topics of another network: the doctor can't check them.
-        unread = self.session.live.networks.unread(topic)
-        words = lost or (f"{topic_words(topic)}: {unread}." if unread else "")
+        unread = self.session.live.networks.read_problem(topic)
+        words = lost or (f"{topic_label(topic)}: {unread}." if unread else "")
         if words:
             fix = _("Check its address, and its password or key if it needs one.")
-            yield Hindrance(words, fix, _("Other networks"), lambda: self.context.run(LOOK_COMMAND))
+            yield Blocker(words, fix, _("Other networks"), lambda: self.context.run(BROWSE_COMMAND))
 
-    def _offer_topics(self) -> None:
-        live, missed = self.session.live, self.session.doctor.missed
+    def _update_topics(self) -> None:
+        live, missed = self.session.live, self.session.doctor.expected_topic
         facts = (live.topics.revision, live.networks.revision, missed)
         if facts == self._offered or self.missed.view().isVisible():
             return
@@ -222,12 +220,12 @@ class DoctorPanel(PanelWidget):
         self.missed.clear()
         self.missed.addItem(_("no specific topic"), "")
         for name in sorted({*names[:MAX_TOPICS], missed} - {""}):
-            self.missed.addItem(topic_words(name), name)
+            self.missed.addItem(topic_label(name), name)
         self.missed.set_value(missed)
         command = f"nep doctor {missed}" if missed and not split_key(missed)[0] else "nep doctor"
         self.terminal.setText(_("In a terminal: {command}").format(command=command))
 
-    def _say_looked(self, *, is_done: bool) -> None:
+    def _update_progress(self, *, is_done: bool) -> None:
         doctor = self.session.doctor
         done, count = (number(each, ".0f") for each in (doctor.looked_at, doctor.things))
         if not is_done:
@@ -240,14 +238,14 @@ class DoctorPanel(PanelWidget):
 
     def _show(self, found: Sequence[Finding]) -> None:
         for row in self.rows:
-            self.pages.drop(row)
+            self.pages.remove_row(row)
         self.shown = list(found)
-        steps = [self._step(finding) for finding in found]
-        fixes = [place for place, step in enumerate(steps) if step is not None and step.fixes]
+        steps = [self._next_step(finding) for finding in found]
+        fixes = [place for place, step in enumerate(steps) if step is not None and step.is_fix]
         self.rows = [self._row(finding, step) for finding, step in zip(found, steps, strict=True)]
         for place, row in enumerate(self.rows):
             row.button.set_kind("primary" if place in fixes[:1] else "plain")
-            self.pages.put(place, row)
+            self.pages.insert_row(place, row)
 
     def _show_chip(self, *, is_done: bool) -> None:
         bad = [each.severity for each in self.shown if each.severity in BAD_SEVERITIES]
@@ -265,14 +263,14 @@ class DoctorPanel(PanelWidget):
             finding.sentence,
             finding.fix,
             command=finding.command,
-            button=step.words if step is not None else "",
+            button=step.text if step is not None else "",
         )
-        row.button.clicked.connect(lambda: self._do(finding, step))
+        row.button.clicked.connect(lambda: self._run_step(finding, step))
         return row
 
     # -- next steps ---------------------------------------------------------------------------------------
 
-    def _step(self, finding: Finding) -> NextStep | None:
+    def _next_step(self, finding: Finding) -> NextStep | None:
         kind, _colon, rest = finding.id.partition(":")
         if kind == "studio" and not self._own[int(rest)].button:
             return None
@@ -280,7 +278,7 @@ class DoctorPanel(PanelWidget):
             return NextStep(self._own[int(rest)].button, self._own[int(rest)].run)
         if finding.id == "topic:near":
             words = _("Use {topic}").format(topic=finding.instead)
-            return NextStep(words, lambda: self._use(finding.instead))
+            return NextStep(words, lambda: self._use_topic(finding.instead))
         if kind == "topic" and finding.instead:
             return NextStep(
                 _("Call {service}").format(service=finding.instead),
@@ -288,20 +286,20 @@ class DoctorPanel(PanelWidget):
             )
         run = {
             "topic:closed": (_("Let other computers connect"), "network.others"),
-            "topic:unreadable": (_("Show the bytes"), f"inspect:{self.session.doctor.missed}"),
+            "topic:unreadable": (_("Show the bytes"), f"inspect:{self.session.doctor.expected_topic}"),
             "topic:name": (_("Choose a topic"), "panel:topics"),
         }.get(finding.id)
         if run is not None:
             return NextStep(
-                run[0], lambda: self.context.run(run[1]), fixes=finding.severity in BAD_SEVERITIES
+                run[0], lambda: self.context.run(run[1]), is_fix=finding.severity in BAD_SEVERITIES
             )
         if finding.id == "master:none":
             return NextStep(_("Start the master"), self._start_master)
         if finding.command:
-            return NextStep(_("Copy the command"), lambda: self._copy_command(finding.command), fixes=False)
+            return NextStep(_("Copy the command"), lambda: self._copy_command(finding.command), is_fix=False)
         return None
 
-    def _do(self, finding: Finding, step: NextStep | None) -> None:
+    def _run_step(self, finding: Finding, step: NextStep | None) -> None:
         if step is None:
             return
         step.run()
@@ -309,12 +307,12 @@ class DoctorPanel(PanelWidget):
             self.session.doctor.start()
             self.context.toast(_("Done. Checking again"))
 
-    def _use(self, topic: str) -> None:
+    def _use_topic(self, topic: str) -> None:
         if self._asker is not None:
             self._asker.show_topic(topic)
         else:
             self.context.open_topic(topic)
-        self.session.doctor.miss(topic)
+        self.session.doctor.expect_topic(topic)
         self.context.toast(_("Opened {topic}. Checking again").format(topic=topic))
 
     def _start_master(self) -> None:
@@ -325,15 +323,15 @@ class DoctorPanel(PanelWidget):
         QGuiApplication.clipboard().setText(command)
         self.context.toast(_("Copied “{command}”").format(command=command))
 
-    def _choose_missed(self) -> None:
-        self.session.doctor.miss(self.missed.value)
-        self.begin_for(None)
+    def _set_missed_topic(self) -> None:
+        self.session.doctor.expect_topic(self.missed.value)
+        self.check_panel(None)
 
     def copy_report(self) -> None:
         """Copy all findings to the clipboard as a report."""
-        missed = self.session.doctor.missed
-        about = _("Missing: {topic}").format(topic=topic_words(missed)) + "\n" if missed else ""
-        QGuiApplication.clipboard().setText(about + report(self.shown))
+        missed = self.session.doctor.expected_topic
+        about = _("Missing: {topic}").format(topic=topic_label(missed)) + "\n" if missed else ""
+        QGuiApplication.clipboard().setText(about + report_text(self.shown))
         self.context.toast(_("Copied the report"))
 
     def more_actions(self) -> Sequence[QAction]:

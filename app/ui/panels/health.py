@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QVBoxLayout,
 
 from app.core.robots.health_facts import HealthFact, facts_of
 from app.ui.panels.base import Density, Panel, PanelContext
-from app.ui.panels.no_robot import NoRobot
+from app.ui.panels.no_robot import NoRobotState
 from app.ui.panels.one_robot_panel import OneRobotPanel
-from app.ui.text.numbers import age_words
+from app.ui.text.numbers import age_text
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, Scrolled, label, paint
+from app.ui.widgets import Button, Chip, ContentScrollArea, EmptyAction, EmptyState, label, paint
 from app.ui.widgets.indicators import StatusIcon
 from nep.i18n import _, lazy, ngettext
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 TITLE_WIDTH = 96
-TITLE_BESIDE_WIDTH = 300
+ONE_LINE_MIN_WIDTH = 300
 ROW_HEIGHTS = {"compact": 22, "comfortable": 28}
 TEXT_FONTS = {"compact": "body", "comfortable": "bodyLarge"}
 
@@ -53,7 +53,7 @@ class HealthRow(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        beside = self.width() >= self._theme.scaled(TITLE_BESIDE_WIDTH)
+        beside = self.width() >= self._theme.scaled(ONE_LINE_MIN_WIDTH)
         way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         self.title.setMinimumWidth(round(self._theme.scaled(TITLE_WIDTH)) if beside else 0)
         space = self._space
@@ -69,9 +69,9 @@ class HealthRow(QWidget):
         self.fact = fact
         self.icon.set(fact.status)
         self.title.setText(_(fact.title))
-        self.words.setText(fact.words)
+        self.words.setText(fact.text)
         self.setAccessibleName(_(fact.title))
-        self.setAccessibleDescription(fact.words)
+        self.setAccessibleDescription(fact.text)
 
 
 class HealthPanel(OneRobotPanel):
@@ -89,8 +89,8 @@ class HealthPanel(OneRobotPanel):
             EmptyAction(_("Find the cause"), lambda: context.run("help.doctor"), "stethoscope"),
         ]
         self.empty = EmptyState(self.theme, "bot", title, text, steps)
-        self._no_robot = NoRobot(self.empty, title, text, steps)
-        self._no_robot.set_starting(self.session.coming)
+        self._no_robot = NoRobotState(self.empty, title, text, steps)
+        self._no_robot.set_starting(self.session.starting_robots)
         self.step = Button(self.theme, _("Restart it"), "rotate-ccw", size="small")
         self.step.clicked.connect(self._do_next_step)
         inside = QWidget()
@@ -104,17 +104,17 @@ class HealthPanel(OneRobotPanel):
         below.addStretch(1)
         self._column.addWidget(self._below)
         self._column.addStretch(1)
-        self._scroll = Scrolled(inside)
+        self._scroll = ContentScrollArea(inside)
         self._scroll.setAccessibleName(_("Robot status"))
         self._scroll.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self._scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.pages = self.show_one_of(self.empty, self._scroll)
+        self.pages = self.make_page_stack(self.empty, self._scroll)
         self.pages.setMinimumSize(1, 1)
 
     # -- display ------------------------------------------------------------------------------------------
 
     def fleet_changed(self) -> None:
-        link = self.wanted_robot()
+        link = self.robot_to_show()
         self.pages.setCurrentIndex(0 if link is None else 1)
         if link is not None:
             self.set_title(_("Health"), link.name if len(self.session.fleet.links) > 1 else "")
@@ -122,9 +122,9 @@ class HealthPanel(OneRobotPanel):
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
             self.chip.set("")
-            self._no_robot.set_starting(self.session.coming)
+            self._no_robot.set_starting(self.session.starting_robots)
             return
-        facts = facts_of(link, self.session.live.topics, time.monotonic(), _whole_age)
+        facts = facts_of(link, self.session.live.topics, time.monotonic(), _age_text)
         if facts != self._facts:
             self._facts = facts
             self._show(facts, link)
@@ -133,12 +133,12 @@ class HealthPanel(OneRobotPanel):
         self._make_rows(len(facts))
         for row, fact in zip(self.rows, facts, strict=True):
             row.show_fact(fact)
-        wrong = [fact for fact in facts if fact.to_look_at]
+        wrong = [fact for fact in facts if fact.needs_attention]
         worst = "error" if any(fact.status == "error" for fact in wrong) else "warn"
         said = ngettext("{count} warning", "{count} warnings", len(wrong)).format(count=len(wrong))
         self.chip.set(said if wrong else "", worst)
         self.step.setText(_("Restart it") if link.virtual else _("Find the cause"))
-        self._below.setVisible(not link.connected or link.mute)
+        self._below.setVisible(not link.is_connected or link.is_unresponsive)
 
     def _make_rows(self, count: int) -> None:
         # The button stays below the first row.
@@ -167,8 +167,8 @@ class HealthPanel(OneRobotPanel):
         self._facts = ()
 
 
-def _whole_age(age_s: float) -> str:
-    return f"{max(1, int(age_s))} s" if age_s < 60 else age_words(age_s)
+def _age_text(age_s: float) -> str:
+    return f"{max(1, int(age_s))} s" if age_s < 60 else age_text(age_s)
 
 
 PANEL = Panel("health", lazy("Health"), "heart", (), HealthPanel)

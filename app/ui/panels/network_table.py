@@ -11,9 +11,9 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.network.source import NODE_NAME
-from app.core.networks.networks import LOOK_COMMAND, lost_words
+from app.core.networks.networks import BROWSE_COMMAND, lost_message
 from app.ui.panels.base import PanelContext
-from app.ui.panels.table_panel import TablePanel, TableWords
+from app.ui.panels.table_panel import TablePanel, TableTexts
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, label
 from app.ui.widgets.buttons import LinkButton
@@ -26,25 +26,25 @@ Row = TypeVar("Row")
 class NetworkTable(TablePanel[Row]):
     """Table panel with a line below the table that reports unreachable networks."""
 
-    def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
+    def __init__(self, context: PanelContext, words: TableTexts, icon: str) -> None:
         super().__init__(context, words, icon)
         self.networks = NetworkLine(self.theme, context.run)
         self._networks_seen = 0
         self._others = QAction(self.theme.icon("waypoints"), _("Other networks"), self)
-        self._others.triggered.connect(lambda _on=False: context.run(LOOK_COMMAND))
+        self._others.triggered.connect(lambda _on=False: context.run(BROWSE_COMMAND))
 
-    def has_several(self) -> bool:
+    def has_other_networks(self) -> bool:
         """Return True if other networks are shown as well."""
-        return bool(self.session.networks.chosen)
+        return bool(self.session.networks.selected)
 
     def show_networks(self) -> None:
         """Update the line with unreachable networks.
 
         The network column is shown if there are several networks.
         """
-        self.networks.set_sentences([lost_words(each) for each in self.session.networks.chosen])
-        if self._networks_seen != len(self.session.networks.chosen):
-            self._networks_seen = len(self.session.networks.chosen)
+        self.networks.set_messages([lost_message(each) for each in self.session.networks.selected])
+        if self._networks_seen != len(self.session.networks.selected):
+            self._networks_seen = len(self.session.networks.selected)
             self.table.fit_columns()
 
     def more_actions(self) -> list[QAction]:
@@ -60,7 +60,7 @@ class NetworkLine(QWidget):
         self.words.setMinimumWidth(0)
         self.button = LinkButton(theme, _("Other networks"))
         self.button.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
-        self.button.clicked.connect(lambda: run(LOOK_COMMAND))
+        self.button.clicked.connect(lambda: run(BROWSE_COMMAND))
         row = QHBoxLayout()
         row.setContentsMargins(12, 5, 12, 5)
         row.setSpacing(8)
@@ -73,14 +73,14 @@ class NetworkLine(QWidget):
         column.addLayout(row)
         self.hide()
 
-    def set_sentences(self, sentences: Sequence[str]) -> None:
+    def set_messages(self, sentences: Sequence[str]) -> None:
         """Show the sentences, one per line; the widget is hidden if all are empty."""
         said = "\n".join(filter(None, sentences))
         self.words.setText(said)
         show_when(self, bool(said))
 
 
-def own_everywhere(nodes: Iterable[str]) -> bool:
+def are_own_nodes(nodes: Iterable[str]) -> bool:
     """Return True if all nodes are Studio's own on another network. ROS names nodes after the process."""
     process = f"{NODE_NAME}_{os.getpid()}_"
     names = [name.lstrip("/") for name in nodes]

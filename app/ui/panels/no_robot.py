@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.core.run.view import connected_words
+from app.core.run.view import connected_text
 from app.ui.widgets import EmptyAction, EmptyState
 from nep.i18n import _
 
 
-class NoRobot:
+class NoRobotState:
     """Switches an `EmptyState` between "no robot" and "robot is starting"."""
 
     def __init__(self, empty: EmptyState, title: str, text: str, actions: Sequence[EmptyAction] = ()) -> None:
@@ -23,7 +23,7 @@ class NoRobot:
         self._coming = coming
         if coming:
             self._empty.set_texts(
-                connected_words((), coming), _("A virtual robot takes a few seconds to start.")
+                connected_text((), coming), _("A virtual robot takes a few seconds to start.")
             )
             self._empty.set_actions(())
         else:

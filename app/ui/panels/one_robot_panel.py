@@ -40,26 +40,30 @@ class OneRobotPanel(PanelWidget):
         if fleet.revision != self._revision:
             self._revision = fleet.revision
             self.fleet_changed()
-            link = self.wanted_robot()
-            if link is not None and self.key_of(link) != self._shown:
-                self.turn_to(link)
+            link = self.robot_to_show()
+            if link is not None and self.rebuild_key(link) != self._shown:
+                self.switch_to(link)
         self.refresh_robot(fleet.link(self._robot) if self._robot else None)
 
-    def turn_to(self, link: RobotLink) -> None:
+    def switch_to(self, link: RobotLink) -> None:
         """Show another robot and watch its topics."""
         self.dispose()
-        self._robot, self._shown, self._revision = link.name, self.key_of(link), self.session.fleet.revision
-        self._watch = self.session.fleet.look_at(link.name)
+        self._robot, self._shown, self._revision = (
+            link.name,
+            self.rebuild_key(link),
+            self.session.fleet.revision,
+        )
+        self._watch = self.session.fleet.watch_sensors(link.name)
         self.show_robot(link)
 
     # -- overridden by subclasses -------------------------------------------------------------------------
 
-    def wanted_robot(self) -> RobotLink | None:
+    def robot_to_show(self) -> RobotLink | None:
         """Return the robot to show; None keeps the current one."""
         fleet = self.session.fleet
         return fleet.current or fleet.link(self._robot)
 
-    def key_of(self, link: RobotLink) -> object:
+    def rebuild_key(self, link: RobotLink) -> object:
         """Return a value that changes when the panel's widgets must be rebuilt by `show_robot`."""
         return link.name
 

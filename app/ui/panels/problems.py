@@ -13,16 +13,16 @@ from PySide6.QtWidgets import (
 )
 
 from app.blocks import Problem
-from app.core.documents.problems import Listed, Mend, listed
+from app.core.documents.problems import Fix, ProblemLine, problem_lines
 from app.core.reports import not_installed
 from app.core.robots.launcher import VIRTUAL_ROBOTS
 from app.ui.panels.base import Density, Panel, PanelContext, PanelWidget
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Chip, Scrolled, label, paint
+from app.ui.widgets import Button, Chip, ContentScrollArea, label, paint
 from app.ui.widgets.cards import Tile
 from app.ui.widgets.indicators import StatusIcon
-from app.ui.widgets.keyboard import is_pressed_key
+from app.ui.widgets.keyboard import is_activation_key
 from app.ui.widgets.labels import BoldInLine
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, ngettext
@@ -43,16 +43,16 @@ class ProblemRow(QWidget):
     """Row of a problem: icon, block, sentence with its subject in bold, and buttons with fixes."""
 
     pressed = Signal(str)
-    fix = Signal(str)
-    stepped = Signal(int)
+    fix_requested = Signal(str)
+    step_requested = Signal(int)
 
-    def __init__(self, theme: Theme, line: Listed, *, large: bool) -> None:
+    def __init__(self, theme: Theme, line: ProblemLine, *, large: bool) -> None:
         super().__init__()
         problem = line.problem
         self._theme, self.line, self.problem, self._large = theme, line, problem, large
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         severity = _(SEVERITIES[problem.severity])
-        said = _("{severity}: {sentence}").format(severity=severity, sentence=problem.sentence)
+        said = _("{severity}: {sentence}").format(severity=severity, sentence=problem.message)
         self.setAccessibleName(said)
         self.setProperty("focusRadius", theme.radius("small"))
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -69,14 +69,14 @@ class ProblemRow(QWidget):
         if problem.category:
             row.addWidget(Tile(theme, icon, category, 22))
         kind = "bodyLarge" if large else "body"
-        row.addWidget(BoldInLine(theme, problem.sentence, problem.subject, kind), 1)
-        self.buttons = [self._fix(fix) for fix in line.fixes]
+        row.addWidget(BoldInLine(theme, problem.message, problem.subject, kind), 1)
+        self.buttons = [self._make_fix_button(fix) for fix in line.fixes]
         for button in self.buttons:
             row.addWidget(button)
 
-    def _fix(self, fix: Mend) -> Button:
-        button = Button(self._theme, fix.words, size="small")
-        button.clicked.connect(lambda: self.fix.emit(fix.action))
+    def _make_fix_button(self, fix: Fix) -> Button:
+        button = Button(self._theme, fix.label, size="small")
+        button.clicked.connect(lambda: self.fix_requested.emit(fix.action))
         return button
 
     def holds_focus(self) -> bool:
@@ -93,10 +93,10 @@ class ProblemRow(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         steps = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
-        if is_pressed_key(event.key()):
+        if is_activation_key(event.key()):
             self._press()
         elif event.key() in steps:
-            self.stepped.emit(steps[Qt.Key(event.key())])
+            self.step_requested.emit(steps[Qt.Key(event.key())])
         else:
             super().keyPressEvent(event)
 
@@ -120,7 +120,7 @@ class ProblemsPanel(PanelWidget):
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self._program: Program | None = None
         self._of_editor: ActiveAlert | None = None
-        self._found: tuple[Listed, ...] | None = None
+        self._found: tuple[ProblemLine, ...] | None = None
         self.rows: list[ProblemRow] = []
         self.chip = Chip(self.theme)
         self.chips = [self.chip]
@@ -134,11 +134,11 @@ class ProblemsPanel(PanelWidget):
         self._column.insertWidget(0, self.others)
         self.nothing = label(_(NO_PROBLEMS), "bodyLarge", role="textSecondary", wrap=True)
         self.nothing.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.pages = self.show_one_of(Scrolled(self.nothing), self._scroll)
+        self.pages = self.make_page_stack(ContentScrollArea(self.nothing), self._scroll)
 
     def refresh(self) -> None:
         document = self.session.document
-        program = document.newest()
+        program = document.newest_program()
         if program is None:
             self.checked.setText(_("Checking"))
             return
@@ -147,7 +147,7 @@ class ProblemsPanel(PanelWidget):
             return
         self._program, self._of_editor = program, of_editor
         self.checked.setText(_("Checked as you build"))
-        found = listed(
+        found = problem_lines(
             program.problems,
             document.workspace if program.absent else {},  # parsed only if robots are missing
             self._missing(document),
@@ -157,17 +157,17 @@ class ProblemsPanel(PanelWidget):
         )
         if of_editor is not None:
             sentence = f"{of_editor.title} {of_editor.detail}"
-            found = (Listed(Problem("error", None, None, of_editor.title, sentence), ()), *found)
+            found = (ProblemLine(Problem("error", None, None, of_editor.title, sentence), ()), *found)
         if found != self._found:
             self._found = found
             self._show(found)
 
     def _missing(self, document: Document) -> list[Robot]:
         # As described in the behaviour, else as last reported on the network.
-        seen = {link.name: link.robot for link in self.session.fleet.links if not link.connected}
-        return list({**seen, **{robot.name: robot for robot in document.absent}}.values())
+        seen = {link.name: link.robot for link in self.session.fleet.links if not link.is_connected}
+        return list({**seen, **{robot.name: robot for robot in document.absent_robots}}.values())
 
-    def _show(self, found: tuple[Listed, ...]) -> None:
+    def _show(self, found: tuple[ProblemLine, ...]) -> None:
         # Existing rows are reused, so that they don't lose the focus.
         kept = {row.line: row for row in self.rows}
         held = False
@@ -191,11 +191,11 @@ class ProblemsPanel(PanelWidget):
             (self.rows[0] if self.rows else self).setFocus(Qt.FocusReason.OtherFocusReason)
         self._count(found)
 
-    def _row(self, line: Listed) -> ProblemRow:
+    def _row(self, line: ProblemLine) -> ProblemRow:
         row = ProblemRow(self.theme, line, large=self.density == "comfortable")
         row.pressed.connect(lambda block: self.context.run(f"block:{block}"))
-        row.fix.connect(self.context.run)
-        row.stepped.connect(lambda step: self._step(row, step))
+        row.fix_requested.connect(self.context.run)
+        row.step_requested.connect(lambda step: self._step(row, step))
         return row
 
     def _step(self, row: ProblemRow, step: int) -> None:
@@ -208,14 +208,14 @@ class ProblemsPanel(PanelWidget):
         self.refresh()  # hidden panels are not refreshed otherwise
         return (self.chip.text, self.chip.status) if self._found else None
 
-    def _count(self, found: tuple[Listed, ...]) -> None:
+    def _count(self, found: tuple[ProblemLine, ...]) -> None:
         if not found:
             self.chip.set(_("No problems"), "ok")
             return
         kinds = [each.severity for each in found]
         worst = next((kind for kind in ("error", "warning") if kind in kinds), "info")
         self.chip.set(str(len(found)), STATUS[worst])
-        words = [_count_words(kind, kinds.count(kind)) for kind in SEVERITIES if kind in kinds]
+        words = [_count_text(kind, kinds.count(kind)) for kind in SEVERITIES if kind in kinds]
         self.chip.setAccessibleName(", ".join(words))
         self.chip.setToolTip(plain.tip(", ".join(words)))
 
@@ -229,7 +229,7 @@ class ProblemsPanel(PanelWidget):
             self._show(self._found)
 
 
-def _count_words(severity: str, count: int) -> str:
+def _count_text(severity: str, count: int) -> str:
     if severity == "error":
         return ngettext("{count} error", "{count} errors", count).format(count=count)
     if severity == "warning":

@@ -19,19 +19,19 @@ class PanelRegistry(Mapping[str, Panel]):
     """
 
     @cached_property
-    def _found(self) -> Mapping[str, Panel]:
+    def _panels(self) -> Mapping[str, Panel]:
         return discover(panels.__name__, "PANEL", Panel)
 
     def steps(self) -> Sequence[Callable[[], object]]:
         """Return callables that import the panel modules one by one, which takes a few milliseconds each."""
         names = [info.name for info in pkgutil.iter_modules(panels.__path__, f"{panels.__name__}.")]
-        return [*(partial(importlib.import_module, name) for name in names), lambda: self._found]
+        return [*(partial(importlib.import_module, name) for name in names), lambda: self._panels]
 
     def __getitem__(self, name: str) -> Panel:
-        return self._found[name]
+        return self._panels[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._found)
+        return iter(self._panels)
 
     def __len__(self) -> int:
-        return len(self._found)
+        return len(self._panels)

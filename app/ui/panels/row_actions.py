@@ -17,15 +17,15 @@ from nep.i18n import _
 class RowAction(NamedTuple):
     """Action in a row's context menu."""
 
-    words: str
+    text: str
     icon: str
     run: Callable[[], object]
 
 
-def filled(menu: Menu, theme: Theme, actions: Iterable[RowAction]) -> Menu:
+def fill_menu(menu: Menu, theme: Theme, actions: Iterable[RowAction]) -> Menu:
     """Add actions to a menu and return the menu."""
     for action in actions:
-        menu.addAction(theme.icon(action.icon), action.words, action.run)
+        menu.addAction(theme.icon(action.icon), action.text, action.run)
     return menu
 
 
@@ -34,7 +34,7 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
     network, name = split_key(key)
     actions = [
         RowAction(_("Show messages"), "list-tree", lambda: show_messages(context, key)),
-        RowAction(_("Open in another panel"), "plus", lambda: context.open_beside(key)),
+        RowAction(_("Open in another panel"), "plus", lambda: context.open_to_side(key)),
     ]
     if has_fields(context, key):
         actions.append(RowAction(_("Plot a field"), "chart-line", lambda: context.plot(key, "")))
@@ -45,14 +45,14 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
             )
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.topic:{key}")))
         actions.append(RowAction(_("Record topic"), "circle-dot", lambda: context.run(f"record.topic:{key}")))
-    return [*actions, copies(context, name)]
+    return [*actions, copy_action(context, name)]
 
 
 def service_actions(context: PanelContext, name: str) -> list[RowAction]:
     """Return the actions for a service of Studio's own network."""
     return [
         RowAction(_("Call service"), "play", lambda: context.run(f"service.call:{name}")),
-        copies(context, name),
+        copy_action(context, name),
     ]
 
 
@@ -61,10 +61,10 @@ def node_actions(context: PanelContext, network: str, name: str) -> list[RowActi
     actions: list[RowAction] = []
     if not network:
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.node:{name}")))
-    return [*actions, copies(context, name)]
+    return [*actions, copy_action(context, name)]
 
 
-def copies(context: PanelContext, name: str) -> RowAction:
+def copy_action(context: PanelContext, name: str) -> RowAction:
     """Return the action that copies a name to the clipboard."""
 
     def copy() -> None:

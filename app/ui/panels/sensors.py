@@ -11,10 +11,10 @@ from PySide6.QtWidgets import QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.robots.description.description import Sensor
 from app.ui.panels.base import Density, Panel, PanelContext
-from app.ui.panels.no_robot import NoRobot
+from app.ui.panels.no_robot import NoRobotState
 from app.ui.panels.one_robot_panel import OneRobotPanel
-from app.ui.text.numbers import age_words
-from app.ui.text.sensor_values import ReadingWords, reading_of
+from app.ui.text.numbers import age_text
+from app.ui.text.sensor_values import ReadingText, reading_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyState, paint
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 ROW_HEIGHTS = {"compact": 26, "comfortable": 28}
-FIRST_WORDS = ("touch", "distance", "battery")  # listed first; other sensors keep their order
+PRIORITY_KEYWORDS = ("touch", "distance", "battery")  # listed first; other sensors keep their order
 TITLE_WIDTH, VALUE_WIDTH = 100, 96
-ICON = 18
+ICON_SIZE = 18
 
 
 class SensorRow(QWidget):
@@ -38,7 +38,7 @@ class SensorRow(QWidget):
         super().__init__()
         self._theme, self.sensor = theme, sensor
         self.title = sensor.title[:1].upper() + sensor.title[1:]
-        self.reading = ReadingWords()
+        self.reading = ReadingText()
         self.large = True
         self._yes_s: float | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -46,16 +46,16 @@ class SensorRow(QWidget):
 
     def show_value(self, value: object, now: float) -> None:
         """Show the newest value. Repaints only if the text changes."""
-        reading = reading_of(self.sensor, value)
+        reading = reading_text(self.sensor, value)
         if value is True:
             self._yes_s = now
         elif value is False and self._yes_s is not None:
-            reading = ReadingWords(
-                reading.value, _("{age} ago").format(age=age_words(max(1.0, float(int(now - self._yes_s)))))
+            reading = ReadingText(
+                reading.value, _("{age} ago").format(age=age_text(max(1.0, float(int(now - self._yes_s)))))
             )
         if reading != self.reading:
             self.reading = reading
-            self.setAccessibleDescription(" ".join(part for part in (reading.value, reading.beside) if part))
+            self.setAccessibleDescription(" ".join(part for part in (reading.value, reading.details) if part))
             self.update()
 
     def sizeHint(self) -> QSize:
@@ -69,20 +69,20 @@ class SensorRow(QWidget):
         font = theme.font("bodyLarge" if self.large else "body")
         bold = theme.font("bodyLarge" if self.large else "body")
         bold.setWeight(bold.Weight.Bold)
-        icon = QRectF(rect.left(), middle - ICON / 2, ICON, ICON)
+        icon = QRectF(rect.left(), middle - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
         paint_icon(painter, icon, self.sensor.icon, theme.colour("textSecondary"))
         title_width = max(theme.scaled(TITLE_WIDTH), paint.width_of(font, self.title) + 4)
         title = QRectF(rect.left() + 26, rect.top(), title_width, rect.height())
-        paint.words(painter, title, self.title, font, theme.colour("text"))
+        paint.text_line(painter, title, self.title, font, theme.colour("text"))
         value_width = max(paint.width_of(bold, self.reading.value), theme.scaled(54))
         value = QRectF(rect.right() - value_width, rect.top(), value_width, rect.height())
-        paint.words(painter, value, self.reading.value, bold, theme.colour("text"), paint.RIGHT)
+        paint.text_line(painter, value, self.reading.value, bold, theme.colour("text"), paint.RIGHT)
         between = QRectF(title.right(), rect.top(), value.left() - title.right() - 10, rect.height())
-        if self.reading.share is not None and between.width() > 30:
+        if self.reading.fraction is not None and between.width() > 30:
             track = QRectF(between.left(), between.center().y() - 3, between.width(), BAR_HEIGHT)
-            paint_bar(painter, theme, track, self.reading.share)
-        elif self.reading.beside and between.width() > 20:
-            paint.words(painter, between, self.reading.beside, font, theme.colour("textSecondary"))
+            paint_bar(painter, theme, track, self.reading.fraction)
+        elif self.reading.details and between.width() > 20:
+            paint.text_line(painter, between, self.reading.details, font, theme.colour("textSecondary"))
         painter.end()
 
 
@@ -96,8 +96,8 @@ class SensorsPanel(OneRobotPanel):
         self._column = self._scroll.column
         title, text = _("No robot connected"), _("Connect a robot to see its sensors.")
         self.empty = EmptyState(self.theme, "eye", title, text)
-        self._no_robot = NoRobot(self.empty, title, text)
-        self._no_robot.set_starting(self.session.coming)
+        self._no_robot = NoRobotState(self.empty, title, text)
+        self._no_robot.set_starting(self.session.starting_robots)
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
         self.pages.addWidget(self._scroll)
@@ -106,23 +106,23 @@ class SensorsPanel(OneRobotPanel):
         self._frame.setContentsMargins(0, 0, 0, 0)
         self._frame.addWidget(self.pages)
 
-    def key_of(self, link: RobotLink) -> object:
-        return (link.name, _shown(link))
+    def rebuild_key(self, link: RobotLink) -> object:
+        return (link.name, _listed_sensors(link))
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is not None:
             now = time.monotonic()
-            there = link.connected  # values of a disconnected robot are outdated
+            there = link.is_connected  # values of a disconnected robot are outdated
             for row in self.rows:
                 row.show_value(link.values.get(row.sensor.name) if there else None, now)
         else:
-            self._no_robot.set_starting(self.session.coming)
+            self._no_robot.set_starting(self.session.starting_robots)
 
     def show_robot(self, link: RobotLink) -> None:
         for row in self.rows:
             self._column.removeWidget(row)
             row.deleteLater()
-        self.rows = [SensorRow(self.theme, sensor) for sensor in _shown(link)]
+        self.rows = [SensorRow(self.theme, sensor) for sensor in _listed_sensors(link)]
         for place, row in enumerate(self.rows):
             row.large = self.density == "comfortable"
             self._column.insertWidget(place, row)
@@ -159,12 +159,14 @@ class SensorsPanel(OneRobotPanel):
         super().set_density(density)
 
 
-def _shown(link: RobotLink) -> list[Sensor]:
+def _listed_sensors(link: RobotLink) -> list[Sensor]:
     # All sensors except images, with the most relevant first.
 
     def rank(sensor: Sensor) -> int:
         words = f"{sensor.name} {sensor.title}".casefold()
-        return next((place for place, word in enumerate(FIRST_WORDS) if word in words), len(FIRST_WORDS))
+        return next(
+            (place for place, word in enumerate(PRIORITY_KEYWORDS) if word in words), len(PRIORITY_KEYWORDS)
+        )
 
     return sorted((sensor for sensor in link.robot.sensors if not sensor.is_image), key=rank)
 

@@ -10,9 +10,9 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.run.acting.sent_log import SentRecord
-from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget, filter_hindrance
-from app.ui.panels.row_actions import RowAction, filled, show_messages
-from app.ui.text.numbers import grouped
+from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, filter_blocker
+from app.ui.panels.row_actions import RowAction, fill_menu, show_messages
+from app.ui.text.numbers import group_digits
 from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, IconButton, Separator
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.menus import Menu
@@ -20,7 +20,7 @@ from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, ngettext
 
-ASKERS = {
+SENDERS = {
     "publish": ("send", lazy("Publish")),
     "service": ("spline", lazy("Services")),
     "replay": ("film", lazy("Replay")),
@@ -32,16 +32,16 @@ MAX_TIP_CHARS = 1000
 STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz
 
 
-def clock_words(record: SentRecord) -> str:
+def clock_text(record: SentRecord) -> str:
     """Format the time of the last send as HH:MM:SS."""
     return time.strftime("%H:%M:%S", time.localtime(record.at_s))
 
 
 def line_of(record: SentRecord) -> str:
     """Format a log entry as a line for the clipboard."""
-    asker = _(ASKERS[record.asker][1])
-    often = f"{grouped(record.count)} \u00d7 " if record.count > 1 else ""
-    return " ".join(filter(None, (clock_words(record), f"[{asker}]", record.name, often + record.words)))
+    asker = _(SENDERS[record.origin][1])
+    often = f"{group_digits(record.count)} \u00d7 " if record.count > 1 else ""
+    return " ".join(filter(None, (clock_text(record), f"[{asker}]", record.name, often + record.result_text)))
 
 
 class SentPanel(PanelWidget):
@@ -78,12 +78,12 @@ class SentPanel(PanelWidget):
 
     def _connect(self) -> None:
         self.filter.textChanged.connect(self._rebuild)
-        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.again.clicked.connect(self.repeat)
-        self.table.filter_wanted.connect(self.focus_filter)
-        self.table.menu_wanted.connect(self._show_menu)
+        self.table.filter_requested.connect(self.focus_filter)
+        self.table.menu_requested.connect(self._show_menu)
         self.table.opened.connect(self.show_row)
-        self.table.selectionModel().currentRowChanged.connect(self._offer_again)
+        self.table.selectionModel().currentRowChanged.connect(self._update_repeat_button)
 
     def _arrange(self) -> None:
         below = QWidget()
@@ -98,7 +98,7 @@ class SentPanel(PanelWidget):
         inside.addWidget(self.table, 1)
         inside.addWidget(Separator(self.theme))
         inside.addWidget(below)
-        self.pages: QStackedWidget = self.show_one_of(self.empty, listed)
+        self.pages: QStackedWidget = self.make_page_stack(self.empty, listed)
 
     # -- display ------------------------------------------------------------------------------------------
 
@@ -107,14 +107,14 @@ class SentPanel(PanelWidget):
         if self.acting.sent.revision != self._seen:
             self._rebuild()
         elif self._ticks % STATE_UPDATE_TICKS == 0:
-            self._offer_again()
+            self._update_repeat_button()
 
     def _rebuild(self) -> None:
         log, words = self.acting.sent, self.filter.text().casefold().split()
         self._seen = log.revision
         rows = [each for each in reversed(log.records) if all(word in _haystack(each) for word in words)]
         self.model.set_rows(rows)
-        self.table.tell_visible_changed()
+        self.table.refresh_visible()
         self.pages.setCurrentIndex(1 if rows else 0)
         if words and log.records:
             self.empty.set_texts(_("No matches"), _("Clear the filter to see all sent messages."), "search")
@@ -125,37 +125,37 @@ class SentPanel(PanelWidget):
             publish = EmptyAction(_("Publish a message"), lambda: self.context.run("publish.new"), "send")
             self.empty.set_actions([publish])
         self.foot.setText(_("Messages and calls you send by hand are listed here"))
-        self.total.setText(self._total_words())
-        self._offer_again()
+        self.total.setText(self._total_text())
+        self._update_repeat_button()
 
-    def _total_words(self) -> str:
+    def _total_text(self) -> str:
         log = self.acting.sent
         if log.since_s is None:
             return ""
         clock = time.strftime("%H:%M", time.localtime(log.since_s))
         said = ngettext("{count} since {time}", "{count} since {time}", log.total)
-        return said.format(count=grouped(log.total), time=clock)
+        return said.format(count=group_digits(log.total), time=clock)
 
-    def chosen(self) -> SentRecord | None:
+    def selected(self) -> SentRecord | None:
         """Return the selected entry, or None."""
-        key = self.table.chosen_key()
+        key = self.table.selected_key()
         return self.acting.sent.get(int(key)) if key else None
 
-    def _may_again(self, record: SentRecord | None) -> bool:
-        return record is not None and record.again is not None and self.acting.arming.allows(record.target)
+    def _can_repeat(self, record: SentRecord | None) -> bool:
+        return record is not None and record.repeat is not None and self.acting.arming.allows(record.target)
 
-    def _offer_again(self) -> None:
-        self.again.setEnabled(self._may_again(self.chosen()))
+    def _update_repeat_button(self) -> None:
+        self.again.setEnabled(self._can_repeat(self.selected()))
 
-    def hindrances(self) -> list[Hindrance]:
+    def blockers(self) -> list[Blocker]:
         words = self.filter.text().strip()
-        return [filter_hindrance(self.title(), words, self.filter.clear)] if words else []
+        return [filter_blocker(self.title(), words, self.filter.clear)] if words else []
 
     # -- user actions -------------------------------------------------------------------------------------
 
     def repeat(self) -> None:
         """Send the selected entry again if its target is armed."""
-        record = self.chosen()
+        record = self.selected()
         why_not = self.acting.repeat(record.number) if record is not None else ""
         if why_not:
             self.context.toast(why_not)
@@ -165,11 +165,11 @@ class SentPanel(PanelWidget):
 
     def copy(self) -> None:
         """Copy the selected entry to the clipboard."""
-        record = self.chosen()
+        record = self.selected()
         if record is not None:
-            self._to_clipboard(line_of(record), _("Copied the line"))
+            self._copy_text(line_of(record), _("Copied the line"))
 
-    def _to_clipboard(self, text: str, said: str) -> None:
+    def _copy_text(self, text: str, said: str) -> None:
         QGuiApplication.clipboard().setText(text)
         self.context.toast(said)
 
@@ -183,7 +183,7 @@ class SentPanel(PanelWidget):
         record = self.acting.sent.get(int(key))
         if record is None or not record.name:
             return
-        if record.asker == "service":
+        if record.origin == "service":
             self.context.run(f"service.call:{record.name}")
         else:
             show_messages(self.context, record.name)
@@ -194,21 +194,21 @@ class SentPanel(PanelWidget):
         if record is None:
             return None
         menu = Menu(self.theme, self)
-        if record.again is not None:
-            words = _("Call again") if record.asker == "service" else _("Send again")
-            may = self._may_again(record)
+        if record.repeat is not None:
+            words = _("Call again") if record.origin == "service" else _("Send again")
+            may = self._can_repeat(record)
             words = words if may else _("{what} (not armed)").format(what=words)
             menu.addAction(self.theme.icon("repeat"), words, self.repeat).setEnabled(may)
         actions = [RowAction(_("Copy the line"), "copy", self.copy)]
         if record.text:
-            copied = _("Copied the request") if record.asker == "service" else _("Copied the message")
-            copies = _("Copy the request") if record.asker == "service" else _("Copy the message")
-            actions.append(RowAction(copies, "braces", lambda: self._to_clipboard(record.text, copied)))
+            copied = _("Copied the request") if record.origin == "service" else _("Copied the message")
+            copies = _("Copy the request") if record.origin == "service" else _("Copy the message")
+            actions.append(RowAction(copies, "braces", lambda: self._copy_text(record.text, copied)))
         if record.name:
-            is_call = record.asker == "service"
+            is_call = record.origin == "service"
             shows = _("Open the service") if is_call else _("Show messages")
             actions.append(RowAction(shows, "spline" if is_call else "list-tree", lambda: self.show_row(key)))
-        return filled(menu, self.theme, actions)
+        return fill_menu(menu, self.theme, actions)
 
     def _show_menu(self, key: str, at: QPoint) -> None:
         menu = self.menu_of(key)
@@ -235,39 +235,39 @@ class SentPanel(PanelWidget):
 
 
 def _haystack(record: SentRecord) -> str:
-    return f"{record.name} {record.words} {_(ASKERS[record.asker][1])}".casefold()
+    return f"{record.name} {record.result_text} {_(SENDERS[record.origin][1])}".casefold()
 
 
 def _columns() -> tuple[Column[SentRecord], ...]:
-    def sign(record: SentRecord) -> Cell:
-        icon, words = ASKERS[record.asker]
-        if record.is_bad:
-            return Cell(icon="circle-x", role="error", said=_("failed"))
-        role = "warn" if record.asker == "switch" else "textTertiary"
-        return Cell(icon=icon, role=role, said=_(words))
+    def state_cell(record: SentRecord) -> Cell:
+        icon, words = SENDERS[record.origin]
+        if record.is_error:
+            return Cell(icon="circle-x", role="error", accessible_text=_("failed"))
+        role = "warn" if record.origin == "switch" else "textTertiary"
+        return Cell(icon=icon, role=role, accessible_text=_(words))
 
-    def what(record: SentRecord) -> Cell:
-        return Cell(record.words, role="error" if record.is_bad else "text")
+    def content_cell(record: SentRecord) -> Cell:
+        return Cell(record.result_text, role="error" if record.is_error else "text")
 
     def count(record: SentRecord) -> Cell:
-        return Cell(f"\u00d7 {grouped(record.count)}" if record.count > 1 else "", role="textSecondary")
+        return Cell(f"\u00d7 {group_digits(record.count)}" if record.count > 1 else "", role="textSecondary")
 
-    def to(record: SentRecord) -> Cell:
-        return Cell(record.name, mono=True, middle=True) if record.name else Cell(_("Studio"))
+    def target_cell(record: SentRecord) -> Cell:
+        return Cell(record.name, mono=True, elide_middle=True) if record.name else Cell(_("Studio"))
 
-    def asked(record: SentRecord) -> Cell:
-        return Cell(_(ASKERS[record.asker][1]), role="textSecondary")
+    def sender_cell(record: SentRecord) -> Cell:
+        return Cell(_(SENDERS[record.origin][1]), role="textSecondary")
 
     def tip(record: SentRecord) -> str:
-        return "\n".join(filter(None, (record.words, record.text[:MAX_TIP_CHARS])))
+        return "\n".join(filter(None, (record.result_text, record.text[:MAX_TIP_CHARS])))
 
     return (
-        Column("at", lazy("Time"), 92, lambda each: Cell(clock_words(each), mono=True, role="textSecondary")),
-        Column("sign", "", 34, sign, words=lazy("Kind")),
-        Column("name", lazy("Sent to"), 112, to, tip=lambda each: each.name),
-        Column("what", lazy("Result"), 110, what, stretch=True, tip=tip),
-        Column("count", lazy("Count"), 60, count, figures=True, yields=1),
-        Column("asker", lazy("Sent from"), 90, asked, yields=2),
+        Column("at", lazy("Time"), 92, lambda each: Cell(clock_text(each), mono=True, role="textSecondary")),
+        Column("sign", "", 34, state_cell, label=lazy("Kind")),
+        Column("name", lazy("Sent to"), 112, target_cell, tip=lambda each: each.name),
+        Column("what", lazy("Result"), 110, content_cell, stretch=True, tip=tip),
+        Column("count", lazy("Count"), 60, count, is_numeric=True, hide_order=1),
+        Column("asker", lazy("Sent from"), 90, sender_cell, hide_order=2),
     )  # fmt: skip
 
 

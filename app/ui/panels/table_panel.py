@@ -10,8 +10,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.ui.panels.base import Density, Hindrance, PanelContext, PanelWidget, filter_hindrance
-from app.ui.panels.row_actions import RowAction, filled
+from app.ui.panels.base import Blocker, Density, PanelContext, PanelWidget, filter_blocker
+from app.ui.panels.row_actions import RowAction, fill_menu
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, Separator, label
 from app.ui.widgets.buttons import LinkButton
@@ -25,13 +25,13 @@ Row = TypeVar("Row")
 
 
 @dataclass(frozen=True)
-class TableWords:
+class TableTexts:
     """Texts of a table panel, such as "Topics" and "Filter topics", each wrapped in `lazy`."""
 
     title: str
     filter: str
-    nothing_fits: str
-    clear_the_filter: str
+    no_matches: str
+    clear_filter_hint: str
     not_recorded: str = ""
     """Text of the empty state while a recording is open; "" for tables that don't depend on the source."""
 
@@ -46,27 +46,27 @@ class TablePanel(PanelWidget, Generic[Row]):
         foot: Short text below the table.
     """
 
-    def __init__(self, context: PanelContext, words: TableWords, icon: str) -> None:
+    def __init__(self, context: PanelContext, words: TableTexts, icon: str) -> None:
         self._words = words
         super().__init__(context, _(words.title))
         theme = self.theme
         self.model = self.make_model()
         self.table = self.make_table(self.model)
         self.filter = FilterField(theme, _(words.filter))
-        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.filter.textChanged.connect(self.rebuild)
         self.header: list[QWidget] = [self.filter]
         self.table.setAccessibleName(self.title())
         self.table.opened.connect(self.open_row)
-        self.table.menu_wanted.connect(self._show_row_menu)
-        self.table.filter_wanted.connect(self.focus_filter)
+        self.table.menu_requested.connect(self._show_row_menu)
+        self.table.filter_requested.connect(self.focus_filter)
         self.table.order_changed.connect(self.rebuild)
         self.foot = label("", "small", role="textTertiary", wrap=True)
         self.foot.setContentsMargins(12, 5, 12, 6)
         self.foot.setMinimumWidth(0)
         self.line = Separator(theme)
         self.empty = EmptyState(theme, icon, "", "")
-        self.doctor = DoctorLine(theme, lambda: context.why(self, ""))
+        self.doctor = DoctorLine(theme, lambda: context.open_doctor(self, ""))
         self.pages = QStackedWidget()
         self.pages.addWidget(self.table)
         self.pages.addWidget(self.empty)
@@ -97,7 +97,7 @@ class TablePanel(PanelWidget, Generic[Row]):
     def menu_of(self, key: str) -> Menu | None:
         """Return the context menu of a row, or None if it has no actions."""
         actions = self.row_actions(key)
-        return filled(Menu(self.theme, self), self.theme, actions) if actions else None
+        return fill_menu(Menu(self.theme, self), self.theme, actions) if actions else None
 
     def _show_row_menu(self, key: str, at: QPoint) -> None:
         menu = self.menu_of(key)
@@ -117,10 +117,10 @@ class TablePanel(PanelWidget, Generic[Row]):
             return
         if filtered:
             words = self._words
-            self.empty.set_texts(_(words.nothing_fits), _(words.clear_the_filter), "search")
+            self.empty.set_texts(_(words.no_matches), _(words.clear_filter_hint), "search")
             clear = EmptyAction(_("Clear the filter"), self.filter.clear, "x")
-            wanted = self.missed_topic()
-            self.empty.set_actions([clear, self.why(wanted)] if wanted else [clear])
+            wanted = self.missing_topic()
+            self.empty.set_actions([clear, self.doctor_action(wanted)] if wanted else [clear])
         elif self.session.replay is not None and self._words.not_recorded:
             self.doctor.hide()
             self.empty.set_texts(_(self._words.not_recorded), "", "film")
@@ -129,19 +129,19 @@ class TablePanel(PanelWidget, Generic[Row]):
             said = _("A master lets programs find each other.")
             self.empty.set_texts(_("No master is running"), said, "radio-tower")
             start = self.session.launcher.ensure_master
-            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
+            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", is_primary=True)])
         else:
-            self.say_empty()
+            self.update_empty_state()
 
-    def missed_topic(self) -> str:
+    def missing_topic(self) -> str:
         """Return the topic that was typed into the filter but does not exist, else ""."""
         return ""
 
-    def hindrances(self) -> list[Hindrance]:
+    def blockers(self) -> list[Blocker]:
         words = self.filter.text().strip()
-        return [filter_hindrance(self.title(), words, self.filter.clear)] if words else []
+        return [filter_blocker(self.title(), words, self.filter.clear)] if words else []
 
-    def say_empty(self) -> None:
+    def update_empty_state(self) -> None:
         """Set the texts of `empty` for a table without rows, depending on the state of the master."""
         raise NotImplementedError
 

@@ -12,7 +12,7 @@ from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.table_panel import TablePanel, TableWords
+from app.ui.panels.table_panel import TablePanel, TableTexts
 from app.ui.widgets import ElidedLabel, EmptyAction, IconButton
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Cell, Column, Order, TableModel
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from app.blocks.model.program import Variable
     from app.blocks.runtime.variables import VariableValue
 
-WORDS = TableWords(
+TABLE_TEXTS = TableTexts(
     title=lazy("Variables"),
     filter=lazy("Filter variables"),
-    nothing_fits=lazy("No matching variables"),
-    clear_the_filter=lazy("Clear the filter to see all variables."),
+    no_matches=lazy("No matching variables"),
+    clear_filter_hint=lazy("Clear the filter to see all variables."),
 )
-CHANGE_MARK_S = 0.8
+CHANGE_HIGHLIGHT_S = 0.8
 """Time in s for which a new value is highlighted."""
 INDENT = 19
 MAX_WITHOUT_FILTER = 8
@@ -46,10 +46,10 @@ class VariableRow:
 
     variable: Variable
     value: VariableValue | None
-    opened: bool = False
+    is_expanded: bool = False
     item: int = 0
-    fresh: bool = False
-    over: bool = False
+    is_new: bool = False
+    has_ended: bool = False
 
     @property
     def key(self) -> str:
@@ -57,7 +57,7 @@ class VariableRow:
         return f"{self.variable.id} {self.item}"
 
     @property
-    def words(self) -> str:
+    def value_text(self) -> str:
         """Value formatted as short text."""
         if self.value is None:
             return ""
@@ -66,7 +66,7 @@ class VariableRow:
         if self.value.kind != "list" or not self.value.length:
             return self.value.text if self.value.kind != "list" else _("empty")
         count = ngettext("{count} item", "{count} items", self.value.length).format(count=self.value.length)
-        return count if self.opened else f"{count}: {', '.join(self.value.items)}"
+        return count if self.is_expanded else f"{count}: {', '.join(self.value.items)}"
 
 
 def name_cell(row: VariableRow) -> Cell:
@@ -75,7 +75,7 @@ def name_cell(row: VariableRow) -> Cell:
         return Cell(str(row.item), role="textTertiary", indent=INDENT)
     kind = row.value.kind if row.value is not None else ""
     if kind == "list":
-        icon: str | None = "chevron-down" if row.opened else "chevron-right"
+        icon: str | None = "chevron-down" if row.is_expanded else "chevron-right"
     else:
         icon = ICONS.get(kind, "variable")
     return Cell(row.variable.name, icon)
@@ -83,16 +83,16 @@ def name_cell(row: VariableRow) -> Cell:
 
 def value_cell(row: VariableRow) -> Cell:
     """Return the cell with the value, highlighted while new and grey after the run has ended."""
-    if row.fresh and not row.item:
-        return Cell(row.words, role="changed", tint="changedTint")
-    return Cell(row.words, role="textSecondary" if row.over else "text")
+    if row.is_new and not row.item:
+        return Cell(row.value_text, role="changed", tint="changedTint")
+    return Cell(row.value_text, role="textSecondary" if row.has_ended else "text")
 
 
 COLUMNS: tuple[Column[VariableRow], ...] = (
     Column("name", lazy("Name"), 150, name_cell, lambda row: row.variable.name.casefold()),
     Column(
         "value", lazy("Value"), 160, value_cell, stretch=True,
-        tip=lambda row: row.value.text if row.value is not None and not row.item else row.words,
+        tip=lambda row: row.value.text if row.value is not None and not row.item else row.value_text,
     ),
 )  # fmt: skip
 
@@ -109,14 +109,14 @@ def rows_of(
     """Return the rows in sort order. Each list whose id is in `opened` is followed by its first items."""
     rows: list[VariableRow] = []
     heads = [
-        VariableRow(each, values.get(each.id), each.id in opened, fresh=each.id in fresh, over=over)
+        VariableRow(each, values.get(each.id), each.id in opened, is_new=each.id in fresh, has_ended=over)
         for each in variables
     ]
     for head in order.sort(heads):
         rows.append(head)
-        if head.opened and head.value is not None:
+        if head.is_expanded and head.value is not None:
             rows += [
-                VariableRow(head.variable, head.value, item=number, over=over)
+                VariableRow(head.variable, head.value, item=number, has_ended=over)
                 for number in range(1, len(head.value.items) + 1)
             ]
     return rows
@@ -126,7 +126,7 @@ class VariablesPanel(TablePanel[VariableRow]):
     """Panel with the table of variables. Actions are in the context menu of a variable."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, WORDS, "variable")
+        super().__init__(context, TABLE_TEXTS, "variable")
         self.clock: Callable[[], float] = time.monotonic
         self.add = IconButton(self.theme, "plus", _("New variable"), size=26)
         self.add.clicked.connect(lambda: context.run("variable.new"))
@@ -154,23 +154,23 @@ class VariablesPanel(TablePanel[VariableRow]):
 
     def make_table(self, model: TableModel[VariableRow]) -> TableView[VariableRow]:
         table = _VariableTable(self.theme, model, "")
-        table.fold_wanted.connect(self._fold)
-        table.rename_wanted.connect(lambda key: self._about("variable.rename", key))
-        table.delete_wanted.connect(lambda key: self._about("variable.delete", key))
+        table.expand_requested.connect(self._set_expanded)
+        table.rename_requested.connect(lambda key: self._run_command_for("variable.rename", key))
+        table.delete_requested.connect(lambda key: self._run_command_for("variable.delete", key))
         return table
 
     # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
         runs, document = self.session.runs, self.session.document
-        program = document.newest()
+        program = document.newest_program()
         if program is None:
             return
         mine = runs.document is document
         now = self.clock()
         values = runs.values if mine else {}
         seen = (document.key, program.variables, runs.values_revision if mine else -1, mine and runs.active)
-        faded = [id for id, since in self._fresh.items() if now - since >= CHANGE_MARK_S]
+        faded = [id for id, since in self._fresh.items() if now - since >= CHANGE_HIGHLIGHT_S]
         for id in faded:
             del self._fresh[id]
         if seen == self._seen and not faded:
@@ -189,11 +189,11 @@ class VariablesPanel(TablePanel[VariableRow]):
             rows_of(found, self._values, self._opened, self.table.order, fresh=self._fresh, over=over)
         )
         self.filter.setVisible(len(self._variables) > MAX_WITHOUT_FILTER or bool(words))
-        self.when.setText(self._when(over=over))
-        self.table.tell_visible_changed()
+        self.when.setText(self._status_text(over=over))
+        self.table.refresh_visible()
         self.show_table(bool(found), bool(words))
 
-    def _when(self, *, over: bool) -> str:
+    def _status_text(self, *, over: bool) -> str:
         if not self._variables or not self._values:
             return ""
         return _("Final values") if over else _("Live")
@@ -204,15 +204,17 @@ class VariablesPanel(TablePanel[VariableRow]):
             self.doctor.hide()
         else:  # the empty state does not depend on the master
             self.pages.setCurrentIndex(1)
-            self.say_empty()
+            self.update_empty_state()
 
-    def say_empty(self) -> None:
+    def update_empty_state(self) -> None:
         self.empty.set_texts(
             _("No variables yet"),
             _("A variable stores a number, a text or a list under a name. You see its value here."),
             "variable",
         )
-        new = EmptyAction(_("New variable"), lambda: self.context.run("variable.new"), "plus", primary=True)
+        new = EmptyAction(
+            _("New variable"), lambda: self.context.run("variable.new"), "plus", is_primary=True
+        )
         self.empty.set_actions([new])
 
     # -- user actions -------------------------------------------------------------------------------------
@@ -220,17 +222,17 @@ class VariablesPanel(TablePanel[VariableRow]):
     def open_row(self, key: str) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is not None and row.value is not None and row.value.kind == "list" and not row.item:
-            self._fold(key, row.variable.id not in self._opened)
+            self._set_expanded(key, row.variable.id not in self._opened)
 
-    def _fold(self, key: str, opened: bool) -> None:
+    def _set_expanded(self, key: str, opened: bool) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is None or (opened and row.item):
             return
         (self._opened.add if opened else self._opened.discard)(row.variable.id)
         self.rebuild()
-        self.table.choose(VariableRow(row.variable, row.value).key)
+        self.table.select_key(VariableRow(row.variable, row.value).key)
 
-    def _about(self, command: str, key: str) -> None:
+    def _run_command_for(self, command: str, key: str) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is not None:
             self.context.run(f"{command}:{row.variable.id}")
@@ -252,7 +254,7 @@ class VariablesPanel(TablePanel[VariableRow]):
         ):
             action = QAction(self.theme.icon(icon), words, menu)
             action.setEnabled(possible)
-            action.triggered.connect(lambda _on=False, command=command: self._about(command, key))
+            action.triggered.connect(lambda _on=False, command=command: self._run_command_for(command, key))
             menu.addAction(action)
         return menu
 
@@ -267,21 +269,21 @@ class VariablesPanel(TablePanel[VariableRow]):
 class _VariableTable(TableView[VariableRow]):
     """Table of variables: Right expands a list, Left collapses it, F2 renames, Delete deletes."""
 
-    fold_wanted = Signal(str, bool)
-    rename_wanted = Signal(str)
-    delete_wanted = Signal(str)
+    expand_requested = Signal(str, bool)
+    rename_requested = Signal(str)
+    delete_requested = Signal(str)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key = self.chosen_key()
+        key = self.selected_key()
         if key is not None and event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
             self.keyboard = True
-            self.fold_wanted.emit(key, event.key() == Qt.Key.Key_Right)
+            self.expand_requested.emit(key, event.key() == Qt.Key.Key_Right)
         elif key is not None and event.key() == Qt.Key.Key_F2:
-            self.rename_wanted.emit(key)
+            self.rename_requested.emit(key)
         elif key is not None and event.key() == Qt.Key.Key_Delete:
-            self.delete_wanted.emit(key)
+            self.delete_requested.emit(key)
         else:
             super().keyPressEvent(event)
 
 
-PANEL = Panel("variables", WORDS.title, "variable", (), VariablesPanel)
+PANEL = Panel("variables", TABLE_TEXTS.title, "variable", (), VariablesPanel)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
 
-from app.core.messages.annotations import Colour, Drawn
+from app.core.messages.annotations import Colour, Shape
 from app.core.messages.picture_look import ColourScale
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -15,14 +15,14 @@ from nep.i18n import number
 
 MIN_PEN, MAX_PEN = 1.0, 64.0
 MIN_LETTERS, MAX_LETTERS = 8.0, 96.0
-FACE_LETTERS = 12.0
-BAR = QSizeF(12, 140)
-BAR_EDGE = 10
-MIN_BAR = 40
+AREA_LABEL_SIZE_PX = 12.0
+BAR_SIZE = QSizeF(12, 140)
+BAR_MARGIN = 10
+MIN_BAR_HEIGHT = 40
 
 
-def paint_drawn(
-    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Iterable[Drawn]
+def paint_annotations(
+    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Iterable[Shape]
 ) -> None:
     """Paint annotations over an image.
 
@@ -36,12 +36,12 @@ def paint_drawn(
         points = [shares.map(QPointF(x, y)) for x, y in each.points]
         painter.setPen(_pen(each.outline, each.thickness * scale))
         painter.setBrush(_brush(each.fill))
-        _paint_one(painter, theme, shares, scale, each, points)
+        _paint_annotation(painter, theme, shares, scale, each, points)
     painter.restore()
 
 
-def _paint_one(
-    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Drawn, points: list[QPointF]
+def _paint_annotation(
+    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Shape, points: list[QPointF]
 ) -> None:
     if drawn.kind == "points":
         radius = max(1.5, drawn.thickness * scale)
@@ -55,26 +55,26 @@ def _paint_one(
         painter.drawEllipse(shares.mapRect(around))
     elif drawn.kind == "area":
         painter.drawPolygon(QPolygonF(points))
-        if drawn.words:
+        if drawn.text:
             corner = QPolygonF(points).boundingRect().topLeft()
-            _paint_words(painter, theme, corner, FACE_LETTERS, drawn)
+            _paint_text(painter, theme, corner, AREA_LABEL_SIZE_PX, drawn)
     elif drawn.kind == "line":
         painter.drawPolyline(QPolygonF(points))
     else:
         high = shares.mapRect(QRectF(0, 0, drawn.size[1], drawn.size[1])).height()
-        _paint_words(painter, theme, points[0], high, drawn)
+        _paint_text(painter, theme, points[0], high, drawn)
 
 
-def _paint_words(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: Drawn) -> None:
+def _paint_text(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: Shape) -> None:
     # The lower left corner of the text is at `at`; the text is upright for any rotation of the image.
-    font, words = theme.font("small"), drawn.words
+    font, words = theme.font("small"), drawn.text
     font.setPixelSize(round(min(max(high, MIN_LETTERS), MAX_LETTERS)))
     metrics = QFontMetricsF(font)
     room = QRectF(at.x(), at.y() - metrics.height(), metrics.horizontalAdvance(words) + 4, metrics.height())
     if drawn.fill is not None:
         painter.fillRect(room, _colour(drawn.fill))
     ink = _colour(drawn.outline) if drawn.outline is not None else QColor("white")
-    paint.words(painter, room.adjusted(2, 0, 2, 0), words, font, ink)
+    paint.text_line(painter, room.adjusted(2, 0, 2, 0), words, font, ink)
 
 
 def _pen(colour: Colour | None, width: float) -> QPen:
@@ -93,7 +93,7 @@ def _colour(colour: Colour) -> QColor:
     return QColor.fromRgbF(*colour)
 
 
-def end_words(value: float) -> str:
+def bar_label(value: float) -> str:
     """Format the value at an end of a colour bar."""
     return number(value, ".4g")
 
@@ -102,19 +102,19 @@ def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: Colou
     """Paint the colour scale at the upper right of the view, unless the view is too low."""
     font = theme.font("small")
     line = paint.height_of(font)
-    high = min(BAR.height(), view.height() - 2 * BAR_EDGE - 2 * line - 40)
-    if high < MIN_BAR:
+    high = min(BAR_SIZE.height(), view.height() - 2 * BAR_MARGIN - 2 * line - 40)
+    if high < MIN_BAR_HEIGHT:
         return
-    ends = (end_words(scale.high), end_words(scale.low / 2 + scale.high / 2), end_words(scale.low))
+    ends = (bar_label(scale.high), bar_label(scale.low / 2 + scale.high / 2), bar_label(scale.low))
     wide = max(paint.width_of(font, words) for words in ends)
-    ground = QRectF(0, 0, BAR.width() + wide + 22, high + line + 8)
-    ground.moveTopRight(QPointF(view.right() - BAR_EDGE, view.top() + BAR_EDGE))
+    ground = QRectF(0, 0, BAR_SIZE.width() + wide + 22, high + line + 8)
+    ground.moveTopRight(QPointF(view.right() - BAR_MARGIN, view.top() + BAR_MARGIN))
     paint.box(painter, ground, 4, QColor(0, 0, 0, 190))
-    bar = QRectF(ground.right() - BAR.width() - 7, ground.top() + line / 2 + 4, BAR.width(), high)
+    bar = QRectF(ground.right() - BAR_SIZE.width() - 7, ground.top() + line / 2 + 4, BAR_SIZE.width(), high)
     painter.drawImage(bar, bar_image(scale))
     for words, y in zip(ends, (bar.top(), bar.center().y(), bar.bottom()), strict=True):
         place = QRectF(ground.left() + 7, y - line / 2, wide, line)
-        paint.words(painter, place, words, font, QColor("white"), paint.RIGHT)
+        paint.text_line(painter, place, words, font, QColor("white"), paint.RIGHT)
 
 
 def bar_image(scale: ColourScale) -> QImage:

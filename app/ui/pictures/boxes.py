@@ -21,17 +21,17 @@ if TYPE_CHECKING:
 
 # Boxes are painted on images and don't depend on the theme: bright colours with dark text.
 BOX_COLOURS = ("#FFC53D", "#5FD4F4", "#7BE0A0", "#F79AC0")
-BOX_INK = "#1C1B19"
+BOX_TEXT_COLOUR = "#1C1B19"
 
 
 @dataclass(frozen=True, slots=True)
 class DetectionBox:
     """Bounding box of a detection: label, confidence (0 to 1 or None), rectangle in image fractions."""
 
-    words: str
+    label: str
     confidence: float | None
-    place: QRectF
-    kind: int = 0
+    rect: QRectF
+    sensor_index: int = 0
 
 
 def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
@@ -54,7 +54,7 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
     return tuple(found)
 
 
-def boxes_on(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
+def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
     """Return the bounding boxes of all detections in this camera's images, with one colour per sensor."""
     cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
     found: list[DetectionBox] = []
@@ -70,7 +70,7 @@ def camera_of(link: RobotLink) -> Sensor | None:
     return next((sensor for sensor in link.robot.sensors if sensor.is_image and sensor.topic), None)
 
 
-def owner_of(session: Session, topic: str) -> RobotLink | None:
+def robot_of_camera(session: Session, topic: str) -> RobotLink | None:
     """Return the robot whose camera publishes the topic, or None."""
     for link in session.fleet.links:
         if any(sensor.is_image and sensor.topic == topic for sensor in link.robot.sensors):
@@ -80,12 +80,12 @@ def owner_of(session: Session, topic: str) -> RobotLink | None:
 
 def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox) -> None:
     """Paint a bounding box around ``place`` (in view pixels), with its label upright above it."""
-    colour = QColor(BOX_COLOURS[box.kind % len(BOX_COLOURS)])
+    colour = QColor(BOX_COLOURS[box.sensor_index % len(BOX_COLOURS)])
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(colour, 2.5))
     painter.drawRoundedRect(place, 2, 2)
-    words = box.words if box.confidence is None else f"{box.words} {number(box.confidence, '.2f')}"
+    words = box.label if box.confidence is None else f"{box.label} {number(box.confidence, '.2f')}"
     font = theme.font("caption")
     font.setWeight(font.Weight.DemiBold)
     width = paint.width_of(font, words) + 12
@@ -93,7 +93,7 @@ def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox)
     top = place.top() - high - 1 if place.top() - high - 1 >= 0 else place.top()
     tag = QRectF(place.left() - 1.25, top, width, high)
     paint.box(painter, tag, 2, colour)
-    paint.words(painter, tag.adjusted(6, 0, 0, 0), words, font, QColor(BOX_INK))
+    paint.text_line(painter, tag.adjusted(6, 0, 0, 0), words, font, QColor(BOX_TEXT_COLOUR))
 
 
 def _number(value: object) -> float | None:

@@ -8,16 +8,16 @@ from PySide6.QtWidgets import QApplication
 
 from app.core.messages.picture import Picture
 from app.core.run.acting.picture_point import Button, PicturePoint
-from app.ui.pictures.zoom import WAYS, ZoomablePicture, key_name
+from app.ui.pictures.zoom import KEY_DIRECTIONS, ZoomablePicture, key_name
 from app.ui.theme.theme import Theme
 from app.ui.widgets.paint import announce
 from nep.i18n import _, lazy
 
-MARK_MS = 1200
+MARK_DURATION_MS = 1200
 RING_PX, REACH_PX = 7.0, 12.0
-FAR = 10  # cursor step with Shift, in image pixels
-KEYS_WORDS = lazy("Use the arrow keys to point at a pixel and Enter to publish it.")
-BESIDE = (16, 16, -16, -16)
+LARGE_CURSOR_STEP_PX = 10  # cursor step with Shift, in image pixels
+KEYBOARD_HINT = lazy("Use the arrow keys to point at a pixel and Enter to publish it.")
+SCROLL_MARGINS = (16, 16, -16, -16)
 BUTTONS: dict[Qt.MouseButton, Button] = {
     Qt.MouseButton.LeftButton: "left",
     Qt.MouseButton.MiddleButton: "middle",
@@ -48,33 +48,33 @@ class ClickablePicture(ZoomablePicture):
         """Point with a mark, or None."""
         self._fading = QTimer(self)
         self._fading.setSingleShot(True)
-        self._fading.timeout.connect(self._unmark)
+        self._fading.timeout.connect(self._clear_mark)
 
     @property
-    def takes_clicks(self) -> bool:
+    def accepts_clicks(self) -> bool:
         """True if clicks are emitted. Pending clicks are discarded when it changes."""
         return self._takes_clicks
 
-    @takes_clicks.setter
-    def takes_clicks(self, takes: bool) -> None:
+    @accepts_clicks.setter
+    def accepts_clicks(self, takes: bool) -> None:
         if takes != self._takes_clicks:
             self._takes_clicks = takes
-            self.forget_click()
+            self.discard_click()
             self._show_cursor()
             if takes:
-                announce(self, _(KEYS_WORDS))
+                announce(self, _(KEYBOARD_HINT))
 
     def mark(self, point: PicturePoint) -> None:
         """Show a mark at a point for a short time."""
         self.marked = point
-        self._fading.start(MARK_MS)
+        self._fading.start(MARK_DURATION_MS)
         self.update()
 
-    def _unmark(self) -> None:
+    def _clear_mark(self) -> None:
         self.marked = None
         self.update()
 
-    def forget_click(self) -> None:
+    def discard_click(self) -> None:
         """Discard a pending click and the keyboard cursor."""
         self._pressed = self._pending_click = None
         self._double_click_timer.stop()
@@ -82,7 +82,7 @@ class ClickablePicture(ZoomablePicture):
 
     def clear(self) -> None:
         super().clear()
-        self.forget_click()
+        self.discard_click()
         self.marked = None
 
     def _emit_click(self) -> None:
@@ -134,21 +134,21 @@ class ClickablePicture(ZoomablePicture):
             self._double_click_timer.start(QApplication.doubleClickInterval())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        self.forget_click()
+        self.discard_click()
         super().mouseDoubleClickEvent(event)
 
     # -- keyboard -----------------------------------------------------------------------------------------
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name, picture = key_name(event), self.picture
-        way = WAYS.get(name.removeprefix("Shift+"))
+        way = KEY_DIRECTIONS.get(name.removeprefix("Shift+"))
         if not self._takes_clicks or picture is None:
             super().keyPressEvent(event)
         elif way is not None:
-            self._move_cursor(-way[0], -way[1], FAR if name.startswith("Shift+") else 1)
+            self._move_cursor(-way[0], -way[1], LARGE_CURSOR_STEP_PX if name.startswith("Shift+") else 1)
         elif name in {"Return", "Enter"} and self.pointed is not None and not event.isAutoRepeat():
             self._emit_click()
-            x, y = _clamped(self.pointed, picture)
+            x, y = _clamp_to_picture(self.pointed, picture)
             self.clicked.emit(PicturePoint(x, y, picture.width, picture.height, picture.stamp_ns, "left"))
         else:
             super().keyPressEvent(event)
@@ -159,7 +159,7 @@ class ClickablePicture(ZoomablePicture):
             wanted = QRectF(self.rect()).center()
         else:
             step = count * max(1.0, self.scale())
-            wanted = self._view_of(self.pointed) + QPointF(across * step, down * step)
+            wanted = self._view_position(self.pointed) + QPointF(across * step, down * step)
         shown = self.area()
         inside = QPointF(
             min(max(wanted.x(), shown.left()), shown.right() - 1e-3),
@@ -176,18 +176,18 @@ class ClickablePicture(ZoomablePicture):
         # Scrolls a zoomed image so that the cursor is visible.
         if self.pointed is None or self.place.zoom is None:
             return
-        at, seen = self._view_of(self.pointed), QRectF(self.rect()).adjusted(*BESIDE)
+        at, seen = self._view_position(self.pointed), QRectF(self.rect()).adjusted(*SCROLL_MARGINS)
         dx = min(0.0, seen.right() - at.x()) + max(0.0, seen.left() - at.x())
         dy = min(0.0, seen.bottom() - at.y()) + max(0.0, seen.top() - at.y())
         if dx or dy:
             self.move_by(dx, dy)
 
-    def _view_of(self, pixel: tuple[int, int]) -> QPointF:
+    def _view_position(self, pixel: tuple[int, int]) -> QPointF:
         # Centre of a pixel in view coordinates.
         picture = self.picture
         if picture is None:
             return QPointF()
-        x, y = _clamped(pixel, picture)
+        x, y = _clamp_to_picture(pixel, picture)
         share = QPointF((x + 0.5) / picture.width, (y + 0.5) / picture.height)
         return self.place.to_view(self.area()).map(share)
 
@@ -200,14 +200,14 @@ class ClickablePicture(ZoomablePicture):
 
     def paintEvent(self, event: QPaintEvent) -> None:
         if self.pointed is not None:  # zoom, rotation or size may have moved the cursor's pixel
-            self.mouse = self._view_of(self.pointed)
+            self.mouse = self._view_position(self.pointed)
         super().paintEvent(event)
         if self.picture is None:
             return
         if self.marked is not None:
-            self._paint_cross(self.place.to_view(self.area()).map(QPointF(*self.marked.share)))
+            self._paint_cross(self.place.to_view(self.area()).map(QPointF(*self.marked.relative_position)))
         if self.pointed is not None and self._takes_clicks:
-            self._paint_cross(self._view_of(self.pointed), ring=False)
+            self._paint_cross(self._view_position(self.pointed), ring=False)
 
     def _paint_cross(self, at: QPointF, *, ring: bool = True) -> None:
         # Dark below and light above, so that the mark is visible on every image.
@@ -223,6 +223,6 @@ class ClickablePicture(ZoomablePicture):
         painter.end()
 
 
-def _clamped(pixel: tuple[int, int], picture: Picture) -> tuple[int, int]:
+def _clamp_to_picture(pixel: tuple[int, int], picture: Picture) -> tuple[int, int]:
     # A later image can be smaller than the one that the cursor was placed on.
     return min(pixel[0], picture.width - 1), min(pixel[1], picture.height - 1)

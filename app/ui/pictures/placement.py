@@ -17,7 +17,7 @@ FILL_LIMIT = 1.34
 
 
 @dataclass(slots=True)
-class PicturePlace:
+class PicturePlacement:
     """Placement of an image in a view.
 
     Attributes:
@@ -28,22 +28,22 @@ class PicturePlace:
 
     zoom: float | None = None
     centre: tuple[float, float] = (0.5, 0.5)
-    turned: int = 0
-    flipped_across: bool = False
-    flipped_down: bool = False
+    rotation_deg: int = 0
+    is_flipped_horizontally: bool = False
+    is_flipped_vertically: bool = False
 
     # -- geometry -----------------------------------------------------------------------------------------
 
-    def seen_size(self, picture: QSizeF) -> QSizeF:
+    def rotated_size(self, picture: QSizeF) -> QSizeF:
         """Return the size of the rotated image."""
-        return picture.transposed() if self.turned % 180 else picture
+        return picture.transposed() if self.rotation_deg % 180 else picture
 
-    def fitting(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> float:
+    def fit_zoom(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> float:
         """Return the zoom that fits the image into the view.
 
         With ``fill``, up to a tenth of the image may be cut off at the edges.
         """
-        seen = self.seen_size(picture)
+        seen = self.rotated_size(picture)
         across, down = view.width() / max(1.0, seen.width()), view.height() / max(1.0, seen.height())
         scale = min(across, down)
         if fill and scale > 0 and max(across, down) / scale < FILL_LIMIT:
@@ -55,19 +55,19 @@ class PicturePlace:
 
         The rectangle may exceed the view, but leaves no gap that a different position would avoid.
         """
-        scale = self.zoom if self.zoom is not None else self.fitting(view, picture, fill=fill)
-        seen = self.seen_size(picture) * scale
+        scale = self.zoom if self.zoom is not None else self.fit_zoom(view, picture, fill=fill)
+        seen = self.rotated_size(picture) * scale
         x, y = self.centre if self.zoom is not None else (0.5, 0.5)
-        left = _placed(view.width(), seen.width(), x)
-        top = _placed(view.height(), seen.height(), y)
+        left = _offset(view.width(), seen.width(), x)
+        top = _offset(view.height(), seen.height(), y)
         return QRectF(left, top, seen.width(), seen.height())
 
     def orientation(self) -> QTransform:
         """Return the transform from the image to the rotated and mirrored image, both in fractions."""
         transform = QTransform()
         transform.translate(0.5, 0.5)
-        transform.scale(-1 if self.flipped_across else 1, -1 if self.flipped_down else 1)
-        transform.rotate(self.turned)
+        transform.scale(-1 if self.is_flipped_horizontally else 1, -1 if self.is_flipped_vertically else 1)
+        transform.rotate(self.rotation_deg)
         transform.translate(-0.5, -0.5)
         return transform
 
@@ -91,12 +91,12 @@ class PicturePlace:
     def zoom_at(self, factor: float, at: QPointF, view: QSizeF, picture: QSizeF) -> None:
         """Zoom by a factor around a point of the view."""
         area = self.area(view, picture)
-        before = area.width() / max(1.0, self.seen_size(picture).width())
-        smallest = min(SMALLEST, self.fitting(view, picture))
+        before = area.width() / max(1.0, self.rotated_size(picture).width())
+        smallest = min(SMALLEST, self.fit_zoom(view, picture))
         after = min(MAX_SIZE, max(smallest, before * factor))
         share_x = (at.x() - area.x()) / max(1e-9, area.width())
         share_y = (at.y() - area.y()) / max(1e-9, area.height())
-        seen = self.seen_size(picture) * after
+        seen = self.rotated_size(picture) * after
         self.zoom = after
         self.centre = (
             share_x + (view.width() / 2 - at.x()) / max(1e-9, seen.width()),
@@ -121,10 +121,10 @@ class PicturePlace:
         if zoom is None:
             self.centre = (0.5, 0.5)
 
-    def turn(self, degrees: int) -> None:
+    def rotate(self, degrees: int) -> None:
         """Rotate the image clockwise by a multiple of 90 degrees."""
-        quarter = -degrees if self.flipped_across != self.flipped_down else degrees
-        self.turned = (self.turned + quarter) % 360
+        quarter = -degrees if self.is_flipped_horizontally != self.is_flipped_vertically else degrees
+        self.rotation_deg = (self.rotation_deg + quarter) % 360
         if degrees % 180:
             x, y = self.centre
             self.centre = (1 - y, x) if degrees % 360 == 90 else (y, 1 - x)
@@ -135,9 +135,9 @@ class PicturePlace:
         """Mirror the image horizontally if `across`, else vertically."""
         x, y = self.centre
         if across:
-            self.flipped_across, self.centre = not self.flipped_across, (1 - x, y)
+            self.is_flipped_horizontally, self.centre = not self.is_flipped_horizontally, (1 - x, y)
         else:
-            self.flipped_down, self.centre = not self.flipped_down, (x, 1 - y)
+            self.is_flipped_vertically, self.centre = not self.is_flipped_vertically, (x, 1 - y)
 
     def _normalize_centre(self, view: QSizeF, picture: QSizeF) -> None:
         # Normalizes the centre, so that the next movement starts where the image is displayed.
@@ -149,14 +149,14 @@ class PicturePlace:
 
     # -- saved with the layout ----------------------------------------------------------------------------
 
-    def saved(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """Return the placement as JSON values for a layout."""
         return {
             "zoom": self.zoom,
             "centre": list(self.centre),
-            "turned": self.turned,
-            "across": self.flipped_across,
-            "down": self.flipped_down,
+            "turned": self.rotation_deg,
+            "across": self.is_flipped_horizontally,
+            "down": self.is_flipped_vertically,
         }
 
     def restore(self, saved: object) -> None:
@@ -173,11 +173,14 @@ class PicturePlace:
             ):
                 self.centre = (float(centre[0]), float(centre[1]))
         if turned in {0, 90, 180, 270}:
-            self.turned = int(turned)
-        self.flipped_across, self.flipped_down = saved.get("across") is True, saved.get("down") is True
+            self.rotation_deg = int(turned)
+        self.is_flipped_horizontally, self.is_flipped_vertically = (
+            saved.get("across") is True,
+            saved.get("down") is True,
+        )
 
 
-def _placed(room: float, length: float, centre: float) -> float:
+def _offset(room: float, length: float, centre: float) -> float:
     # Offset of `length` that puts `centre` into the middle without leaving a gap.
     if length <= room:
         return (room - length) / 2

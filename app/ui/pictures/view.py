@@ -11,31 +11,31 @@ from PySide6.QtCore import QPointF, QRectF, QSize, QSizeF, Qt
 from PySide6.QtGui import QColor, QFont, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.pictures.annotations import paint_colour_bar, paint_drawn
+from app.ui.pictures.annotations import paint_annotations, paint_colour_bar
 from app.ui.pictures.boxes import DetectionBox, paint_box
-from app.ui.pictures.placement import PicturePlace
-from app.ui.text.numbers import age_words
+from app.ui.pictures.placement import PicturePlacement
+from app.ui.text.numbers import age_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _
 
 if TYPE_CHECKING:
-    from app.core.messages.annotations import Drawn
+    from app.core.messages.annotations import Shape
     from app.core.messages.image_streams import ImageStream
     from app.core.messages.picture import Picture, Pixel
 
-SILENT_AFTER_S = 2.0
-LABEL_EDGE = 8
-SHARP_FROM = 2.0  # screen pixels per image pixel from which pixels are drawn with sharp edges
-FIGURES_STAY_S = 1.0  # a rate or age that changes with every image would be unreadable
-OLDEST_S = 3600.0
-COARSE = QSize(16, 12)
+STALE_AFTER_S = 2.0
+LABEL_MARGIN = 8
+MIN_SHARP_SCALE = 2.0  # screen pixels per image pixel from which pixels are drawn with sharp edges
+STATS_INTERVAL_S = 1.0  # a rate or age that changes with every image would be unreadable
+MAX_AGE_S = 3600.0
+BLUR_SIZE = QSize(16, 12)
 DIMMED, SILENT = QColor(0, 0, 0, 110), QColor(0, 0, 0, 140)
-ICON = 28.0
+ICON_SIZE = 28.0
 
 
-def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
+def rate_text(shown_hz: float | None, arriving_hz: float | None) -> str:
     """Format frame rates, such as ``shown 30 of 60/s``; "" if both are unknown."""
     if arriving_hz is None:
         return ""
@@ -43,7 +43,7 @@ def rate_sentence(shown_hz: float | None, arriving_hz: float | None) -> str:
     return _("{arriving} fps ({shown} shown)").format(shown=round(shown), arriving=round(arriving_hz))
 
 
-class RateWords:
+class RateText:
     """Text with the frame rates of a stream, updated at most once a second.
 
     Rates that change with every image would be unreadable, and texts of different lengths move adjacent text.
@@ -53,10 +53,10 @@ class RateWords:
         self._clock = clock
         self._words, self._since = "", 0.0
 
-    def of(self, stream: ImageStream) -> str:
+    def for_stream(self, stream: ImageStream) -> str:
         """Return the current text for a stream."""
-        words, now = rate_sentence(stream.shown_hz, stream.arriving_hz), self._clock()
-        if words != self._words and (not self._words or not words or now - self._since >= FIGURES_STAY_S):
+        words, now = rate_text(stream.displayed_hz, stream.arriving_hz), self._clock()
+        if words != self._words and (not self._words or not words or now - self._since >= STATS_INTERVAL_S):
             self._words, self._since = words, now
         return self._words
 
@@ -65,7 +65,7 @@ class RateWords:
         self._words = ""
 
 
-def pixel_words(x: int, y: int, pixel: Pixel | None) -> str:
+def pixel_text(x: int, y: int, pixel: Pixel | None) -> str:
     """Format a pixel, such as ``(16, 8)  196 198 190  #C4C6BE``, or with a single number for one channel."""
     if pixel is None:
         return f"({x}, {y})"
@@ -95,17 +95,17 @@ class PictureView(QWidget):
         self._clock = clock
         self._theme = theme
         self._fill, self._labelled = fill, labelled
-        self.place = PicturePlace()
+        self.place = PicturePlacement()
         self._picture: Picture | None = None
         self._image: QImage | None = None
         self._grey: QImage | None = None  # grey version of the last image, shown while the stream is silent
         self._boxes: tuple[DetectionBox, ...] = ()
-        self._drawn: tuple[Drawn, ...] = ()
+        self._drawn: tuple[Shape, ...] = ()
         self._rate = self._state = self._age = ""
-        self._rates = RateWords(clock)
+        self._rates = RateText(clock)
         self._silent = False  # the last image is shown because no new one arrives
         self.mouse: QPointF | None = None  # position of the mouse if it is over the image
-        self._age_updated_s = -FIGURES_STAY_S  # time of the last update of the age
+        self._age_updated_s = -STATS_INTERVAL_S  # time of the last update of the age
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(80, 60)
@@ -113,12 +113,12 @@ class PictureView(QWidget):
     # -- content ------------------------------------------------------------------------------------------
 
     @property
-    def words(self) -> str:
+    def label_text(self) -> str:
         """Text of the label at the lower left."""
         picture = self._picture
         if picture is None:
             return ""
-        under = self._under_mouse()
+        under = self._hovered_pixel_text()
         size = "" if self._state else f"{picture.width}\u00d7{picture.height}"
         zoom = f"{round(self.scale() * 100)} %" if self.place.zoom is not None else ""
         facts = (under, zoom) if under else (size, zoom, "" if self._state else self._age)
@@ -130,7 +130,7 @@ class PictureView(QWidget):
         return self._boxes
 
     @property
-    def drawn(self) -> tuple[Drawn, ...]:
+    def annotations(self) -> tuple[Shape, ...]:
         """Annotations on the current image."""
         return self._drawn
 
@@ -152,20 +152,20 @@ class PictureView(QWidget):
         self,
         stream: ImageStream,
         boxes: tuple[DetectionBox, ...] = (),
-        drawn: Callable[[int, int], tuple[Drawn, ...]] | None = None,
+        drawn: Callable[[int, int], tuple[Shape, ...]] | None = None,
     ) -> None:
         """Show the stream's newest image; ``drawn`` returns the annotations for an image of a given size."""
-        words, before = self.words, (self._boxes, self._drawn, self._silent, self._state)
+        words, before = self.label_text, (self._boxes, self._drawn, self._silent, self._state)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
-        self._rate = self._rates.of(stream)
+        self._rate = self._rates.for_stream(stream)
         now = self._clock()
-        if picture is not None and (now - self._age_updated_s >= FIGURES_STAY_S or not self._age):
-            self._age, self._age_updated_s = _age_words(stream.stamped_s), now
-        self._silent = not stream.held and silent_s is not None and silent_s > SILENT_AFTER_S
-        if stream.held:
-            self._state = _("Frozen {age} ago").format(age=age_words(stream.age_s))
+        if picture is not None and (now - self._age_updated_s >= STATS_INTERVAL_S or not self._age):
+            self._age, self._age_updated_s = _age_text(stream.stamp_age_s), now
+        self._silent = not stream.is_frozen and silent_s is not None and silent_s > STALE_AFTER_S
+        if stream.is_frozen:
+            self._state = _("Frozen {age} ago").format(age=age_text(stream.age_s))
         elif self._silent:
-            self._state = _("Last image {age} ago").format(age=age_words(stream.age_s))
+            self._state = _("Last image {age} ago").format(age=age_text(stream.age_s))
         else:
             self._state = ""
         if picture is not self._picture and picture is not None:
@@ -178,32 +178,32 @@ class PictureView(QWidget):
                     picture.bgra.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32
                 )
                 self.update()
-            if not stream.held:
+            if not stream.is_frozen:
                 stream.count_painted()
-        if not stream.held or picture is not shown:
+        if not stream.is_frozen or picture is not shown:
             self._boxes = boxes  # boxes on a frozen image don't change
             shown = self._picture
             self._drawn = drawn(shown.width, shown.height) if drawn is not None and shown is not None else ()
-        stream.want(self._wanted_size())
+        stream.set_size(self._requested_size())
         if (self._boxes, self._drawn, self._silent, self._state) != before:
             self.update()
         self._update_label(words)
 
     def _update_label(self, before: str) -> None:
-        words = self.words
+        words = self.label_text
         if words != before:
             self.setAccessibleDescription(words)
             if self._labelled:
                 top = self._label_top()
                 self.update(0, top, self.width(), self.height() - top)
 
-    def _wanted_size(self) -> tuple[int, int] | None:
+    def _requested_size(self) -> tuple[int, int] | None:
         # Size of the image in screen pixels; None if all image pixels are needed.
         if self.mouse is not None:
             return None
         ratio = self.devicePixelRatioF()
         size = self.area().size() if self._picture is not None else QSizeF(self.size())
-        if self.place.turned % 180:
+        if self.place.rotation_deg % 180:
             size = size.transposed()
         return round(size.width() * ratio), round(size.height() * ratio)
 
@@ -223,7 +223,7 @@ class PictureView(QWidget):
 
     def scale(self) -> float:
         """Return the number of screen pixels per image pixel."""
-        seen = self.place.seen_size(self.picture_size()).width()
+        seen = self.place.rotated_size(self.picture_size()).width()
         return self.area().width() / max(1.0, seen) * self.devicePixelRatioF()
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
@@ -237,10 +237,10 @@ class PictureView(QWidget):
         x, y = int(share.x() * picture.width + 1e-6), int(share.y() * picture.height + 1e-6)
         return min(x, picture.width - 1), min(y, picture.height - 1)
 
-    def _under_mouse(self) -> str:
+    def _hovered_pixel_text(self) -> str:
         picture = self._picture
         pixel = self.pixel_at(self.mouse) if self.mouse is not None else None
-        return pixel_words(*pixel, picture.pixel(*pixel)) if pixel is not None and picture is not None else ""
+        return pixel_text(*pixel, picture.pixel(*pixel)) if pixel is not None and picture is not None else ""
 
     # -- painting -----------------------------------------------------------------------------------------
 
@@ -252,37 +252,37 @@ class PictureView(QWidget):
             if image is None or not self._fill:
                 painter.fillRect(self.rect(), QColor("black"))
             else:
-                paint_around(painter, view, image)
+                paint_blurred_background(painter, view, image)
         if image is not None:
             self._paint_image(painter, area, image)
         if self._silent and not self._labelled:
-            paint_silent(painter, self._theme, view, self._state)
+            paint_stale(painter, self._theme, view, self._state)
         elif self._silent:
             painter.fillRect(area, QColor(90, 90, 90, 150))
         else:
             shares = self.place.to_view(area)
             for box in self._boxes:
-                paint_box(painter, self._theme, shares.mapRect(box.place), box)
+                paint_box(painter, self._theme, shares.mapRect(box.rect), box)
             if self._drawn:
-                paint_drawn(
+                paint_annotations(
                     painter, self._theme, shares, self.scale() / self.devicePixelRatioF(), self._drawn
                 )
         if self._labelled and self._picture is not None and self._picture.scale is not None:
             paint_colour_bar(painter, self._theme, view, self._picture.scale)
-        if self._labelled and self.words:
+        if self._labelled and self.label_text:
             self._paint_label(painter)
         painter.end()
 
     def _grey_image(self) -> QImage | None:
         if self._grey is None and self._image is not None:
-            self._grey = grey(self._image)
+            self._grey = to_greyscale(self._image)
         return self._grey
 
     def _paint_image(self, painter: QPainter, area: QRectF, image: QImage) -> None:
-        smooth = self.scale() < SHARP_FROM
+        smooth = self.scale() < MIN_SHARP_SCALE
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, smooth)
         place = self.place
-        if not place.turned and not place.flipped_across and not place.flipped_down:
+        if not place.rotation_deg and not place.is_flipped_horizontally and not place.is_flipped_vertically:
             painter.drawImage(area, image)  # fast path of Qt
             return
         painter.save()
@@ -297,49 +297,49 @@ class PictureView(QWidget):
 
     def _label_top(self) -> int:
         high = max(20.0, paint.height_of(self._label_font()) + 4)
-        return math.floor(self.height() - LABEL_EDGE - high)
+        return math.floor(self.height() - LABEL_MARGIN - high)
 
     def _paint_label(self, painter: QPainter) -> None:
         font = self._label_font()
         high = max(20.0, paint.height_of(font) + 4)
-        width = min(paint.width_of(font, self.words) + 16, self.width() - 2 * LABEL_EDGE)
-        tag = QRectF(LABEL_EDGE, self.height() - LABEL_EDGE - high, width, high)
+        width = min(paint.width_of(font, self.label_text) + 16, self.width() - 2 * LABEL_MARGIN)
+        tag = QRectF(LABEL_MARGIN, self.height() - LABEL_MARGIN - high, width, high)
         paint.box(painter, tag, 4, QColor(0, 0, 0, 190))
-        paint.words(painter, tag.adjusted(8, 0, -4, 0), self.words, font, QColor("white"))
+        paint.text_line(painter, tag.adjusted(8, 0, -4, 0), self.label_text, font, QColor("white"))
 
 
-def paint_around(painter: QPainter, view: QRectF, image: QImage) -> None:
+def paint_blurred_background(painter: QPainter, view: QRectF, image: QImage) -> None:
     """Fill the view around an image with a blurred and darkened copy of it instead of black borders."""
     ignore, smooth = Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
-    painter.drawImage(view, image.scaled(COARSE, ignore, smooth))
+    painter.drawImage(view, image.scaled(BLUR_SIZE, ignore, smooth))
     painter.restore()
     painter.fillRect(view, DIMMED)
 
 
-def grey(image: QImage) -> QImage:
+def to_greyscale(image: QImage) -> QImage:
     """Return a greyscale copy of the image."""
     return image.convertToFormat(QImage.Format.Format_Grayscale8)
 
 
-def paint_silent(painter: QPainter, theme: Theme, view: QRectF, words: str) -> None:
+def paint_stale(painter: QPainter, theme: Theme, view: QRectF, words: str) -> None:
     """Paint a camera icon and the image's age in the middle of the view."""
     painter.fillRect(view, SILENT)
     font = theme.font("bodyLarge")
     font.setWeight(font.Weight.DemiBold)
     line = paint.height_of(font)
-    with_icon = view.height() >= ICON + line + 12
+    with_icon = view.height() >= ICON_SIZE + line + 12
     middle = view.center()
     if with_icon:
-        square = QRectF(0, 0, ICON, ICON)
+        square = QRectF(0, 0, ICON_SIZE, ICON_SIZE)
         square.moveCenter(QPointF(middle.x(), middle.y() - line / 2 - 2))
         paint_icon(painter, square, "camera", QColor("white"))
-    top = middle.y() + ICON / 2 - line / 2 + 4 if with_icon else middle.y() - line / 2
+    top = middle.y() + ICON_SIZE / 2 - line / 2 + 4 if with_icon else middle.y() - line / 2
     room = QRectF(view.left() + 8, top, view.width() - 16, line + 2)
-    paint.words(painter, room, words, font, QColor("white"), paint.CENTRE)
+    paint.text_line(painter, room, words, font, QColor("white"), paint.CENTRE)
 
 
-def _age_words(age_s: float | None) -> str:
+def _age_text(age_s: float | None) -> str:
     # Age of the image; "" if it has no time stamp or the clock is wrong.
-    return age_words(age_s) if age_s is not None and 0 <= age_s < OLDEST_S else ""
+    return age_text(age_s) if age_s is not None and 0 <= age_s < MAX_AGE_S else ""

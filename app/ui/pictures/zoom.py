@@ -11,8 +11,8 @@ from app.ui.pictures.view import PictureView
 from app.ui.theme.theme import Theme
 
 STEP, NOTCH = 1.25, 120
-KEY_MOVE = 40
-WAYS = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
+KEY_MOVE_PX = 40
+KEY_DIRECTIONS = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 
 
 class ZoomablePicture(PictureView):
@@ -22,7 +22,7 @@ class ZoomablePicture(PictureView):
     "Ctrl+C". These keys take precedence over the window's shortcuts while the image has the focus.
     """
 
-    place_changed = Signal()
+    placement_changed = Signal()
     key_pressed = Signal(str)
 
     def __init__(self, theme: Theme) -> None:
@@ -36,26 +36,26 @@ class ZoomablePicture(PictureView):
         """Zoom by a factor around ``at``, by default the centre."""
         middle = QPointF(self.width() / 2, self.height() / 2)
         self.place.zoom_at(factor, at or middle, QSizeF(self.size()), self.picture_size())
-        self.told()
+        self.notify_changed()
 
-    def show_whole(self) -> None:
+    def fit_to_view(self) -> None:
         """Fit the image into the view."""
         self.place.set_zoom(None)
-        self.told()
+        self.notify_changed()
 
-    def show_exact(self, at: QPointF | None = None) -> None:
+    def show_actual_size(self, at: QPointF | None = None) -> None:
         """Show one screen pixel per image pixel, around ``at``."""
         self.zoom_by(1 / max(1e-9, self.scale()), at)
 
     def move_by(self, dx: float, dy: float) -> None:
         """Move the image by a distance in px."""
         self.place.move(dx, dy, QSizeF(self.size()), self.picture_size())
-        self.told()
+        self.notify_changed()
 
-    def told(self) -> None:
+    def notify_changed(self) -> None:
         """Repaint and emit `place_changed`."""
         self.update()
-        self.place_changed.emit()
+        self.placement_changed.emit()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if self.picture is None:
@@ -76,9 +76,9 @@ class ZoomablePicture(PictureView):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         name = key_name(event)
-        if name in WAYS and self.place.zoom is not None:
-            across, down = WAYS[name]
-            self.move_by(across * KEY_MOVE, down * KEY_MOVE)
+        if name in KEY_DIRECTIONS and self.place.zoom is not None:
+            across, down = KEY_DIRECTIONS[name]
+            self.move_by(across * KEY_MOVE_PX, down * KEY_MOVE_PX)
         elif name in self.keys:
             self.key_pressed.emit(name)
         else:
@@ -101,9 +101,9 @@ class ZoomablePicture(PictureView):
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             if self.place.zoom is None:
-                self.show_exact(event.position())
+                self.show_actual_size(event.position())
             else:
-                self.show_whole()
+                self.fit_to_view()
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._dragged is not None:

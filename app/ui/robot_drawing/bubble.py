@@ -15,7 +15,7 @@ MIN_WIDTH, SHORT_WIDTH, LONG_WIDTH = 140.0, 190.0, 320.0
 SHORT_LINES, MAX_LINES, MAX_NARROW = 4, 6, 8
 LARGE, SMALL = 14, 12
 INSIDE, EDGE = 14.0, 8.0
-READ_AHEAD = 2
+LINES_ABOVE_SPOKEN = 2
 """Number of visible lines above the spoken one."""
 
 
@@ -25,15 +25,15 @@ class BubbleText:
 
     lines: Sequence[str]
     first: int
-    shown: int
+    visible_count: int
 
     @property
-    def visible(self) -> Sequence[str]:
+    def visible_lines(self) -> Sequence[str]:
         """Lines that are visible."""
-        return self.lines[self.first : self.first + self.shown]
+        return self.lines[self.first : self.first + self.visible_count]
 
 
-def wrapped(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
+def wrap_text(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
     """Wrap a text to a width in px; a longer word continues in the next line."""
     lines = [""]
     for word in words.split():
@@ -41,7 +41,7 @@ def wrapped(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
         if metrics.horizontalAdvance(tried) <= width:
             lines[-1] = tried
             continue
-        for piece in _pieces(word, metrics, width):
+        for piece in _split_word(word, metrics, width):
             if lines[-1]:
                 lines.append(piece)
             else:
@@ -49,7 +49,7 @@ def wrapped(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
     return lines
 
 
-def _pieces(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
+def _split_word(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
     pieces = [""]
     for letter in word:
         if pieces[-1] and metrics.horizontalAdvance(pieces[-1] + letter) > width:
@@ -58,7 +58,7 @@ def _pieces(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
     return pieces
 
 
-def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
+def scroll_to_spoken(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
     """Return as many lines as fit, scrolled to the spoken word (``spoken`` from 0 to 1)."""
     shown = max(1, min(most, len(lines)))
     letters = sum(len(line) for line in lines)
@@ -66,7 +66,10 @@ def scrolled(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
     while line < len(lines) - 1 and position >= len(lines[line]):
         position -= len(lines[line])
         line += 1
-    first = min(max(0, line - (shown - 1 - READ_AHEAD if shown > READ_AHEAD else 0)), len(lines) - shown)
+    first = min(
+        max(0, line - (shown - 1 - LINES_ABOVE_SPOKEN if shown > LINES_ABOVE_SPOKEN else 0)),
+        len(lines) - shown,
+    )
     return BubbleText(lines, max(0, first), shown)
 
 
@@ -92,18 +95,20 @@ def paint_bubble(
     face.setWeight(QFont.Weight.DemiBold)
     face.setPixelSize(LARGE)
     width = min(SHORT_WIDTH, bounds.width() - 2 * EDGE)
-    lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
+    lines = wrap_text(words, QFontMetricsF(face), width - 2 * INSIDE)
     if len(lines) > SHORT_LINES:
         face.setPixelSize(SMALL)
         beside = max(room_right, room_left)  # narrower and higher, so that the bubble doesn't cover the face
         width = min(max(MIN_WIDTH, beside), LONG_WIDTH, bounds.width() - 2 * EDGE)
-        lines = wrapped(words, QFontMetricsF(face), width - 2 * INSIDE)
+        lines = wrap_text(words, QFontMetricsF(face), width - 2 * INSIDE)
     metrics = QFontMetricsF(face)
     line_height = metrics.height() + 1
     fits = int((bounds.height() - 2 * EDGE - 30) / line_height)
-    text = scrolled(lines, min(MAX_NARROW if width < SHORT_WIDTH else MAX_LINES, fits), state.spoken)
+    text = scroll_to_spoken(
+        lines, min(MAX_NARROW if width < SHORT_WIDTH else MAX_LINES, fits), state.spoken_fraction
+    )
     width = max(metrics.horizontalAdvance(line) for line in lines) + 2 * INSIDE
-    height = text.shown * line_height + 18
+    height = text.visible_count * line_height + 18
     side = -1.0 if room_left > room_right and room_right < width else 1.0
 
     def box_at(towards: float) -> QRectF:
@@ -111,34 +116,34 @@ def paint_bubble(
         left = min(max(left, bounds.left() + EDGE), max(bounds.left() + EDGE, bounds.right() - EDGE - width))
         return QRectF(left, max(bounds.top() + EDGE, head.v - 39 * head.scale - height), width, height)
 
-    side, box = _free_place([(side, box_at(side)), (-side, box_at(-side))], taken, bounds)
+    side, box = _choose_box([(side, box_at(side)), (-side, box_at(-side))], taken, bounds)
     _paint_box(p, box, min(max(head.u + side * 58 * head.scale, box.left() + 18), box.right() - 30), side)
     p.setFont(face)
     p.setPen(QColor("#1C1B19"))
-    scrolls = text.shown < len(lines)
-    for number, line in enumerate(text.visible):
+    scrolls = text.visible_count < len(lines)
+    for number, line in enumerate(text.visible_lines):
         at = QRectF(box.left(), box.top() + 9 + number * line_height, width, line_height)
         p.drawText(at, Qt.AlignmentFlag.AlignCenter, line)
     if scrolls:
-        _paint_thumb(p, box, text)
+        _paint_scroll_thumb(p, box, text)
     return box
 
 
-def _free_place(
+def _choose_box(
     places: Sequence[tuple[float, QRectF]], taken: Sequence[QRectF], bounds: QRectF
 ) -> tuple[float, QRectF]:
     # Tries places without overlap first, then below other bubbles, then the one with the smallest overlap.
-    def covered(place: tuple[float, QRectF]) -> float:
+    def covered_area(place: tuple[float, QRectF]) -> float:
         common = [place[1].intersected(other) for other in taken]
         return sum(each.width() * each.height() for each in common)
 
     tops = [other.bottom() + EDGE for other in taken]
     lower = [(side, box.translated(0, top - box.top())) for top in tops for side, box in places]
     inside = [place for place in lower if place[1].bottom() <= bounds.bottom() - EDGE]
-    return min([*places, *inside], key=covered)
+    return min([*places, *inside], key=covered_area)
 
 
-def paint_heard(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
+def paint_caption(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
     """Paint a caption, in one line at the bottom of ``area`` (px), of speech that outlasts its bubble."""
     metrics = QFontMetricsF(font)
     most = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
@@ -166,7 +171,7 @@ def _paint_box(p: QPainter, box: QRectF, foot: float, side: float) -> None:
     p.drawPath(shape.united(tail))
 
 
-def _paint_thumb(p: QPainter, box: QRectF, text: BubbleText) -> None:
+def _paint_scroll_thumb(p: QPainter, box: QRectF, text: BubbleText) -> None:
     # Paints the scroll position.
     track = QRectF(box.right() - 7, box.top() + 10, 3, box.height() - 20)
     count = len(text.lines)
@@ -174,7 +179,7 @@ def _paint_thumb(p: QPainter, box: QRectF, text: BubbleText) -> None:
         track.left(),
         track.top() + track.height() * text.first / count,
         track.width(),
-        track.height() * text.shown / count,
+        track.height() * text.visible_count / count,
     )
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor("#C9C4BA"))

@@ -8,22 +8,22 @@ from __future__ import annotations
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QFont, QPainter, QPainterPath, QPen, QPolygonF
 
-from app.ui.robot_drawing.room import HORIZON, START, Spot
+from app.ui.robot_drawing.room import HORIZON, UNIT_SCALE_DEPTH, Spot
 from app.ui.robot_drawing.state import Thing
 
 BALL_M, CARD_M = 0.14, 0.30
 UNITS_PER_M = 150.0
 SHELF_UNITS_PER_M = 66.0
-BOOKS = (("#3F7CB3", "#C9523F", "#E2A94F", "#4E8C7A"), ("#4E8C7A", "#7A5BA8", "#3F7CB3"))
-TABLE = Spot(315.0, 239.0, (239.0 - HORIZON) / START)
+BOOK_COLOURS = (("#3F7CB3", "#C9523F", "#E2A94F", "#4E8C7A"), ("#4E8C7A", "#7A5BA8", "#3F7CB3"))
+TABLE_SPOT = Spot(315.0, 239.0, (239.0 - HORIZON) / UNIT_SCALE_DEPTH)
 
 
-def _table(p: QPainter, spot: Spot) -> None:
+def _paint_table(p: QPainter, spot: Spot) -> None:
     # Painted at its position in the design and translated from there.
     p.save()
     p.translate(spot.u, spot.v)
-    p.scale(spot.scale / TABLE.scale, spot.scale / TABLE.scale)
-    p.translate(-TABLE.u, -TABLE.v)
+    p.scale(spot.scale / TABLE_SPOT.scale, spot.scale / TABLE_SPOT.scale)
+    p.translate(-TABLE_SPOT.u, -TABLE_SPOT.v)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(60, 40, 20, 46))
     p.drawEllipse(QPointF(315, 239.5), 52, 5)
@@ -44,7 +44,7 @@ def _table(p: QPainter, spot: Spot) -> None:
     p.restore()
 
 
-def _shelf(p: QPainter, area: QRectF) -> None:
+def _paint_shelf(p: QPainter, area: QRectF) -> None:
     # Lower than a real table, so that the window stays visible.
     p.fillRect(area, QColor("#8B6644"))
     edge = area.width() * 0.07
@@ -55,7 +55,7 @@ def _shelf(p: QPainter, area: QRectF) -> None:
         bottom = inside.top() + board * (row + 1)
         p.fillRect(QRectF(inside.left(), bottom - edge * 0.7, inside.width(), edge * 0.7), QColor("#9E7654"))
         x = inside.left() + edge * 0.6
-        for place, colour in enumerate(BOOKS[row]):
+        for place, colour in enumerate(BOOK_COLOURS[row]):
             wide, high = edge * (1.5 + place % 2 * 0.5), board * (0.62 + 0.09 * (place * 2 % 3))
             p.fillRect(QRectF(x, bottom - edge * 0.7 - high, wide, high), QColor(colour))
             x += wide + edge * 0.25
@@ -72,7 +72,7 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
         r = max(4.0, (thing.size_m or BALL_M) * 110.0 * spot.scale)
         return QRectF(spot.u - r, spot.v - 2 * r + r * 0.08, 2 * r, 2 * r)
     if thing.kind == "table":
-        share = spot.scale / TABLE.scale
+        share = spot.scale / TABLE_SPOT.scale
         return QRectF(spot.u - 53 * share, spot.v - 61 * share, 106 * share, 61 * share)
     wide = max(10.0, min(thing.size_m or CARD_M, CARD_M * 0.8) * UNITS_PER_M * spot.scale)
     return QRectF(spot.u - wide / 2, spot.v - 78 * spot.scale - wide * 0.6, wide, wide * 1.2)
@@ -83,16 +83,16 @@ def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
     area = thing_area(thing, spot)
     p.setPen(Qt.PenStyle.NoPen)
     if thing.kind == "table":
-        _table(p, spot)
+        _paint_table(p, spot)
         return
     if thing.kind == "shelf":
-        _shelf(p, area)
+        _paint_shelf(p, area)
         return
     if thing.kind == "ball":
-        _ball(p, area, QColor(thing.colour or "#D8403F"))
+        _paint_ball(p, area, QColor(thing.colour or "#D8403F"))
         return
     if thing.kind == "place":
-        _place(p, area, thing.name, font)
+        _paint_position(p, area, thing.name, font)
         return
     p.setBrush(QColor(60, 40, 20, 70))
     p.drawEllipse(QPointF(spot.u, spot.v), area.width() * 0.34, area.width() * 0.08)
@@ -102,12 +102,12 @@ def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
     p.setBrush(QColor("#FBFAF7"))
     p.drawRoundedRect(area, 2.5 * spot.scale, 2.5 * spot.scale)
     if thing.kind in {"face", "person"}:
-        _face_card(p, area)
+        _paint_face_card(p, area)
     elif thing.kind == "marker":
-        _marker_card(p, area)
+        _paint_marker_card(p, area)
 
 
-def _ball(p: QPainter, area: QRectF, colour: QColor) -> None:
+def _paint_ball(p: QPainter, area: QRectF, colour: QColor) -> None:
     r = area.width() / 2
     p.setBrush(QColor(60, 40, 20, 92))
     p.drawEllipse(QPointF(area.center().x(), area.bottom() + r * 0.05), r, r * 0.24)
@@ -121,7 +121,7 @@ def _ball(p: QPainter, area: QRectF, colour: QColor) -> None:
     p.drawArc(inner, 50 * 16, 92 * 16)
 
 
-def _place(p: QPainter, area: QRectF, name: str, font: QFont) -> None:
+def _paint_position(p: QPainter, area: QRectF, name: str, font: QFont) -> None:
     # A person between the robot and the viewer is only a mark on the floor.
     p.setPen(QPen(QColor(63, 124, 179, 210), 1.4))
     p.setBrush(QColor(63, 124, 179, 70))
@@ -134,7 +134,7 @@ def _place(p: QPainter, area: QRectF, name: str, font: QFont) -> None:
     p.drawText(area, int(Qt.AlignmentFlag.AlignCenter), name)
 
 
-def _face_card(p: QPainter, area: QRectF) -> None:
+def _paint_face_card(p: QPainter, area: QRectF) -> None:
     w, c = area.width(), area.center()
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor("#3F7CB3"))
@@ -151,7 +151,7 @@ def _face_card(p: QPainter, area: QRectF) -> None:
     p.drawArc(QRectF(c.x() - w * 0.09, c.y() - w * 0.02, w * 0.18, w * 0.12), 200 * 16, 140 * 16)
 
 
-def _marker_card(p: QPainter, area: QRectF) -> None:
+def _paint_marker_card(p: QPainter, area: QRectF) -> None:
     w = area.width() * 0.76
     left, top = area.center().x() - w / 2, area.center().y() - w / 2
     p.setPen(Qt.PenStyle.NoPen)

@@ -16,16 +16,16 @@ from PySide6.QtGui import QBrush, QColor, QLinearGradient, QPainter, QPainterPat
 
 from app.ui.robot_drawing.state import RobotState
 
-HEAD = QPointF(0.0, -152.2)
+HEAD_CENTRE = QPointF(0.0, -152.2)
 SHOULDER_X, SHOULDER_Y = 26.2, -102.5
 ARM, ARM_WIDTH, HAND = 46.5, 14.4, 7.7
 REST_DEG, UP_DEG = 20.0, 160.0  # limits that keep the arms beside body and head
-ARM_PLANE = math.radians(25.0)
+ARM_PLANE_RAD = math.radians(25.0)
 WHITE, LIMB, LIMB_EDGE, HAND_WHITE = "#FFFFFF", "#E2E7F0", "#CFD6E3", "#F3F5FA"
 JOINT, NECK, BAND = "#D3DAE7", "#C5CAD7", "#C8CCD8"
 HEAD_RX, HEAD_RY = 31.9, 32.8
-EYE_AT = math.radians(24.8)
-DARK = "#15181F"
+EYE_AZIMUTH_RAD = math.radians(24.8)
+DARK_COLOUR = "#15181F"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,24 +46,24 @@ class Expression:
     brow: float = 0.0
     eye: float = 1.0
     smile: float = 3.1
-    half: float = 6.6
-    open: float = 0.0
-    cheeks: bool = False
+    mouth_half_width: float = 6.6
+    mouth_opening: float = 0.0
+    has_cheeks: bool = False
 
 
 _EXPRESSIONS = {
     "neutral": Expression(),
-    "happy": Expression(smile=6.4, half=9.0, cheeks=True),
-    "joy": Expression(smile=6.0, half=9.0, open=6.5, cheeks=True),
-    "laughing": Expression(smile=6.0, half=9.0, open=6.5, cheeks=True),
-    "sad": Expression(smile=-4.6, half=6.4, brow=1.0, lid=0.22),
-    "surprised": Expression(eye=1.13, open=8.0, half=4.2, smile=0.0, brow=0.35),
-    "angry": Expression(smile=-2.4, half=7.0, brow=-1.0, lid=0.2),
-    "afraid": Expression(eye=1.08, smile=-2.0, half=7.0, brow=0.9),
-    "scared": Expression(eye=1.08, smile=-2.0, half=7.0, brow=0.9),
-    "thinking": Expression(smile=0.8, half=5.4, brow=-0.35, lid=0.12),
-    "tired": Expression(smile=1.0, half=5.4, lid=0.5),
-    "sleepy": Expression(smile=1.0, half=5.4, lid=0.62),
+    "happy": Expression(smile=6.4, mouth_half_width=9.0, has_cheeks=True),
+    "joy": Expression(smile=6.0, mouth_half_width=9.0, mouth_opening=6.5, has_cheeks=True),
+    "laughing": Expression(smile=6.0, mouth_half_width=9.0, mouth_opening=6.5, has_cheeks=True),
+    "sad": Expression(smile=-4.6, mouth_half_width=6.4, brow=1.0, lid=0.22),
+    "surprised": Expression(eye=1.13, mouth_opening=8.0, mouth_half_width=4.2, smile=0.0, brow=0.35),
+    "angry": Expression(smile=-2.4, mouth_half_width=7.0, brow=-1.0, lid=0.2),
+    "afraid": Expression(eye=1.08, smile=-2.0, mouth_half_width=7.0, brow=0.9),
+    "scared": Expression(eye=1.08, smile=-2.0, mouth_half_width=7.0, brow=0.9),
+    "thinking": Expression(smile=0.8, mouth_half_width=5.4, brow=-0.35, lid=0.12),
+    "tired": Expression(smile=1.0, mouth_half_width=5.4, lid=0.5),
+    "sleepy": Expression(smile=1.0, mouth_half_width=5.4, lid=0.62),
 }
 
 
@@ -83,7 +83,7 @@ def _limb(side: str, sign: int, raised_deg: float, heading: float) -> Limb:
     out = sign * math.pi / 2 + heading
     raised = math.radians(REST_DEG + max(-20.0, min(180.0, raised_deg)) * (UP_DEG - REST_DEG) / 180.0)
     shoulder = QPointF(SHOULDER_X * math.sin(out), SHOULDER_Y)
-    reach = math.cos(ARM_PLANE) * math.sin(out) + math.sin(ARM_PLANE) * math.sin(heading)
+    reach = math.cos(ARM_PLANE_RAD) * math.sin(out) + math.sin(ARM_PLANE_RAD) * math.sin(heading)
     hand = shoulder + QPointF(ARM * math.sin(raised) * reach, ARM * math.cos(raised))
     return Limb(side, shoulder, hand, math.cos(out))
 
@@ -97,21 +97,21 @@ def paint_figure(p: QPainter, state: RobotState) -> None:
     p.drawEllipse(QPointF(0, 0), 52, 10.8)
     for arm in arms:
         if arm.front < -0.08:
-            _arm(p, arm, state)
-    _base(p)
-    _torso(p, heading)
+            _paint_arm(p, arm, state)
+    _paint_base(p)
+    _paint_torso(p, heading)
     if math.cos(heading) > 0.08:
-        _tablet(p, heading)
+        _paint_tablet(p, heading)
     elif math.cos(heading) < -0.08:
-        _back(p, heading)
+        _paint_back(p, heading)
     p.fillRect(QRectF(-6, -122, 12, 10), QColor(NECK))
-    _head(p, state, heading + math.radians(state.head_yaw_deg))
+    _paint_head(p, state, heading + math.radians(state.head_yaw_deg))
     for arm in arms:
         if arm.front >= -0.08:
-            _arm(p, arm, state)
+            _paint_arm(p, arm, state)
 
 
-def _shade(half: float) -> QBrush:
+def _shading_brush(half: float) -> QBrush:
     across = QLinearGradient(-half, 0, half, 0)
     across.setColorAt(0.0, QColor("#E9EDF4"))
     across.setColorAt(0.34, QColor(WHITE))
@@ -120,14 +120,14 @@ def _shade(half: float) -> QBrush:
     return QBrush(across)
 
 
-def _base(p: QPainter) -> None:
+def _paint_base(p: QPainter) -> None:
     skirt = QPainterPath(QPointF(-18.5, -64))
     skirt.cubicTo(QPointF(-22, -46), QPointF(-31, -36), QPointF(-30.8, -13))
     skirt.lineTo(-29, -1.5)
     skirt.quadTo(QPointF(0, 6.2), QPointF(29, -1.5))
     skirt.lineTo(30.8, -13)
     skirt.cubicTo(QPointF(31, -36), QPointF(22, -46), QPointF(18.5, -64))
-    p.fillPath(skirt, _shade(31))
+    p.fillPath(skirt, _shading_brush(31))
     band = QPainterPath(QPointF(-28.4, -18))
     band.quadTo(QPointF(0, -9.6), QPointF(30.2, -18))
     band.lineTo(31.5, 8)
@@ -138,7 +138,7 @@ def _base(p: QPainter) -> None:
     p.restore()
 
 
-def _torso(p: QPainter, heading: float) -> None:
+def _paint_torso(p: QPainter, heading: float) -> None:
     half = math.hypot(27.5 * math.cos(heading), 23.0 * math.sin(heading))
     body = QPainterPath(QPointF(0, -115.6))
     body.cubicTo(QPointF(half * 0.55, -115.6), QPointF(half, -106), QPointF(half, -86))
@@ -149,10 +149,10 @@ def _torso(p: QPainter, heading: float) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(120, 130, 155, 40))
     p.drawEllipse(QPointF(0, -61.8), half * 0.72, 3.0)
-    p.fillPath(body, _shade(half))
+    p.fillPath(body, _shading_brush(half))
 
 
-def _tablet(p: QPainter, heading: float) -> None:
+def _paint_tablet(p: QPainter, heading: float) -> None:
     wide = math.cos(heading)
     p.save()
     p.translate(21.5 * math.sin(heading), -88.1)
@@ -170,7 +170,7 @@ def _tablet(p: QPainter, heading: float) -> None:
     p.restore()
 
 
-def _back(p: QPainter, heading: float) -> None:
+def _paint_back(p: QPainter, heading: float) -> None:
     p.save()
     p.translate(-20.0 * math.sin(heading), 0)
     p.scale(-math.cos(heading), 1.0)
@@ -183,7 +183,7 @@ def _back(p: QPainter, heading: float) -> None:
     p.restore()
 
 
-def _arm(p: QPainter, arm: Limb, state: RobotState) -> None:
+def _paint_arm(p: QPainter, arm: Limb, state: RobotState) -> None:
     edge = QPen(QColor(LIMB_EDGE), ARM_WIDTH + 0.9, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
     p.setPen(edge)
     p.drawLine(QLineF(arm.shoulder, arm.hand))
@@ -199,26 +199,26 @@ def _arm(p: QPainter, arm: Limb, state: RobotState) -> None:
         # Seen from the front, the light is where the shoulder faces the viewer, so that it is never hidden.
         p.setBrush(QColor(state.shoulders))
         p.drawEllipse(arm.shoulder, 4.0, 4.0)
-    if f"{arm.side}_hand" in state.touched:
-        _halo(p, arm.hand, HAND + 3)
+    if f"{arm.side}_hand" in state.touched_parts:
+        _paint_halo(p, arm.hand, HAND + 3)
 
 
-def _halo(p: QPainter, centre: QPointF, radius: float) -> None:
+def _paint_halo(p: QPainter, centre: QPointF, radius: float) -> None:
     p.setPen(QPen(QColor("#FFB300"), 2.2))
     p.setBrush(Qt.BrushStyle.NoBrush)
     p.drawEllipse(centre, radius, radius)
     p.setPen(Qt.PenStyle.NoPen)
 
 
-def _head(p: QPainter, state: RobotState, heading: float) -> None:
+def _paint_head(p: QPainter, state: RobotState, heading: float) -> None:
     p.save()
-    p.translate(HEAD)
+    p.translate(HEAD_CENTRE)
     ears = [(sign, sign * math.pi / 2 + heading) for sign in (-1, 1)]
     for _, azimuth in ears:
         if math.cos(azimuth) <= 0.1:
-            _ear(p, azimuth)
+            _paint_ear(p, azimuth)
     p.setPen(Qt.PenStyle.NoPen)
-    p.setBrush(_shade(HEAD_RX))
+    p.setBrush(_shading_brush(HEAD_RX))
     p.drawEllipse(QPointF(0, 0), HEAD_RX, HEAD_RY)
     nod = HEAD_RY * 0.6 * math.sin(math.radians(max(-45.0, min(45.0, state.head_pitch_deg))))
     p.save()
@@ -229,13 +229,13 @@ def _head(p: QPainter, state: RobotState, heading: float) -> None:
     p.restore()
     for _, azimuth in ears:
         if math.cos(azimuth) > 0.1:
-            _ear(p, azimuth)
-    if "head" in state.touched:
-        _halo(p, QPointF(0, 0), HEAD_RY + 4)
+            _paint_ear(p, azimuth)
+    if "head" in state.touched_parts:
+        _paint_halo(p, QPointF(0, 0), HEAD_RY + 4)
     p.restore()
 
 
-def _ear(p: QPainter, azimuth: float) -> None:
+def _paint_ear(p: QPainter, azimuth: float) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor("#D5DAE6"))
     centre = QPointF((HEAD_RX + 0.8) * math.sin(azimuth), 2.2)
@@ -256,24 +256,24 @@ def paint_face(p: QPainter, state: RobotState, heading: float, nod: float) -> No
         p.setBrush(QColor("#3A3F4C"))
         p.drawEllipse(dot, 2.2 * math.cos(heading), 2.2)
     for sign in (-1, 1):
-        azimuth = EYE_AT * sign + heading
+        azimuth = EYE_AZIMUTH_RAD * sign + heading
         if math.cos(azimuth) > 0.1:
             p.save()
             p.translate(HEAD_RX * math.sin(azimuth), 1.9 + nod)
-            p.scale(math.cos(azimuth) / math.cos(EYE_AT), 1.0)
-            _eye(p, QColor(state.eyes), look, sign)
+            p.scale(math.cos(azimuth) / math.cos(EYE_AZIMUTH_RAD), 1.0)
+            _paint_eye(p, QColor(state.eyes), look, sign)
             p.restore()
     if math.cos(heading) > 0.12:
         p.save()
         p.translate(HEAD_RX * 0.93 * math.sin(heading), 19.4 + nod)
         p.scale(math.cos(heading), 1.0)
-        _mouth(p, look)
+        _paint_mouth(p, look)
         p.restore()
 
 
-def _eye(p: QPainter, colour: QColor, look: Expression, sign: int) -> None:
+def _paint_eye(p: QPainter, colour: QColor, look: Expression, sign: int) -> None:
     p.setPen(Qt.PenStyle.NoPen)
-    for brush, radius in ((QColor(DARK), 9.7), (colour, 8.4), (QColor(DARK), 5.3)):
+    for brush, radius in ((QColor(DARK_COLOUR), 9.7), (colour, 8.4), (QColor(DARK_COLOUR), 5.3)):
         p.setBrush(brush)
         p.drawEllipse(QPointF(0, 0), radius * look.eye, radius * look.eye)
     p.setBrush(QColor(WHITE))
@@ -292,22 +292,22 @@ def _eye(p: QPainter, colour: QColor, look: Expression, sign: int) -> None:
         p.setPen(Qt.PenStyle.NoPen)
 
 
-def _mouth(p: QPainter, look: Expression) -> None:
-    if look.cheeks:
+def _paint_mouth(p: QPainter, look: Expression) -> None:
+    if look.has_cheeks:
         p.setPen(Qt.PenStyle.NoPen)
         p.setBrush(QColor(255, 150, 150, 70))
         p.drawEllipse(QPointF(-17, -5), 4.6, 3.0)
         p.drawEllipse(QPointF(17, -5), 4.6, 3.0)
     pen = QPen(QColor("#4E5566"), 1.7, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap)
     p.setPen(pen)
-    mouth = QPainterPath(QPointF(-look.half, 0))
-    if look.open and not look.smile:
+    mouth = QPainterPath(QPointF(-look.mouth_half_width, 0))
+    if look.mouth_opening and not look.smile:
         p.setBrush(QColor("#5B3440"))
-        p.drawEllipse(QPointF(0, look.open * 0.2), look.half, look.open * 0.62)
+        p.drawEllipse(QPointF(0, look.mouth_opening * 0.2), look.mouth_half_width, look.mouth_opening * 0.62)
         return
-    mouth.quadTo(QPointF(0, 2 * look.smile), QPointF(look.half, 0))
-    if look.open:
-        mouth.quadTo(QPointF(0, -1.0), QPointF(-look.half, 0))
+    mouth.quadTo(QPointF(0, 2 * look.smile), QPointF(look.mouth_half_width, 0))
+    if look.mouth_opening:
+        mouth.quadTo(QPointF(0, -1.0), QPointF(-look.mouth_half_width, 0))
         p.setBrush(QColor("#5B3440"))
     else:
         p.setBrush(Qt.BrushStyle.NoBrush)

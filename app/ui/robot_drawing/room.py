@@ -16,7 +16,7 @@ from app.ui.robot_drawing.state import RoomBounds
 WIDTH, HEIGHT = 382.0, 286.0
 HORIZON, WALL_FOOT, FLOOR_TOP = 91.0, 157.0, 162.8
 BACK, FRONT = 178.0, 280.0  # vertical positions of things at the far wall, and nearest to the viewer
-START = 250.6 - HORIZON  # vertical position of the robot in the design, where the scale is 1
+UNIT_SCALE_DEPTH = 250.6 - HORIZON  # vertical position of the robot in the design, where the scale is 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,11 @@ class Stage:
         a = self.area
         return QRectF((a.x() - o.x()) / s, (a.y() - o.y()) / s, a.width() / s, a.height() / s)
 
-    def unit(self, point: QPointF) -> QPointF:
+    def to_units(self, point: QPointF) -> QPointF:
         """Convert a point in pixels to stage units."""
         return (point - self.origin) / self.scale
 
-    def spot(self, x: float, y: float) -> Spot:
+    def spot_at(self, x: float, y: float) -> Spot:
         """Return the position of a floor point (in m), limited to the room.
 
         This is no true perspective: distant things are drawn closer, so that the robot stays large.
@@ -65,24 +65,24 @@ class Stage:
         room = self.room
         depth = _clamp((x - room.x_min) / (room.x_max - room.x_min), 0.0, 1.0)
         v = BACK + (FRONT - BACK) * depth**0.5
-        scale = (v - HORIZON) / START
+        scale = (v - HORIZON) / UNIT_SCALE_DEPTH
         side = 2 * _clamp((y - room.y_min) / (room.y_max - room.y_min), 0.0, 1.0) - 1
-        return Spot(WIDTH / 2 + side * _reach(scale), v, scale)
+        return Spot(WIDTH / 2 + side * _half_width(scale), v, scale)
 
-    def floor(self, point: QPointF) -> tuple[float, float]:
+    def floor_at(self, point: QPointF) -> tuple[float, float]:
         """Return the floor point (in m) at a pixel, limited to the room."""
-        unit = self.unit(point)
+        unit = self.to_units(point)
         room = self.room
         share = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
-        scale = (BACK + (FRONT - BACK) * share - HORIZON) / START
-        side = _clamp((unit.x() - WIDTH / 2) / _reach(scale), -1.0, 1.0)
+        scale = (BACK + (FRONT - BACK) * share - HORIZON) / UNIT_SCALE_DEPTH
+        side = _clamp((unit.x() - WIDTH / 2) / _half_width(scale), -1.0, 1.0)
         return (
             room.x_min + share**2 * (room.x_max - room.x_min),
             room.y_min + (side + 1) / 2 * (room.y_max - room.y_min),
         )
 
 
-def _reach(scale: float) -> float:
+def _half_width(scale: float) -> float:
     # Distance of the side walls from the centre, at a scale.
     return 70.0 + 96.0 * scale
 
@@ -107,12 +107,12 @@ def paint_room(p: QPainter, bounds: QRectF) -> None:
     floor.setColorAt(0, QColor("#B89A76"))
     floor.setColorAt(1, QColor("#CBB08D"))
     p.fillRect(QRectF(bounds.left(), FLOOR_TOP, bounds.width(), bounds.bottom() - FLOOR_TOP), floor)
-    _planks(p, bounds)
-    _window(p)
-    _picture(p)
+    _paint_planks(p, bounds)
+    _paint_window(p)
+    _paint_picture(p)
 
 
-def _planks(p: QPainter, bounds: QRectF) -> None:
+def _paint_planks(p: QPainter, bounds: QRectF) -> None:
     p.save()
     p.setClipRect(QRectF(bounds.left(), FLOOR_TOP, bounds.width(), bounds.bottom() - FLOOR_TOP))
     p.setPen(QPen(QColor(140, 108, 74, 90), 1.0))
@@ -124,7 +124,7 @@ def _planks(p: QPainter, bounds: QRectF) -> None:
     p.restore()
 
 
-def _window(p: QPainter) -> None:
+def _paint_window(p: QPainter) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor("#F6F3EB"))
     p.drawRoundedRect(QRectF(27, 29, 88, 75), 2, 2)
@@ -146,7 +146,7 @@ def _window(p: QPainter) -> None:
     p.fillRect(QRectF(31, 64.8, 80, 3.4), QColor("#F6F3EB"))
 
 
-def _picture(p: QPainter) -> None:
+def _paint_picture(p: QPainter) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor("#3B3F4A"))
     p.drawRoundedRect(QRectF(283, 38.5, 62.5, 48), 1.5, 1.5)

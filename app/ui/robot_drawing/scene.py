@@ -11,13 +11,13 @@ from PySide6.QtGui import QColor, QFont, QPainter, QPen, QPixmap
 
 from app.ui.robot_drawing.bubble import paint_bubble
 from app.ui.robot_drawing.objects import paint_thing, thing_area
-from app.ui.robot_drawing.pepper import HEAD, limbs, paint_figure
+from app.ui.robot_drawing.pepper import HEAD_CENTRE, limbs, paint_figure
 from app.ui.robot_drawing.room import WIDTH, Spot, Stage, paint_room
 from app.ui.robot_drawing.state import RobotState, Thing
-from app.ui.robot_drawing.turtle import TOP, paint_turtle, side_at
+from app.ui.robot_drawing.turtle import TOP_CENTRE, paint_turtle, side_at
 
 TURTLE = "turtle"
-Others: TypeAlias = Sequence[tuple[str, RobotState]]
+OtherRobots: TypeAlias = Sequence[tuple[str, RobotState]]
 
 # Shown before any robot has published its state.
 PREVIEW = RobotState(
@@ -32,7 +32,7 @@ class Marks:
     """Part under the mouse and part selected by keyboard, as returned by `RobotDrawing.part_at`."""
 
     hovered: str | None = None
-    chosen: str | None = None
+    selected: str | None = None
     ink: QColor = field(default_factory=lambda: QColor("#3F7CB3"))
 
 
@@ -56,7 +56,7 @@ class RobotDrawing:
         painter: QPainter,
         area: QRectF,
         state: RobotState,
-        others: Others = (),
+        others: OtherRobots = (),
         *,
         marks: Marks = NO_MARKS,
         dark: bool = False,
@@ -78,11 +78,11 @@ class RobotDrawing:
                 paint_thing(painter, one, spot, self._font)
             else:
                 _paint_figure(painter, one)
-        self._mark(painter, stage, state, others, marks)
+        self._paint_marks(painter, stage, state, others, marks)
         bubbles: list[QRectF] = []
         for figure in figures:
             if figure.state.caption:
-                high = TOP.y() if figure.state.figure == TURTLE else HEAD.y()
+                high = TOP_CENTRE.y() if figure.state.figure == TURTLE else HEAD_CENTRE.y()
                 head = replace(figure.spot, v=figure.spot.v + high * figure.spot.scale)
                 bubble = paint_bubble(painter, stage.bounds(), head, figure.state, self._font, bubbles)
                 bubbles.append(bubble)
@@ -90,26 +90,28 @@ class RobotDrawing:
         if dark:
             painter.fillRect(area, QColor(0, 0, 12, 34))
 
-    def part_at(self, point: QPointF, area: QRectF, state: RobotState, others: Others = ()) -> str | None:
+    def part_at(
+        self, point: QPointF, area: QRectF, state: RobotState, others: OtherRobots = ()
+    ) -> str | None:
         """Return the part at a point in px, or None.
 
         Examples are ``head``, ``left_hand``, ``body``, ``Turtle/body`` and the name of an object. Parts that
         can be touched precede things, and things precede others behind them.
         """
         stage = Stage(area, state.room)
-        unit = stage.unit(point)
+        unit = stage.to_units(point)
         figures = sorted(_figures(stage, state, others), key=lambda figure: -figure.spot.v)
         for figure in figures:
-            part = _part_at(figure.own(unit), figure.state)
+            part = _part_at(figure.to_own_units(unit), figure.state)
             if part is not None:
-                return figure.named(part)
+                return figure.part_name(part)
         for spot, thing in reversed(_placed_things(stage, state)):
             if thing_area(thing, spot).adjusted(-3, -3, 3, 3).contains(unit):
                 return thing.name or thing.kind
-        return next((each.named("body") for each in figures if each.area.contains(unit)), None)
+        return next((each.part_name("body") for each in figures if each.area.contains(unit)), None)
 
     def side_at(
-        self, point: QPointF, area: QRectF, part: str, state: RobotState, others: Others = ()
+        self, point: QPointF, area: QRectF, part: str, state: RobotState, others: OtherRobots = ()
     ) -> str | None:
         """Return the side of the bumper that is pressed by a click on ``part``, the body of a robot.
 
@@ -117,29 +119,31 @@ class RobotDrawing:
         """
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
-            if figure.named("body") == part and figure.state.figure == TURTLE:
-                return side_at(figure.own(stage.unit(point)), figure.state.theta_deg)
+            if figure.part_name("body") == part and figure.state.figure == TURTLE:
+                return side_at(figure.to_own_units(stage.to_units(point)), figure.state.theta_deg)
         return None
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
         """Return the floor point (in m) at a point in px."""
-        return Stage(area, state.room).floor(point)
+        return Stage(area, state.room).floor_at(point)
 
     def pixel_of(self, x: float, y: float, area: QRectF, state: RobotState) -> QPointF:
         """Return the point in px of a floor point (in m)."""
         stage = Stage(area, state.room)
-        spot = stage.spot(x, y)
+        spot = stage.spot_at(x, y)
         return stage.origin + QPointF(spot.u, spot.v) * stage.scale
 
-    def place_of(self, part: str, area: QRectF, state: RobotState, others: Others = ()) -> QPointF | None:
+    def point_of(
+        self, part: str, area: QRectF, state: RobotState, others: OtherRobots = ()
+    ) -> QPointF | None:
         """Return the point in px at the centre of a part (see `part_at`), or None."""
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
             small = figure.state.figure == TURTLE
             own = {} if small else {f"{limb.side}_hand": limb.hand for limb in limbs(figure.state)}
-            own |= {"body": TOP} if small else {"head": HEAD, "body": QPointF(0, -50)}
+            own |= {"body": TOP_CENTRE} if small else {"head": HEAD_CENTRE, "body": QPointF(0, -50)}
             for name, place in own.items():
-                if part == figure.named(name):
+                if part == figure.part_name(name):
                     unit = QPointF(figure.spot.u, figure.spot.v) + place * figure.spot.scale
                     return stage.origin + unit * stage.scale
         for spot, thing in _placed_things(stage, state):
@@ -147,12 +151,14 @@ class RobotDrawing:
                 return stage.origin + thing_area(thing, spot).center() * stage.scale
         return None
 
-    def _mark(self, p: QPainter, stage: Stage, state: RobotState, others: Others, marks: Marks) -> None:
+    def _paint_marks(
+        self, p: QPainter, stage: Stage, state: RobotState, others: OtherRobots, marks: Marks
+    ) -> None:
         # Outlines the part under the mouse, and more strongly the selected part.
-        areas = {figure.named("body"): figure.area for figure in _figures(stage, state, others)}
+        areas = {figure.part_name("body"): figure.area for figure in _figures(stage, state, others)}
         for spot, thing in _placed_things(stage, state):
             areas[thing.name or thing.kind] = thing_area(thing, spot)
-        for part, width in ((marks.hovered, 1.4), (marks.chosen, 2.4)):
+        for part, width in ((marks.hovered, 1.4), (marks.selected, 2.4)):
             area = areas.get(part or "")
             if area is not None:
                 p.setBrush(Qt.BrushStyle.NoBrush)
@@ -185,7 +191,7 @@ def _placed_things(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
     for thing in state.objects:
         before = thing.kind in {"person", "face"} and thing.x > state.x
         shown = replace(thing, kind="place") if before else thing
-        spot = stage.spot(thing.x, thing.y)
+        spot = stage.spot_at(thing.x, thing.y)
         half = thing_area(shown, spot).width() / 2
         # keeps things at a side wall completely visible
         inside = min(max(spot.u, half + 4), WIDTH - half - 4)
@@ -201,11 +207,11 @@ class Figure:
     state: RobotState
     spot: Spot
 
-    def named(self, part: str) -> str:
+    def part_name(self, part: str) -> str:
         """Return the name of a part in the format of `RobotDrawing.part_at`."""
         return f"{self.name}/{part}" if self.name else part
 
-    def own(self, unit: QPointF) -> QPointF:
+    def to_own_units(self, unit: QPointF) -> QPointF:
         """Convert a point from stage units to the figure's own units."""
         return (unit - QPointF(self.spot.u, self.spot.v)) / self.spot.scale
 
@@ -222,14 +228,14 @@ class Figure:
         )
 
 
-def _figures(stage: Stage, state: RobotState, others: Others) -> list[Figure]:
+def _figures(stage: Stage, state: RobotState, others: OtherRobots) -> list[Figure]:
     found = [("", state), *others]
-    return [Figure(name, each, stage.spot(each.x, each.y)) for name, each in found]
+    return [Figure(name, each, stage.spot_at(each.x, each.y)) for name, each in found]
 
 
 def _paint_figure(p: QPainter, figure: Figure) -> None:
     p.save()
-    lifted = 9.0 if figure.state.held else 0.0
+    lifted = 9.0 if figure.state.is_lifted else 0.0
     p.translate(figure.spot.u, figure.spot.v - lifted)
     p.scale(figure.spot.scale, figure.spot.scale)
     (paint_turtle if figure.state.figure == TURTLE else paint_figure)(p, figure.state)
@@ -244,7 +250,7 @@ def _paint_reach(painter: QPainter, robot: Spot, state: RobotState) -> None:
     reach.setStyle(Qt.PenStyle.DashLine)
     reach.setDashPattern([4.0, 4.0])
     painter.setPen(reach)
-    painter.setBrush(QColor(92, 88, 170, 46 if not state.moving else 78))
+    painter.setBrush(QColor(92, 88, 170, 46 if not state.is_moving else 78))
     painter.drawEllipse(QPointF(0, 0), 113, 21)
     painter.restore()
 
@@ -256,7 +262,7 @@ def _part_at(own: QPointF, state: RobotState) -> str | None:
     for limb in limbs(state):
         if _is_near(own, limb.hand, 11.0):
             return f"{limb.side}_hand"
-    return "head" if _is_near(own, HEAD, 36.0) else None
+    return "head" if _is_near(own, HEAD_CENTRE, 36.0) else None
 
 
 def _is_near(point: QPointF, centre: QPointF, radius: float) -> bool:

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from nep.i18n import _
 from nep.text import bounded_str
 
-EYES = "#35B0FA"
-SHOULDERS = "#3AB5FF"
+DEFAULT_EYE_COLOUR = "#35B0FA"
+DEFAULT_SHOULDER_COLOUR = "#3AB5FF"
 MAX_HEARD_CHARS = 200  # characters
 
 
@@ -61,20 +61,20 @@ class RobotState:
     head_yaw_deg: float = 0.0
     head_pitch_deg: float = 0.0
     speech: str | None = None
-    spoken: float = 0.0
+    spoken_fraction: float = 0.0
     sound: str = ""
-    heard: str = ""
-    eyes: str = EYES
-    shoulders: str = SHOULDERS
+    heard_text: str = ""
+    eyes: str = DEFAULT_EYE_COLOUR
+    shoulders: str = DEFAULT_SHOULDER_COLOUR
     emotion: str = "neutral"
     arm_left_deg: float = 0.0
     arm_right_deg: float = 0.0
-    moving: bool = False
-    touched: tuple[str, ...] = ()
+    is_moving: bool = False
+    touched_parts: tuple[str, ...] = ()
     figure: str = "pepper"
-    bumped: str = ""
-    held: bool = False
-    shared: bool = False
+    pressed_bumper: str = ""
+    is_lifted: bool = False
+    is_room_shared: bool = False
     objects: tuple[Thing, ...] = ()
     room: RoomBounds = field(default_factory=RoomBounds)
 
@@ -95,20 +95,20 @@ class RobotState:
             head_yaw_deg=_number(data.get("head_yaw_deg")),
             head_pitch_deg=_number(data.get("head_pitch_deg")),
             speech=speech if isinstance(speech, str) and speech.strip() else None,
-            spoken=min(1.0, max(0.0, _number(data.get("spoken")))),
+            spoken_fraction=min(1.0, max(0.0, _number(data.get("spoken")))),
             sound=_sound(data.get("sound")),
-            heard=bounded_str(data.get("heard") or "")[:MAX_HEARD_CHARS],
-            eyes=_colour(data.get("eyes"), EYES),
-            shoulders=_colour(data.get("shoulders"), SHOULDERS),
+            heard_text=bounded_str(data.get("heard") or "")[:MAX_HEARD_CHARS],
+            eyes=_colour(data.get("eyes"), DEFAULT_EYE_COLOUR),
+            shoulders=_colour(data.get("shoulders"), DEFAULT_SHOULDER_COLOUR),
             emotion=bounded_str(data.get("emotion") or "neutral"),
             arm_left_deg=_number(data.get("arm_left_deg")),
             arm_right_deg=_number(data.get("arm_right_deg")),
-            moving=data.get("moving") is True,
+            is_moving=data.get("moving") is True,
             figure=bounded_str(data.get("figure") or "pepper"),
-            bumped=bounded_str(data.get("bumped") or ""),
-            touched=_touched(data.get("touched", data.get("touch"))),
-            held=data.get("held") is True,
-            shared=_is_shared(data.get("room")),
+            pressed_bumper=bounded_str(data.get("bumped") or ""),
+            touched_parts=_touched_parts(data.get("touched", data.get("touch"))),
+            is_lifted=data.get("held") is True,
+            is_room_shared=_is_shared(data.get("room")),
             objects=_things(data.get("objects")),
             room=_room(data.get("room")),
         )
@@ -129,7 +129,7 @@ def _colour(value: object, default: str) -> str:
     return default
 
 
-def _touched(value: object) -> tuple[str, ...]:
+def _touched_parts(value: object) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     if isinstance(value, Mapping):

@@ -15,10 +15,10 @@ from app.ui.robot_drawing.state import RobotState
 
 RADIUS, FLAT = 37.0, 0.36  # radius of the body, and ratio of height to width of a circle on the floor
 LOW, HIGH = -9.0, -31.0  # heights of the lower and upper deck
-MAST = -52.0  # height of the top of the camera's mast
-WHEEL = 14.0
-TOP = QPointF(0.0, -36.0)
-ABOVE = 0.6  # fraction of the radius that counts as a touch from above
+MAST_TOP = -52.0  # height of the top of the camera's mast
+WHEEL_RADIUS = 14.0
+TOP_CENTRE = QPointF(0.0, -36.0)
+TOP_TOUCH_FRACTION = 0.6  # fraction of the radius that counts as a touch from above
 FRONT_DEG, BACK_DEG = 40.0, 130.0
 
 SHELL, SHELL_DARK, DECK, RUBBER, METAL = "#4E8C7A", "#376B5C", "#6FB3A0", "#2B2D33", "#C8CCD8"
@@ -33,17 +33,17 @@ def paint_turtle(p: QPainter, state: RobotState) -> None:
     wheels = [(sign, heading + sign * math.pi / 2) for sign in (-1, 1)]
     for _, azimuth in wheels:
         if math.cos(azimuth) < 0:
-            _wheel(p, azimuth)
-    _body(p, state)
+            _paint_wheel(p, azimuth)
+    _paint_body(p, state)
     for _, azimuth in wheels:
         if math.cos(azimuth) >= 0:
-            _wheel(p, azimuth)
-    _bumper(p, heading, state.bumped)
-    _deck(p, heading, state.eyes)
-    _mast(p, heading)
+            _paint_wheel(p, azimuth)
+    _paint_bumper(p, heading, state.pressed_bumper)
+    _paint_deck(p, heading, state.eyes)
+    _paint_mast(p, heading)
 
 
-def on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
+def point_on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
     """Return the point at an azimuth (rad, 0 faces the viewer), a fraction of the radius and a height."""
     return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
 
@@ -54,7 +54,7 @@ def side_at(own: QPointF, theta_deg: float) -> str:
     `own` is in the figure's units; a touch from above presses the front.
     """
     across, along = own.x() / RADIUS, (own.y() - HIGH) / (RADIUS * FLAT)
-    if math.hypot(across, along) < ABOVE or along < -1.0:
+    if math.hypot(across, along) < TOP_TOUCH_FRACTION or along < -1.0:
         return "front"
     if along > 0:  # near edge of the deck and drum below it: counts as the side that faces the viewer
         along = math.sqrt(max(0.0, 1.0 - across * across))
@@ -65,21 +65,21 @@ def side_at(own: QPointF, theta_deg: float) -> str:
     return "back" if abs(aside) > BACK_DEG else "left" if aside > 0 else "right"
 
 
-def _wheel(p: QPainter, azimuth: float) -> None:
+def _paint_wheel(p: QPainter, azimuth: float) -> None:
     # Painted on the body's side, facing in the direction of the azimuth.
-    wide = max(2.6, WHEEL * abs(math.cos(azimuth)))
-    middle = on_body(azimuth, 0.98, -WHEEL + 1.5)
+    wide = max(2.6, WHEEL_RADIUS * abs(math.cos(azimuth)))
+    middle = point_on_body(azimuth, 0.98, -WHEEL_RADIUS + 1.5)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(RUBBER))
     thick = 5.0 * abs(math.sin(azimuth)) + 1.0
-    box = QRectF(middle.x() - wide - thick / 2, middle.y() - WHEEL, 2 * wide + thick, 2 * WHEEL)
-    p.drawRoundedRect(box, min(box.width() / 2, WHEEL), WHEEL)
+    box = QRectF(middle.x() - wide - thick / 2, middle.y() - WHEEL_RADIUS, 2 * wide + thick, 2 * WHEEL_RADIUS)
+    p.drawRoundedRect(box, min(box.width() / 2, WHEEL_RADIUS), WHEEL_RADIUS)
     if math.cos(azimuth) > 0.15:
         p.setBrush(QColor(METAL))
-        p.drawEllipse(middle, wide * 0.5, WHEEL * 0.5)
+        p.drawEllipse(middle, wide * 0.5, WHEEL_RADIUS * 0.5)
 
 
-def _body(p: QPainter, state: RobotState) -> None:
+def _paint_body(p: QPainter, state: RobotState) -> None:
     flat = RADIUS * FLAT
     drum = QPainterPath(QPointF(-RADIUS, HIGH))
     drum.lineTo(-RADIUS, LOW)
@@ -100,7 +100,7 @@ def _body(p: QPainter, state: RobotState) -> None:
     p.drawArc(QRectF(-RADIUS, LOW - 4 - flat, 2 * RADIUS, 2 * flat), 180 * 16, 180 * 16)
 
 
-def _bumper(p: QPainter, heading: float, bumped: str) -> None:
+def _paint_bumper(p: QPainter, heading: float, bumped: str) -> None:
     # An arc around the visible front; the touching side is amber.
     sides = {"left": (18.0, 70.0), "front": (-18.0, 18.0), "right": (-70.0, -18.0)}
     for side, (first, last) in sides.items():
@@ -111,7 +111,7 @@ def _bumper(p: QPainter, heading: float, bumped: str) -> None:
             if math.cos(azimuth) < -0.05:
                 drawn = False
                 continue
-            point = on_body(azimuth, 1.05, LOW + 2)
+            point = point_on_body(azimuth, 1.05, LOW + 2)
             if drawn:
                 shape.lineTo(point)
             else:
@@ -124,7 +124,7 @@ def _bumper(p: QPainter, heading: float, bumped: str) -> None:
         p.drawPath(shape)
 
 
-def _deck(p: QPainter, heading: float, light: str) -> None:
+def _paint_deck(p: QPainter, heading: float, light: str) -> None:
     flat = RADIUS * FLAT
     p.setPen(QPen(QColor(SHELL_DARK), 1.0))
     p.setBrush(QColor(DECK))
@@ -132,9 +132,9 @@ def _deck(p: QPainter, heading: float, light: str) -> None:
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(255, 255, 255, 46))
     p.drawEllipse(QPointF(-6, HIGH - 2), RADIUS * 0.72, flat * 0.66)
-    arrow = QPainterPath(on_body(heading, 0.9, HIGH))
-    arrow.lineTo(on_body(heading + 0.42, 0.62, HIGH))
-    arrow.lineTo(on_body(heading - 0.42, 0.62, HIGH))
+    arrow = QPainterPath(point_on_body(heading, 0.9, HIGH))
+    arrow.lineTo(point_on_body(heading + 0.42, 0.62, HIGH))
+    arrow.lineTo(point_on_body(heading - 0.42, 0.62, HIGH))
     arrow.closeSubpath()
     p.setBrush(QColor(255, 255, 255, 215))
     p.drawPath(arrow)
@@ -144,23 +144,23 @@ def _deck(p: QPainter, heading: float, light: str) -> None:
     shine.setAlpha(0)
     glow.setColorAt(1.0, shine)
     p.setBrush(QBrush(glow))
-    p.drawEllipse(on_body(heading + math.pi, 0.45, HIGH), 13, 13 * FLAT + 2)
+    p.drawEllipse(point_on_body(heading + math.pi, 0.45, HIGH), 13, 13 * FLAT + 2)
     p.setBrush(QColor(light))
-    p.drawEllipse(on_body(heading + math.pi, 0.45, HIGH), 5.0, 3.2)
+    p.drawEllipse(point_on_body(heading + math.pi, 0.45, HIGH), 5.0, 3.2)
 
 
-def _mast(p: QPainter, heading: float) -> None:
+def _paint_mast(p: QPainter, heading: float) -> None:
     # The lens is visible if it faces the viewer.
-    foot, top = QPointF(0, HIGH - 1), QPointF(0, MAST + 6)
+    foot, top = QPointF(0, HIGH - 1), QPointF(0, MAST_TOP + 6)
     p.setPen(QPen(QColor(METAL), 5.0, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
     p.drawLine(foot, top)
     half = 10.5 - 2.5 * abs(math.sin(heading))
     p.setPen(QPen(QColor("#9AA2B4"), 0.8))
     p.setBrush(QColor("#E9EDF4"))
-    p.drawRoundedRect(QRectF(-half, MAST - 7, 2 * half, 14), 4.5, 4.5)
+    p.drawRoundedRect(QRectF(-half, MAST_TOP - 7, 2 * half, 14), 4.5, 4.5)
     towards = math.cos(heading)
     if towards > -0.2:
-        eye = QPointF(half * 0.85 * math.sin(heading), MAST)
+        eye = QPointF(half * 0.85 * math.sin(heading), MAST_TOP)
         wide = max(1.4, 5.0 * max(0.0, towards))
         p.setPen(Qt.PenStyle.NoPen)
         p.setBrush(QColor("#1B1E2A"))

@@ -14,18 +14,18 @@ from PySide6.QtCore import QObject, QTimer
 
 from app.blocks.fixes.fixes import fix
 from app.core.documents.document import Document
-from app.core.documents.file_format import SUFFIX, what_behaviours_are
-from app.core.documents.journal import Unsaved
-from app.core.documents.versions import Earlier, free_path, keep_earlier, stamp_of
+from app.core.documents.file_format import SUFFIX, file_type_hint
+from app.core.documents.journal import UnsavedWork
+from app.core.documents.versions import SavedVersion, free_path, save_version, stamp_of
 from app.core.session import Session
 from app.core.storage import deep_json
-from app.core.storage.settings import kept_folder
+from app.core.storage.settings import closed_tabs_folder
 from app.errors import AppError, DocumentError, SettingsError
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _, ngettext
 
 MAX_FLUSH_MS = 500
-RECORDING, LAYOUT = OTHERS = (".mcap", ".nep-layout")
+RECORDING, LAYOUT = OTHER_SUFFIXES = (".mcap", ".nep-layout")
 
 
 @runtime_checkable
@@ -44,10 +44,10 @@ class SupportsShowCurrent(Protocol):
         """Show the current behaviour immediately."""
 
 
-class Closed:
+class ClosedTab:
     """Closed tab: text for the toast, and the previous version of its file if that was overwritten."""
 
-    def __init__(self, document: Document, words: str = "", earlier: Earlier | None = None) -> None:
+    def __init__(self, document: Document, words: str = "", earlier: SavedVersion | None = None) -> None:
         self.words, self.earlier = words, earlier
         self.workspace = document.workspace
         self.stamp = stamp_of(document.path) if document.path is not None else None
@@ -79,7 +79,7 @@ class DocumentController:
 
     def new(self) -> None:
         """Create an empty behaviour in a new tab."""
-        self.with_newest(lambda: self._show(self._documents.new))
+        self.after_flush(lambda: self._open_tab(self._documents.new))
 
     def ask_open(self) -> None:
         """Ask for a file and open it."""
@@ -90,11 +90,11 @@ class DocumentController:
     def open(self, path: Path) -> None:
         """Open a behaviour file in a tab. Errors become alerts."""
 
-        def opened() -> None:
+        def open_document() -> None:
             self._documents.open(path)
-            self._remember(path)
+            self._add_recent(path)
 
-        self.with_newest(lambda: self._show(opened))
+        self.after_flush(lambda: self._open_tab(open_document))
 
     def open_all(self, paths: Sequence[Path]) -> None:
         """Open files from the command line, a drop, or a later start of Studio.
@@ -102,7 +102,7 @@ class DocumentController:
         Files of unknown types are listed in one alert; the others are opened.
         """
         self._session.alerts.resolve("strange")
-        strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHERS}]
+        strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHER_SUFFIXES}]
         for path in paths:
             if path.suffix.lower() == SUFFIX:
                 self.open(path)
@@ -110,24 +110,26 @@ class DocumentController:
             for path in [each for each in paths if each.suffix.lower() == kind][-1:]:  # only one is shown
                 show(path)
         if strange:
-            self._complain(strange_words(strange), "file.open", _("Open another file"), alert="strange")
+            self._raise_alert(
+                unknown_type_text(strange), "file.open", _("Open another file"), alert="strange"
+            )
 
-    def example(self, path: Path) -> None:
+    def open_example(self, path: Path) -> None:
         """Open an example as a new behaviour."""
-        self.with_newest(lambda: self._show(lambda: self._documents.example(path)))
+        self.after_flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
 
     def copy(self, path: Path, name: str) -> None:
         """Open an earlier version as a new behaviour with this name. No file is written."""
 
-        def opened() -> None:
+        def open_copy() -> None:
             self._documents.copy(path, name)
             self._say(_("Opened {name} as a copy").format(name=name))
 
-        self.with_newest(lambda: self._show(opened))
+        self.after_flush(lambda: self._open_tab(open_copy))
 
-    def recover(self, left: Sequence[Unsaved]) -> None:
+    def recover(self, left: Sequence[UnsavedWork]) -> None:
         """Open behaviours that were not saved before a crash, each in its tab, and show the last used one."""
-        self.with_newest(lambda: self._show(lambda: self._session.tabs.recover(left)))
+        self.after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(left)))
 
     def close(self, *documents: Document) -> None:
         """Close tabs: stop their programs, and save unsaved work to its file or to Recent.
@@ -135,30 +137,30 @@ class DocumentController:
         Overwritten files can be restored.
         """
 
-        def closed() -> None:
+        def close_documents() -> None:
             runs = self._session.runs
             gone = []
             for document in documents:
-                if runs.concerns(document):
+                if runs.is_running_or_pending(document):
                     runs.stop()
-                kept = self._keep(document)
+                kept = self._save_before_close(document)
                 if kept is None:
                     continue
                 self._documents.close(document)
                 gone.append(kept)
             self._session.tabs.save()
-            self._tell_closed([each for each in gone if each.words])
+            self._notify_closed([each for each in gone if each.words])
 
-        self.with_newest(closed)
+        self.after_flush(close_documents)
 
     def reopen(self) -> None:
         """Reopen the tab that was closed last."""
 
-        def reopened() -> None:
+        def reopen_document() -> None:
             if self._documents.reopen() is None:
                 self._say(_("No closed tabs"))
 
-        self.with_newest(lambda: self._show(reopened))
+        self.after_flush(lambda: self._open_tab(reopen_document))
 
     def show(self, document: Document) -> None:
         """Show the tab of an open behaviour immediately; the choice is saved later."""
@@ -169,7 +171,7 @@ class DocumentController:
 
     def duplicate(self, document: Document) -> None:
         """Open a copy of a behaviour as a new one."""
-        self.with_newest(lambda: self._show(lambda: self._documents.duplicate(document)))
+        self.after_flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
 
     def rename(self, document: Document, name: str) -> bool:
         """Rename a behaviour and its file, with undo. Return False on failure."""
@@ -179,7 +181,7 @@ class DocumentController:
         try:
             self._documents.rename(document, name)
         except AppError as error:
-            self._complain(words_of(error), "file.save_as", _("Save somewhere else"))
+            self._raise_alert(alert_text(error), "file.save_as", _("Save somewhere else"))
             return False
         self._session.tabs.save()
         if old is not None and document.path is not None:
@@ -201,29 +203,29 @@ class DocumentController:
         if self._session.document.path is None:
             self.save_as()
         else:
-            self.with_newest(lambda: self._save(None))
+            self.after_flush(lambda: self._save(None))
 
     def save_as(self) -> None:
         """Ask for a file, then save the behaviour to it."""
         document = self._session.document
         own = document.path
-        folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
+        folder = own.parent if own is not None and own.parent != closed_tabs_folder() else Path.home()
         suggestion = str(folder / f"{document.name}{SUFFIX}")
-        self.asks.save(suggestion, lambda path: self.with_newest(lambda: self._save(path)))
+        self.asks.save(suggestion, lambda path: self.after_flush(lambda: self._save(path)))
 
     def fix(self, action: str) -> bool:
         """Apply the fix of a problem to the blocks. Return False if the action isn't a fix."""
         document = self._session.document
-        if deep_json.deeply(lambda: fix(document.workspace, action)) is None:
+        if deep_json.run_deep(lambda: fix(document.workspace, action)) is None:
             return False
 
-        def change() -> None:
+        def apply_fix() -> None:
             document.fix(action)
 
-        self.with_newest(change)
+        self.after_flush(apply_fix)
         return True
 
-    def with_newest(self, then: Callable[[], None]) -> None:
+    def after_flush(self, then: Callable[[], None]) -> None:
         """Call a function once the editor's newest edit is in the document."""
         editor = self._editor()
         if isinstance(editor, SupportsFlush):
@@ -234,16 +236,16 @@ class DocumentController:
     def _save(self, path: Path | None) -> None:
         document = self._session.document
         try:
-            earlier, words = self._kept_before(document, path)
+            earlier, words = self._back_up(document, path)
             document.save(path)
         except AppError as error:
-            self._cant_save(error)
+            self._report_save_error(error)
             return
-        self._documents.saved(document)
+        self._documents.on_saved(document)
         self._session.tabs.save()
         self._session.alerts.resolve("file")
         if document.path is not None:
-            self._remember(document.path)
+            self._add_recent(document.path)
         if earlier is None:
             self._say(_("Saved {name}").format(name=document.name))
             return
@@ -251,56 +253,56 @@ class DocumentController:
         said = words.format(name=document.name)
         self._say(said, _("Open"), lambda: self.copy(earlier.copy, then))
 
-    def _kept_before(self, document: Document, path: Path | None) -> tuple[Earlier | None, str]:
+    def _back_up(self, document: Document, path: Path | None) -> tuple[SavedVersion | None, str]:
         # Backs up a file before it is overwritten; returns the text for the toast with the placeholder
         # "name". Raises DocumentError if content from elsewhere can't be backed up; Studio's own content is
         # backed up without text if possible.
         own = document.path
         if path is not None and (own is None or path.resolve() != own.resolve()):
-            return keep_earlier(path), _("Saved {name}. The previous file is under Earlier versions.")
-        if own is not None and document.changed_outside:
-            return keep_earlier(own), _(
+            return save_version(path), _("Saved {name}. The previous file is under Earlier versions.")
+        if own is not None and document.is_changed_externally:
+            return save_version(own), _(
                 "Saved {name}. Another program had changed the file; its version is under Earlier versions."
             )
         if own is not None and document.dirty:
             try:
-                keep_earlier(own)
+                save_version(own)
             except DocumentError as error:
                 words = _("No earlier versions: {error}").format(error=error)
                 self._session.console.add("warn", "studio", words)
         return None, ""
 
-    def _show(self, act: Callable[[], object]) -> None:
+    def _open_tab(self, act: Callable[[], object]) -> None:
         try:
             act()
         except AppError as error:
-            self._complain(words_of(error), "file.open", _("Open another file"))
+            self._raise_alert(alert_text(error), "file.open", _("Open another file"))
             return
         self._session.tabs.save()
         self._session.alerts.resolve("file")
         self._shown()
 
-    def _keep(self, document: Document) -> Closed | None:
+    def _save_before_close(self, document: Document) -> ClosedTab | None:
         # Returns None and raises an alert if saving fails.
         if not document.dirty:
-            return Closed(document)
+            return ClosedTab(document)
         name, path = document.name, document.path
         try:
-            earlier = keep_earlier(path) if path is not None else None
+            earlier = save_version(path) if path is not None else None
             if path is None:
-                document.save(free_path(kept_folder(), name, self._clock()))
+                document.save(free_path(closed_tabs_folder(), name, self._clock()))
             else:
                 document.save()
         except AppError as error:
             self._documents.show(document)
-            self._cant_save(error)
+            self._report_save_error(error)
             return None
         if document.path is not None:
-            self._remember(document.path, name)
+            self._add_recent(document.path, name)
         words = _("Saved {name}") if path is not None else _("Closed {name}. You'll find it under Recent.")
-        return Closed(document, words.format(name=name), earlier)
+        return ClosedTab(document, words.format(name=name), earlier)
 
-    def _tell_closed(self, closed: Sequence[Closed]) -> None:
+    def _notify_closed(self, closed: Sequence[ClosedTab]) -> None:
         # Shows a toast that names the saved behaviours and offers undo.
         if not closed:
             return
@@ -310,11 +312,11 @@ class DocumentController:
             words = words.format(count=len(closed))
         back = [each for each in closed if each.earlier is not None]
         if back:
-            self._say(words, _("Undo"), lambda: self._show(lambda: self._take_back(back)))
+            self._say(words, _("Undo"), lambda: self._open_tab(lambda: self._undo_close(back)))
         else:
             self._say(words)
 
-    def _take_back(self, closed: Sequence[Closed]) -> None:
+    def _undo_close(self, closed: Sequence[ClosedTab]) -> None:
         # Restores the files, and reopens the tabs with unsaved work.
         for each in closed:
             if each.earlier is None:
@@ -323,24 +325,26 @@ class DocumentController:
                 name = _("{name} (previous version)").format(name=each.earlier.path.stem)
                 self._documents.copy(each.earlier.copy, name)  # the file was changed since then
                 continue
-            there = self._documents.with_path(each.earlier.path)  # reopened before "Undo" was pressed
-            each.earlier.put_back()
+            there = self._documents.find_by_path(each.earlier.path)  # reopened before "Undo" was pressed
+            each.earlier.restore()
             if there is not None:
-                there.file_went_back()
+                there.on_file_reverted()
             else:
-                self._documents.open(each.earlier.path).edited(each.workspace)
+                self._documents.open(each.earlier.path).apply_edit(each.workspace)
 
-    def _remember(self, path: Path, name: str | None = None) -> None:
+    def _add_recent(self, path: Path, name: str | None = None) -> None:
         try:
             self._session.settings.add_recent(path, name or self._session.document.name)
         except SettingsError as error:
             self._session.console.add("warn", "studio", str(error))
 
-    def _cant_save(self, error: Exception) -> None:
-        self._complain(words_of(error), "file.save_as", _("Save somewhere else"))
+    def _report_save_error(self, error: Exception) -> None:
+        self._raise_alert(alert_text(error), "file.save_as", _("Save somewhere else"))
 
-    def _complain(self, words: AlertText, action: str, button: str, alert: str = "file") -> None:
-        self._session.alerts.put(alert, "error", words.title, words.detail, button=button, action=action)
+    def _raise_alert(self, words: AlertText, action: str, button: str, alert: str = "file") -> None:
+        self._session.alerts.raise_alert(
+            alert, "error", words.title, words.detail, button=button, action=action
+        )
 
 
 class AlertText(NamedTuple):
@@ -350,16 +354,16 @@ class AlertText(NamedTuple):
     detail: str
 
 
-def words_of(error: Exception) -> AlertText:
+def alert_text(error: Exception) -> AlertText:
     """Return the text of the alert for a file error."""
     if not isinstance(error, DocumentError):
-        return AlertText(_sentence(str(error)), "")
+        return AlertText(_as_sentence(str(error)), "")
     named = error.path is not None and error.reason.startswith(error.path.name)  # the name is not capitalised
-    title = f"{error.reason}." if named else _sentence(error.reason)
-    return AlertText(title, _sentence(error.advice))
+    title = f"{error.reason}." if named else _as_sentence(error.reason)
+    return AlertText(title, _as_sentence(error.advice))
 
 
-def strange_words(paths: Sequence[Path]) -> AlertText:
+def unknown_type_text(paths: Sequence[Path]) -> AlertText:
     """Return the text of the alert for files of unknown types."""
     names = [path.name or str(path) for path in paths]
     words, others = _("{file} is not a behaviour"), len(names) - 1
@@ -367,10 +371,10 @@ def strange_words(paths: Sequence[Path]) -> AlertText:
         words = ngettext(
             "{file} and {count} more are not behaviours", "{file} and {count} more are not behaviours", others
         )
-    return AlertText(f"{words.format(file=names[0], count=others)}.", _sentence(what_behaviours_are()))
+    return AlertText(f"{words.format(file=names[0], count=others)}.", _as_sentence(file_type_hint()))
 
 
-def _sentence(words: str) -> str:
+def _as_sentence(words: str) -> str:
     return f"{words[:1].upper()}{words[1:]}." if words else ""
 
 
@@ -395,19 +399,19 @@ class FlushBeforeClose(QObject):
             self._asked, self._ready = True, False
             editor = self._editor()
             if isinstance(editor, SupportsFlush):
-                editor.flush(self._go_on)
+                editor.flush(self._on_flushed)
             else:
                 self._ready = True
             self._waits = not self._ready
             if self._waits:
-                QTimer.singleShot(MAX_FLUSH_MS, self, self._go_on)
+                QTimer.singleShot(MAX_FLUSH_MS, self, self._on_flushed)
         return self._ready
 
-    def stay(self) -> None:
+    def reset(self) -> None:
         """Reset after closing was cancelled."""
         self._asked = self._ready = self._waits = False
 
-    def _go_on(self) -> None:
+    def _on_flushed(self) -> None:
         self._ready = True
         if self._waits:
             self._waits = False

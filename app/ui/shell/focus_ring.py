@@ -25,14 +25,14 @@ from shiboken6 import isValid
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.keyboard import keyboard_leads, set_keyboard_leads
+from app.ui.widgets.keyboard import is_keyboard_navigation, set_keyboard_navigation
 
-_MOVES = frozenset(
+_GEOMETRY_EVENTS = frozenset(
     {QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide, QEvent.Type.ParentChange}
 )
-_PRESSES = frozenset({QEvent.Type.MouseButtonPress, QEvent.Type.TouchBegin, QEvent.Type.TabletPress})
+_PRESS_EVENTS = frozenset({QEvent.Type.MouseButtonPress, QEvent.Type.TouchBegin, QEvent.Type.TabletPress})
 _Key = Qt.Key
-_LEADING = frozenset(
+_NAVIGATION_KEYS = frozenset(
     {
         _Key.Key_Tab, _Key.Key_Backtab, _Key.Key_F6, _Key.Key_Home, _Key.Key_End, _Key.Key_PageUp,
         _Key.Key_PageDown, _Key.Key_Left, _Key.Key_Right, _Key.Key_Up, _Key.Key_Down,
@@ -55,7 +55,7 @@ class FocusRing(QWidget):
         super().__init__(window)
         self._theme = theme
         self._home = self._window = window
-        set_keyboard_leads(False)
+        set_keyboard_navigation(False)
         self._target: QWidget | None = None
         self._chain: list[QWidget] = []
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -82,15 +82,15 @@ class FocusRing(QWidget):
 
     def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
-        if pressed or not keyboard_leads() or new is None or not self._rings(new):
-            self._follow(None)
+        if pressed or not is_keyboard_navigation() or new is None or not self._accepts_ring(new):
+            self._set_target(None)
             return
         if new.window() is not self._window:
             self._window = new.window()
             self.setParent(self._window)
-        self._follow(new)
+        self._set_target(new)
 
-    def _rings(self, widget: QWidget) -> bool:
+    def _accepts_ring(self, widget: QWidget) -> bool:
         window = widget.window()
         ours = window is self._home or (isinstance(window, QDockWidget) and self._home.isAncestorOf(window))
         if not ours or widget is window or widget.property("ownFocus"):
@@ -101,7 +101,7 @@ class FocusRing(QWidget):
         own = QAbstractItemView | QAbstractScrollArea | QMainWindow | QMenu | QMenuBar
         return not isinstance(widget, own)
 
-    def _follow(self, target: QWidget | None) -> None:
+    def _set_target(self, target: QWidget | None) -> None:
         for widget in self._chain:
             if isValid(widget):  # the focus also changes when a widget is deleted
                 widget.removeEventFilter(self)
@@ -120,19 +120,25 @@ class FocusRing(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         kind = event.type()
         if isinstance(watched, QWindow):
-            if kind in _PRESSES:
-                set_keyboard_leads(False)
-                self._follow(None)
-            elif kind == QEvent.Type.KeyPress and _leads(cast("QKeyEvent", event)) and not keyboard_leads():
-                set_keyboard_leads(True)
-                QTimer.singleShot(0, self, self._ring_here)  # after the key had a chance to move the focus
+            if kind in _PRESS_EVENTS:
+                set_keyboard_navigation(False)
+                self._set_target(None)
+            elif (
+                kind == QEvent.Type.KeyPress
+                and _moves_focus(cast("QKeyEvent", event))
+                and not is_keyboard_navigation()
+            ):
+                set_keyboard_navigation(True)
+                QTimer.singleShot(
+                    0, self, self._show_at_focus
+                )  # after the key had a chance to move the focus
         elif kind == QEvent.Type.Show and watched is self._home:
             self._window_changed(self._home.windowHandle())
-        elif kind in _MOVES:
+        elif kind in _GEOMETRY_EVENTS:
             self._place()
         return super().eventFilter(watched, event)
 
-    def _ring_here(self) -> None:
+    def _show_at_focus(self) -> None:
         if self._target is None:
             self._focus_changed(None, QApplication.focusWidget())
 
@@ -173,7 +179,9 @@ class FocusRing(QWidget):
         painter.end()
 
 
-def _leads(event: QKeyEvent) -> bool:
+def _moves_focus(event: QKeyEvent) -> bool:
     # Tab, arrows, F6, and Ctrl+1 to Ctrl+9, which focus a panel.
     to_panel = _Key.Key_1 <= event.key() <= _Key.Key_9
-    return event.key() in _LEADING or (to_panel and event.modifiers() == Qt.KeyboardModifier.ControlModifier)
+    return event.key() in _NAVIGATION_KEYS or (
+        to_panel and event.modifiers() == Qt.KeyboardModifier.ControlModifier
+    )

@@ -33,18 +33,18 @@ class HintRing(QWidget):
         self._end = QTimer(self)
         self._end.setSingleShot(True)
         self._end.setInterval(TIMEOUT_MS)
-        self._end.timeout.connect(self.forget)
+        self._end.timeout.connect(self.clear)
         self.hide()
 
     def point_at(self, command: str) -> bool:
         """Highlight the button of a command. Return False if no such button is visible."""
-        self.forget()
+        self.clear()
         buttons = self._window.findChildren(QAbstractButton)
         found = (each for each in buttons if each.isVisible() and each.property("command") == command)
         self.target = next(found, None)
         if self.target is None:
             return False
-        self.target.clicked.connect(self.forget)
+        self.target.clicked.connect(self.clear)
         self._listens_to = self._window.windowHandle()
         if self._listens_to is not None:
             self._listens_to.installEventFilter(self)
@@ -53,10 +53,10 @@ class HintRing(QWidget):
         self._end.start()
         return True
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Remove the highlight."""
         if self.target is not None and isValid(self.target):
-            self.target.clicked.disconnect(self.forget)
+            self.target.clicked.disconnect(self.clear)
         if self._listens_to is not None and isValid(self._listens_to):
             self._listens_to.removeEventFilter(self)
         self._listens_to = None
@@ -71,13 +71,13 @@ class HintRing(QWidget):
             and isinstance(event, QKeyEvent)
             and event.key() == Qt.Key.Key_Escape
         ):
-            self.forget()
+            self.clear()
         return super().eventFilter(watched, event)
 
     def _place(self) -> None:
         target = self.target
         if target is None or not isValid(target) or not target.isVisible():
-            self.forget()
+            self.clear()
             return
         inset = int(target.property("focusInset") or 0)
         out = OUT + HALO - inset

@@ -21,12 +21,12 @@ class PanelFocus(QObject):
         self._bench = bench
         application = QApplication.instance()
         if isinstance(application, QApplication):
-            application.focusChanged.connect(self._changed)
+            application.focusChanged.connect(self._on_focus_changed)
 
     def next(self, step: int) -> None:
         """Focus the next visible panel, or the previous one for -1."""
         bench = self._bench()
-        docks = [dock for dock in bench.docks.values() if dock.shown()] if bench is not None else []
+        docks = [dock for dock in bench.docks.values() if dock.is_displayed()] if bench is not None else []
         if bench is None or not docks:
             return
         current = self.dock()
@@ -40,7 +40,7 @@ class PanelFocus(QObject):
         if bench is not None and 0 < number <= len(names):
             bench.focus_panel(bench.docks[names[number - 1]])
 
-    def give(self, dock: Dock | None) -> None:
+    def focus(self, dock: Dock | None) -> None:
         """Bring a panel to the front and focus it."""
         bench = self._bench()
         if bench is not None and dock is not None:
@@ -56,7 +56,7 @@ class PanelFocus(QObject):
             return False
         skipped = False
         for stop in tab_stops(window, focus, forward=forward):
-            if not isinstance(stop, QTabBar) and not self._is_behind(stop):
+            if not isinstance(stop, QTabBar) and not self._is_covered(stop):
                 if skipped:
                     reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
                     stop.setFocus(reason)
@@ -64,7 +64,7 @@ class PanelFocus(QObject):
             skipped = True
         return False
 
-    def _is_behind(self, widget: QWidget) -> bool:
+    def _is_covered(self, widget: QWidget) -> bool:
         bench = self._bench()
         docks = bench.docks.values() if bench is not None else ()
         return any(dock.isAncestorOf(widget) and not dock.front for dock in docks)
@@ -74,18 +74,18 @@ class PanelFocus(QObject):
         focus, bench = QApplication.focusWidget(), self._bench()
         if bench is None or focus is None:
             return None
-        return next((dock for dock in bench.docks.values() if _has(dock, focus)), None)
+        return next((dock for dock in bench.docks.values() if _contains(dock, focus)), None)
 
-    def _changed(self, _old: QWidget | None, new: QWidget | None) -> None:
+    def _on_focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         bench = self._bench()
         if new is None or bench is None:
             return
         for dock in bench.docks.values():
-            has = _has(dock, new)
+            has = _contains(dock, new)
             dock.title.set_active(has)
             if has:
-                bench.used(dock)
+                bench.record_use(dock)
 
 
-def _has(dock: Dock, widget: QWidget) -> bool:
+def _contains(dock: Dock, widget: QWidget) -> bool:
     return dock is widget or dock.isAncestorOf(widget)

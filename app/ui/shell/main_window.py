@@ -26,10 +26,10 @@ from app.ui.shell.bars.run_bar import RunBar, ToolBar
 from app.ui.shell.bars.status_bar import Fact, StatusBar, StatusFacts
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.shell import START
+from app.ui.shell.commands.shell import START_PAGE
 from app.ui.shell.dialogs.motion_permission import MotionQuestion
 from app.ui.shell.dialogs.studio_dialogs import StudioDialogs
-from app.ui.shell.docking.dock import Dock, fitting
+from app.ui.shell.docking.dock import Dock, dock_for_kinds
 from app.ui.shell.docking.layouts import LAYOUTS, Layout, layout_named
 from app.ui.shell.docking.saved_layouts import SavedLayouts
 from app.ui.shell.docking.workbench import Workbench
@@ -49,16 +49,16 @@ from nep.i18n import _, lazy
 TICK_MS = 33
 MIN_SIZE = QSize(960, 540)  # leaves room for the system's bars on a screen of 1024 x 600
 FIRST_SIZE = QSize(1440, 900)
-FACTS_EVERY = 8  # ticks between refreshes
-OPEN_ALERTS = "panel:alerts"
+FACTS_REFRESH_TICKS = 8  # ticks between refreshes
+ALERTS_COMMAND = "panel:alerts"
 BLOCK_KEYS = {
     QKeySequence.StandardKey.Copy: "copy",
     QKeySequence.StandardKey.Cut: "cut",
     QKeySequence.StandardKey.Paste: "paste",
 }
-MENU = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
-DUPLICATE = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
-BOOKMARK = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
+MENU_KEY = QKeyCombination(Qt.KeyboardModifier.ShiftModifier, Qt.Key.Key_F10)
+DUPLICATE_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_D)
+BOOKMARK_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_B)
 LOADING_TEXTS = {"behaviour": lazy("Loading blocks.")}
 OTHER_LOADING_TEXT = lazy("Loading panels.")
 
@@ -74,7 +74,7 @@ class SupportsFields(Protocol):
 class MainWindow(QMainWindow):
     """Window of one session; implements `Shell` for its commands."""
 
-    bench_made = Signal()
+    bench_created = Signal()
 
     def __init__(
         self,
@@ -91,8 +91,8 @@ class MainWindow(QMainWindow):
         super().__init__()
         self._clock = clock
         self.session, self.theme, self.panels = session, theme, panels
-        self.state = WindowState(session.settings, self.complain)
-        self.saved_layouts = SavedLayouts(self.state, self.complain)
+        self.state = WindowState(session.settings, self.log_problem)
+        self.saved_layouts = SavedLayouts(self.state, self.log_problem)
         self.on_shut: Callable[[], object] = lambda: None
         self.can_restart = self.wants_restart = False
         self._showing = self._left = ""
@@ -100,18 +100,18 @@ class MainWindow(QMainWindow):
         self._ahead: dict[str, Workbench] = {}  # workbenches with panels created in advance
         self._facts = StatusFacts(session)
         self._alerts_seen = (-1, False)
-        self._source_seen = session.sources_shown
+        self._source_seen = session.source_revision
         self._ticks = self._halves = 0
         self._twice = False  # the timer runs at twice the tick rate
         self._shut = False
         self._flush_before_close = FlushBeforeClose(self, self.editor, self.close)
         self._build(examples)
         files = asks if asks is not None else self._file_dialogs()
-        asked = self.asked.take_keyboard
+        asked = self.asked.take_focus
         self.context = PanelContext(
             session, theme, self.open_topic, self.show_toast, self._run, files, asked, self.plot,
-            partial(self.open_topic, beside=True), self._why,
-            lambda: self.bench.shown_panels() if self.bench is not None else (),
+            partial(self.open_topic, beside=True), self._diagnose,
+            lambda: self.bench.visible_panels() if self.bench is not None else (),
         )  # fmt: skip
         self.ring = FocusRing(theme, self)
         self.timer = QTimer(self)
@@ -123,7 +123,7 @@ class MainWindow(QMainWindow):
         self._connect()
         self.show_start()
 
-    def _why(self, panel: PanelWidget, topic: str) -> None:
+    def _diagnose(self, panel: PanelWidget, topic: str) -> None:
         self.commands.view.open_doctor(panel, topic)
 
     def _build(self, examples: Sequence[Example]) -> None:
@@ -135,7 +135,7 @@ class MainWindow(QMainWindow):
         self.setMenuWidget(self.bar)
         self.run_bar, self.tool_bar = RunBar(theme), ToolBar(theme)
         self.use_robot = Button(theme, _("Use the virtual robot"), "bot", size="small")
-        self.use_robot.let_shrink()
+        self.use_robot.allow_shrinking()
         self.tool_bar.add_tool(self.use_robot)
         self.banner = AlertBanner(theme)
         self.start = StartPage(theme, examples)
@@ -154,32 +154,32 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(middle)
         self.toast = Toast(theme, self)
         self.asked = QuestionCard(theme, self, self.session.runs.asking.answer)
-        self.question = MotionQuestion(theme, self, self.session.fleet.permission, self.complain)
+        self.question = MotionQuestion(theme, self, self.session.fleet.permission, self.log_problem)
 
     def _connect(self) -> None:
         commands, start, run = self.commands, self.start, self._run
         actions, files, shortcuts = commands.actions, commands.files, commands.shortcuts
         for bar in (self.bar, self.run_bar, self.tool_bar):
-            bar.use(actions)
+            bar.set_actions(actions)
         self.tools = DeveloperTools(self, self.tool_bar, commands, self.session)
-        self.bar.layout_chosen.connect(lambda layout: run(f"layout.{layout}"))
+        self.bar.layout_selected.connect(lambda layout: run(f"layout.{layout}"))
         self.use_robot.clicked.connect(actions["robots.start"].trigger)
         self.status.pressed.connect(run)
-        start.virtual_robot.connect(actions["robots.virtual"].trigger)
-        start.new_behaviour.connect(actions["file.new"].trigger)
+        start.virtual_robot_pressed.connect(actions["robots.virtual"].trigger)
+        start.new_behaviour_pressed.connect(actions["file.new"].trigger)
         start.learn_pressed.connect(actions["help.first_steps"].trigger)
         start.open_pressed.connect(actions["file.open"].trigger)
         start.developer_pressed.connect(actions["layout.developer"].trigger)
-        start.example_chosen.connect(files.example)
-        start.file_chosen.connect(files.open)
-        start.work_chosen.connect(self._go_on_with)
-        start.left.connect(actions["start_page.leave"].trigger)
+        start.example_selected.connect(files.open_example)
+        start.file_selected.connect(files.open)
+        start.work_selected.connect(self._continue_work)
+        start.exited.connect(actions["start_page.leave"].trigger)
         actions["help.first_steps"].triggered.connect(lambda: start.offer_first_steps(False))
         self.banner.on_action = run
         self.banner.on_dismiss = self.session.alerts.dismiss
-        self.banner.on_more = partial(run, OPEN_ALERTS)
+        self.banner.on_more = partial(run, ALERTS_COMMAND)
         self.pages.currentChanged.connect(self._page_changed)
-        self.bench_made.connect(shortcuts.update_tooltips)
+        self.bench_created.connect(shortcuts.update_tooltips)
         shortcuts.changed.connect(self._show_keys)
         self._show_keys()
 
@@ -198,7 +198,7 @@ class MainWindow(QMainWindow):
         return StudioDialogs(self.theme, self, self.session.settings)
 
     @property
-    def showing(self) -> str:
+    def current_layout(self) -> str:
         """Name of the current layout, or `START`."""
         return self._showing
 
@@ -226,7 +226,7 @@ class MainWindow(QMainWindow):
         """Show the start page."""
         if self.bench is not None:
             self._left = self._showing
-        self._showing = START
+        self._showing = START_PAGE
         self.pages.setCurrentWidget(self.start)
         self.show_recent()
         self._show_bars(None)
@@ -237,9 +237,9 @@ class MainWindow(QMainWindow):
         """Name of the layout to return to from the start page, or ""."""
         if self._left:
             return self._left
-        return "behaviour" if any(not each.blank for each in self.session.documents) else ""
+        return "behaviour" if any(not each.is_blank for each in self.session.documents) else ""
 
-    def _go_on_with(self, key: str) -> None:
+    def _continue_work(self, key: str) -> None:
         self._run(f"tab:{key}")
         self._run("layout.behaviour")
 
@@ -251,7 +251,7 @@ class MainWindow(QMainWindow):
         """Update the recent files on the start page."""
         self.start.show_recent(recent_titles(self.session.settings.recent))
 
-    def complain(self, sentence: str) -> None:
+    def log_problem(self, sentence: str) -> None:
         """Log a problem that needs no action in the Console."""
         self.session.console.add("warn", "studio", sentence)
 
@@ -263,17 +263,17 @@ class MainWindow(QMainWindow):
             self._ahead.pop(layout.name, None)
             self.pages.addWidget(bench)
             bench.resize(self.pages.size())
-            self.saved_layouts.bring_back(bench, layout.name)
-            self.bench_made.emit()
+            self.saved_layouts.restore(bench, layout.name)
+            self.bench_created.emit()
         bench = self.benches[layout.name]
         focus = QApplication.focusWidget()
         inside = focus is None or self.pages.isAncestorOf(focus)
         self._showing = layout.name
         self.pages.setCurrentWidget(bench)
         if inside:  # focus the layout only if the focus was in it, not in the switch or a menu
-            bench.focus_home()
+            bench.focus_main_panel()
         self._show_bars(layout.name)
-        self.state.keep_layout(layout.name)
+        self.state.save_layout(layout.name)
         return bench
 
     def _new_bench(self, layout: Layout) -> Workbench:
@@ -284,17 +284,17 @@ class MainWindow(QMainWindow):
             bench.panel_failed.connect(self._panel_failed)
         return bench
 
-    def steps_ahead(self) -> list[Callable[[], object]]:
+    def preload_steps(self) -> list[Callable[[], object]]:
         """Return steps that create the panels of layouts not opened yet, one panel per step."""
 
         def make(layout: Layout, name: str) -> None:
             if not self._shut and layout.name not in self.benches:
                 self._ahead[layout.name] = bench = self._new_bench(layout)
-                bench.make_ahead(name)
+                bench.preload(name)
 
-        return [partial(make, layout, name) for layout in LAYOUTS for name in layout.at_first]
+        return [partial(make, layout, name) for layout in LAYOUTS for name in layout.default_panels]
 
-    def expect(self, layout: str) -> None:
+    def show_placeholder(self, layout: str) -> None:
         """Show the bars of a layout, with a placeholder until its workbench is created."""
         self._showing = layout
         placeholder = Placeholder(layout)
@@ -302,7 +302,7 @@ class MainWindow(QMainWindow):
         self.pages.setCurrentWidget(placeholder)
         placeholder.setFocus()
         self._show_bars(layout)
-        self.bench_made.connect(placeholder.deleteLater)
+        self.bench_created.connect(placeholder.deleteLater)
 
     def _show_bars(self, layout: str | None) -> None:
         self.bar.show_layout(layout, back=bool(self.left))
@@ -315,7 +315,7 @@ class MainWindow(QMainWindow):
     @property
     def bench(self) -> Workbench | None:
         """Current workbench, or None on the start page."""
-        return self.benches.get(self.showing)
+        return self.benches.get(self.current_layout)
 
     def editor(self) -> object:
         """Return the panel of behaviours, or None before it is first shown."""
@@ -325,7 +325,7 @@ class MainWindow(QMainWindow):
 
     def open_panel(self, name: str) -> Dock | None:
         """Show a panel in the current layout; the panel "behaviour" only in its own layout."""
-        wanted = "behaviour" if name == "behaviour" or self.bench is None else self.showing
+        wanted = "behaviour" if name == "behaviour" or self.bench is None else self.current_layout
         return self.show_layout(wanted).open(name)
 
     def open_topic(self, topic: str, *, beside: bool = False) -> None:
@@ -336,10 +336,10 @@ class MainWindow(QMainWindow):
         known = self.session.topic(topic)
         kinds = {known.codec, known.msg_type} if known is not None else set()
         bench = self.bench if self.bench is not None else self.show_layout("developer")
-        dock = fitting(bench.docks, bench.by_use(), kinds)
+        dock = dock_for_kinds(bench.docks, bench.recently_used(), kinds)
         if dock is None:
             bench = self.show_layout("developer")
-            dock = fitting(bench.docks, bench.by_use(), kinds) or bench.open("inspector")
+            dock = dock_for_kinds(bench.docks, bench.recently_used(), kinds) or bench.open("inspector")
         if dock is not None and beside and dock.panel.subtitle():
             dock = bench.open_another(dock.key)
         if dock is not None:
@@ -360,15 +360,15 @@ class MainWindow(QMainWindow):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Handle keys that no widget has accepted: copy and paste blocks wherever the focus is."""
         what = next((what for key, what in BLOCK_KEYS.items() if event.matches(key)), "")
-        if event.keyCombination() == DUPLICATE:
+        if event.keyCombination() == DUPLICATE_KEY:
             what = "duplicate"
         if what:
             self._run(f"blocks.edit:{what}")
         elif event.key() == Qt.Key.Key_Space and self.session.replay is not None and not event.modifiers():
             self._run("replay.play")
-        elif event.keyCombination() == BOOKMARK and self.session.replay is not None:
+        elif event.keyCombination() == BOOKMARK_KEY and self.session.replay is not None:
             self._run("replay.bookmark")
-        elif event.keyCombination() == MENU and (focus := QApplication.focusWidget()) is not None:
+        elif event.keyCombination() == MENU_KEY and (focus := QApplication.focusWidget()) is not None:
             # Qt itself handles only the Menu key, which many keyboards lack.
             place = focus.rect().center()
             asked = QContextMenuEvent.Reason.Keyboard
@@ -388,21 +388,21 @@ class MainWindow(QMainWindow):
             self.tick()
         elif self.bench is not None:
             self.bench.refresh(pictures=True)
-        self.tools.follow()
+        self.tools.on_half_tick()
 
-    def _follow_source(self) -> None:
+    def _update_source(self) -> None:
         # Resets all panels after a change of the source.
-        if self._source_seen != self.session.sources_shown:
-            self._source_seen = self.session.sources_shown
+        if self._source_seen != self.session.source_revision:
+            self._source_seen = self.session.source_revision
             for bench in (*self.benches.values(), *self._ahead.values()):
-                bench.source_changed()
+                bench.notify_source_changed()
 
-    def _follow_panels(self) -> None:
+    def _update_panels(self) -> None:
         # Suspends hidden panels and adapts the timer rate.
         now = self._clock()
         for bench in self.benches.values():
-            bench.follow(now)
-        twice = self.bench is not None and self.bench.shows_pictures()
+            bench.update_suspension(now)
+        twice = self.bench is not None and self.bench.shows_video()
         if twice != self._twice:
             self._twice, self._halves = twice, 1
             self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
@@ -419,9 +419,9 @@ class MainWindow(QMainWindow):
         with guarded(lazy("ask a question")):
             self.question.refresh()
         with guarded(lazy("switch the source")):
-            self._follow_source()
+            self._update_source()
         with guarded(lazy("pause panels")):
-            self._follow_panels()
+            self._update_panels()
         with guarded(lazy("show panels")):
             if self.bench is not None:
                 self.bench.refresh()
@@ -434,19 +434,19 @@ class MainWindow(QMainWindow):
         self.bar.show_robots(words, status)
         self.toast.refresh()
         self.asked.show_question(self.session.runs.asking.question, held=view.state == "paused")
-        if self.showing == START:
+        if self.current_layout == START_PAGE:
             self.bar.stop.show_state(
-                _(view.stop_word), ring=view.state == "stopping", filled=self._may_move()
+                _(view.stop_label), ring=view.state == "stopping", filled=self._may_move()
             )
             there = any(link.state in {"ready", "busy", STOPPING} for link in self.session.fleet.links)
             self.start.show_robot(words if there else "", status)
             self.start.show_open(open_work(self.session))
-        elif self.showing == "behaviour":
+        elif self.current_layout == "behaviour":
             self.run_bar.show_view(view)
         else:
             self.tool_bar.show_view(view)
             self.use_robot.setVisible(not self.session.fleet.links)
-        if self._ticks % FACTS_EVERY == 0:
+        if self._ticks % FACTS_REFRESH_TICKS == 0:
             with self.session.guarded(lazy("update the status bar")):
                 self._show_facts()
         with self.session.guarded(lazy("show alerts")):
@@ -455,72 +455,81 @@ class MainWindow(QMainWindow):
     def _show_facts(self) -> None:
         # Called less often than the tick, because numbers can't be read at 30 Hz.
         facts, document = self._facts, self.session.document
-        alerts = facts.alerts(for_developers=self.showing == "developer")
+        alerts = facts.alerts(for_developers=self.current_layout == "developer")
         web = facts.web_pages()
         self.status.commands = {
-            alerts[1]: OPEN_ALERTS,
+            alerts[1]: ALERTS_COMMAND,
             facts.remote_access()[1]: "network.others",
             web[1]: "network.web",
         }
-        if self.showing == "behaviour":
+        if self.current_layout == "behaviour":
             self.status.show_facts(
-                (facts.health(), facts.saved()),
-                (facts.armed(), facts.recording(), web, facts.topics(), facts.remote_access_quietly()),
+                (facts.health(), facts.save_state()),
+                (facts.arming(), facts.recording(), web, facts.topics(), facts.remote_access_plain()),
             )
-        elif self.showing == "developer":
+        elif self.current_layout == "developer":
             left: tuple[Fact, ...] = (alerts, facts.master(), facts.remote_access(), web, facts.traffic())
-            left = (*left, facts.armed(), facts.lost())
-            right: tuple[Fact, ...] = (facts.recording(), facts.ring(), facts.shown(), facts.window())
+            left = (*left, facts.arming(), facts.lost())
+            right: tuple[Fact, ...] = (
+                facts.recording(),
+                facts.flight_recorder(),
+                facts.displayed_messages(),
+                facts.window(),
+            )
             if self.session.replay is not None:
-                left = (alerts, *facts.replayed(), web)
+                left = (alerts, *facts.replayed_recording(), web)
                 right = (
                     facts.recording(),
-                    facts.ring(),
-                    facts.live_goes_on(),
+                    facts.flight_recorder(),
+                    facts.live_network_note(),
                     facts.master(),
                     facts.window(),
                 )
             self.status.show_facts(left, right)
         title = (
             "NEP Studio"
-            if self.showing == START
+            if self.current_layout == START_PAGE
             else f"{self.session.documents.title(document)} - NEP Studio"
         )
         if title != self.windowTitle():
             self.setWindowTitle(title)
 
-    def _moves(self) -> bool:
+    def _is_moving(self) -> bool:
         moves = {"busy", STOPPING}
         return self.session.runs.active or any(link.state in moves for link in self.session.fleet.links)
 
     def _may_move(self) -> bool:
         # Also True for a robot that hasn't confirmed Stop.
-        is_open = self.session.runs.view().stop_word != "Stop"
-        return is_open or self._moves() or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
+        is_open = self.session.runs.view().stop_label != "Stop"
+        return (
+            is_open
+            or self._is_moving()
+            or any(link.state == NOT_STOPPED for link in self.session.fleet.links)
+        )
 
     def _show_alerts(self) -> None:
         # Alerts for the current layout, shown in the free area of its bar.
-        alerts, is_developer = self.session.alerts, self.showing == "developer"
+        alerts, is_developer = self.session.alerts, self.current_layout == "developer"
         if (alerts.revision, is_developer) != self._alerts_seen:
             self._alerts_seen = (alerts.revision, is_developer)
-            told = alerts.to_tell(for_developers=is_developer)
-            self.banner.show_alerts([alert for alert in told if not alerts.dismissed(alert.id)])
-        hosts: Mapping[str, StartPage | RunBar] = {START: self.start, "behaviour": self.run_bar}
-        host = hosts.get(self.showing, self.tool_bar)
-        self.run_bar.share(has_banner=bool(self.banner.identity))
+            told = alerts.errors_and_warnings(for_developers=is_developer)
+            self.banner.show_alerts([alert for alert in told if not alerts.is_dismissed(alert.id)])
+        hosts: Mapping[str, StartPage | RunBar] = {START_PAGE: self.start, "behaviour": self.run_bar}
+        host = hosts.get(self.current_layout, self.tool_bar)
+        self.run_bar.reserve_banner_room(has_banner=bool(self.banner.identity))
         area = host.banner_area() if self.banner.identity else QRect()
-        self.banner.follow(QRect(host.mapTo(self.middle, area.topLeft()), area.size()))
+        self.banner.move_to(QRect(host.mapTo(self.middle, area.topLeft()), area.size()))
 
     def _panel_failed(self, name: str, sentence: str) -> None:
         self.session.console.add("error", f"panel {name}", sentence)
 
-    def begin(self) -> None:
+    def start_session(self) -> None:
         """Start the session and the timer of the tick."""
         self.session.start()
         self.timer.start()
         GcTimer(self).start()
         self.gc_freeze.start()
-        self.bench_made.connect(self.gc_freeze.start)
+        self.bench_created.connect(self.gc_freeze.start)
 
     def restart(self) -> str:
         """Close the window and restart Studio. Return the reason if that is impossible, or ""."""
@@ -532,42 +541,42 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self._shut:
-            if self._moves():
+            if self._is_moving():
                 self.session.runs.stop()  # sent now, so that replies can arrive while the session closes
             if not self._flush_before_close.ready():
                 event.ignore()
                 return
-            if not self._may_lose_work():
+            if not self._may_discard_work():
                 self.wants_restart = False
-                self._flush_before_close.stay()
+                self._flush_before_close.reset()
                 event.ignore()
                 return
             self._shut = True
             self.timer.stop()
             with log_errors("keep how the window looks"):
-                self._keep()
+                self._save_state()
             self.hide()
             for bench in (*self.benches.values(), *self._ahead.values()):
-                bench.shut()
+                bench.dispose()
             self.session.close()
             self.on_shut()
         super().closeEvent(event)
 
-    def _may_lose_work(self) -> bool:
+    def _may_discard_work(self) -> bool:
         # True if no unsaved work would be lost, or the user has confirmed the loss.
-        unkept = self.session.documents.unkept()
-        if not unkept or self.session.gives_up(unkept[0]):
+        unkept = self.session.documents.retry_journals()
+        if not unkept or self.session.confirm_discard(unkept[0]):
             return True
         self.show_layout("behaviour")
         self.session.documents.show(unkept[0])
         self.toast.show_toast(_("Studio can't close: save this behaviour first, or its changes are lost"))
         return False
 
-    def _keep(self) -> None:
-        self.state.keep_place(self)
+    def _save_state(self) -> None:
+        self.state.save_geometry(self)
         for name, bench in self.benches.items():
-            self.saved_layouts.keep(bench, name)
-        self.state.keep_theme(self.theme)
+            self.saved_layouts.save(bench, name)
+        self.state.save_theme(self.theme)
 
 
 class Placeholder(QWidget):

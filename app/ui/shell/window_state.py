@@ -11,14 +11,14 @@ from PySide6.QtWidgets import QMainWindow
 
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
-from app.ui.theme.system import preference_of
+from app.ui.theme.system import parse_preference
 from app.ui.theme.theme import MODES, Mode, Theme
 
 Saved = dict[str, object]
 FRAME = QSize(16, 48)  # approximate size of a window manager's frame
 
 
-def fitting(size: QSize, room: QSize) -> QSize:
+def initial_size(size: QSize, room: QSize) -> QSize:
     """Return the initial window size for a screen. On a small screen Stop would otherwise be outside it."""
     fits = size.width() <= room.width() and size.height() <= room.height()
     return size if fits else size.boundedTo(room - FRAME)
@@ -37,22 +37,22 @@ class WindowState:
         """Apply all saved settings to the theme at once."""
         chosen = self._settings.get("theme", "system")
         mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
-        motion = preference_of(self._settings.get("less_motion", None))
-        contrast = preference_of(self._settings.get("high_contrast", None))
-        theme.begin(mode, self._settings.get("text_percent", 100), motion, contrast)
+        motion = parse_preference(self._settings.get("less_motion", None))
+        contrast = parse_preference(self._settings.get("high_contrast", None))
+        theme.apply_settings(mode, self._settings.get("text_percent", 100), motion, contrast)
 
-    def keep_theme(self, theme: Theme) -> None:
+    def save_theme(self, theme: Theme) -> None:
         """Save the current settings of the theme."""
         self._set("theme", theme.mode)
         self._set("text_percent", theme.text_percent)
         self._set("less_motion", theme.motion)
         self._set("high_contrast", theme.contrast)
 
-    def keep(self, key: str, value: object) -> None:
+    def save(self, key: str, value: object) -> None:
         """Save a setting, as JSON value."""
         self._set(key, value)
 
-    def place(self, window: QMainWindow) -> bool:
+    def restore_geometry(self, window: QMainWindow) -> bool:
         """Restore the position of the window. Return False if none is saved."""
         text = self._settings.get("window", "")
         try:
@@ -64,7 +64,7 @@ class WindowState:
             window.setWindowState(window.windowState() & ~Qt.WindowState.WindowFullScreen)
         return placed
 
-    def keep_place(self, window: QMainWindow) -> None:
+    def save_geometry(self, window: QMainWindow) -> None:
         """Save the window's position."""
         self._set("window", base64.b64encode(window.saveGeometry().data()).decode("ascii"))
 
@@ -73,7 +73,7 @@ class WindowState:
         """Name of the last layout; "start" for the start page, or before the first start."""
         return self._settings.get("layout", "start")
 
-    def keep_layout(self, name: str) -> None:
+    def save_layout(self, name: str) -> None:
         """Save the name of the current layout."""
         self._set("layout", name)
 
@@ -82,27 +82,27 @@ class WindowState:
         kept: Saved = self._settings.get("layouts", {})
         return kept
 
-    def of_layout(self, name: str) -> Mapping[str, object]:
+    def layout_state(self, name: str) -> Mapping[str, object]:
         """Return the saved state of a layout; empty if there is none."""
         found = self.layouts().get(name)
         return found if isinstance(found, Mapping) else {}
 
-    def forget_layout(self, name: str) -> bool:
+    def delete_layout(self, name: str) -> bool:
         """Delete the saved state of a layout; return False if that couldn't be saved."""
         return self._set("layouts", {key: value for key, value in self.layouts().items() if key != name})
 
-    def chosen(self, base: str) -> str:
+    def selected_layout(self, base: str) -> str:
         """Return the name of the custom layout last shown in a built-in layout's workbench, or ""."""
         kept: Saved = self._settings.get("chosen_layouts", {})
         name = kept.get(base)
         return name if isinstance(name, str) else ""
 
-    def keep_chosen(self, base: str, name: str) -> None:
+    def save_selected_layout(self, base: str, name: str) -> None:
         """Save the name of the custom layout shown in a workbench."""
         kept: Saved = self._settings.get("chosen_layouts", {})
         self._set("chosen_layouts", {**kept, base: name})
 
-    def keep_layouts(self, found: Mapping[str, Mapping[str, object]]) -> bool:
+    def save_layouts(self, found: Mapping[str, Mapping[str, object]]) -> bool:
         """Save the states of layouts. Return False on failure."""
         return self._set("layouts", {**self.layouts(), **found})
 

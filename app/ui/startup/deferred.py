@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from PySide6.QtCore import QEvent, QObject, QTimer
 from PySide6.QtWidgets import QWidget
 
-AT_THE_LATEST_MS = 2000  # a window that starts minimised, or behind a locked screen, is not painted
+MAX_DELAY_MS = 2000  # a window that starts minimised, or behind a locked screen, is not painted
 
 _log = logging.getLogger(__name__)
 
@@ -28,20 +28,20 @@ class DeferredSteps(QObject):
         self._idle_timer.timeout.connect(self._run_step)
         self._deadline = QTimer(self)
         self._deadline.setSingleShot(True)
-        self._deadline.timeout.connect(self._begin)
-        self._deadline.start(AT_THE_LATEST_MS)
+        self._deadline.timeout.connect(self._start)
+        self._deadline.start(MAX_DELAY_MS)
         window.installEventFilter(self)
 
-    def put_first(self, steps: Sequence[Callable[[], object]]) -> None:
+    def prepend(self, steps: Sequence[Callable[[], object]]) -> None:
         """Run these steps before all others."""
         self._steps.extendleft(reversed(steps))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Paint and watched is self._window:
-            self._begin()
+            self._start()
         return False
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         if not self.began:
             self.began = True
             self._deadline.stop()

@@ -13,14 +13,21 @@ import sys
 from collections.abc import Callable, MutableMapping, Sequence
 
 CHOICE, BY_SOFTWARE = "QT_QUICK_BACKEND", "software"
-DEVICES = ("/dev/dri/renderD*", "/dev/nvidia[0-9]*", "/dev/dxg", "/dev/mali*", "/dev/kgsl*", "/dev/pvr*")
+GPU_DEVICE_PATTERNS = (
+    "/dev/dri/renderD*",
+    "/dev/nvidia[0-9]*",
+    "/dev/dxg",
+    "/dev/mali*",
+    "/dev/kgsl*",
+    "/dev/pvr*",
+)
 """Device files of GPUs on Linux, including WSL and single-board computers."""
-BASIC = ("Microsoft Basic Display", "Microsoft Basic Render")
+FALLBACK_ADAPTERS = ("Microsoft Basic Display", "Microsoft Basic Render")
 """Names of Windows' fallback graphics adapters."""
 _ATTACHED = 0x1
 
 
-def draw_by_software(
+def use_software_renderer(
     environ: MutableMapping[str, str], platform: str, there: Callable[[str], bool] | None = None
 ) -> bool:
     """Select Qt's software renderer on machines without a GPU. Return True if it was selected.
@@ -38,7 +45,7 @@ def draw_by_software(
 def has_graphics_processor(platform: str) -> bool:
     """Return True if this computer has a GPU, or if the system doesn't report that."""
     if platform.startswith("linux"):
-        return any(glob.glob(pattern) for pattern in DEVICES)  # noqa: PTH207 - absolute patterns
+        return any(glob.glob(pattern) for pattern in GPU_DEVICE_PATTERNS)  # noqa: PTH207 - absolute patterns
     if platform == "win32":
         return has_driver(adapters())
     return True
@@ -46,7 +53,7 @@ def has_graphics_processor(platform: str) -> bool:
 
 def has_driver(names: Sequence[str]) -> bool:
     """Return True if one of these adapters is not Windows' fallback, or if the list is empty."""
-    return not names or any(not name.startswith(BASIC) for name in names)
+    return not names or any(not name.startswith(FALLBACK_ADAPTERS) for name in names)
 
 
 def adapters() -> list[str]:

@@ -32,7 +32,7 @@ def shorten_switch_interval() -> None:
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
 
-def freeze_garbage() -> None:
+def freeze_objects() -> None:
     """Exclude all existing objects from later collections. Takes a few microseconds."""
     gc.freeze()
 
@@ -65,4 +65,4 @@ class GcFreezeTimer(QTimer):
         super().__init__(parent)
         self.setSingleShot(True)
         self.setInterval(SETTLE_MS)
-        self.timeout.connect(freeze_garbage)
+        self.timeout.connect(freeze_objects)

@@ -23,7 +23,7 @@ def has_bus(environ: MutableMapping[str, str]) -> bool:
     return bool(folder) and (Path(folder or "") / "bus").is_socket()
 
 
-def chooser_answers() -> bool:
+def has_file_chooser() -> bool:
     """Return True if the portal has a file chooser, False if it doesn't reply within 0.3 s."""
     from PySide6.QtDBus import QDBusConnection, QDBusMessage  # noqa: PLC0415 - only where there is a bus
 
@@ -39,7 +39,7 @@ def chooser_answers() -> bool:
 
 
 def use_portal(
-    environ: MutableMapping[str, str], platform: str, answers: Callable[[], bool] = chooser_answers
+    environ: MutableMapping[str, str], platform: str, answers: Callable[[], bool] = has_file_chooser
 ) -> None:
     """Select the portal's dialogs if they are available and the environment doesn't choose another theme.
 

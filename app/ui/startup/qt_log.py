@@ -22,8 +22,8 @@ from nep.system import terminal
 
 FLAGS = "QTWEBENGINE_CHROMIUM_FLAGS"
 QUIET = "--log-level=3"  # only fatal messages of Chromium
-NO_WINDOW = "no Qt platform plugin could be initialized"
-KEPT = 200
+NO_PLATFORM_MESSAGE = "no Qt platform plugin could be initialized"
+MAX_RECORDS = 200
 
 NOISE = re.compile(
     r"Failed to load vulkan:|initInstance: No Vulkan library available$"
@@ -59,7 +59,7 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> 
     If Qt can't open a window, the program exits here with code 2, because Qt would advise to reinstall the
     application and abort. This happens during startup, so no work is lost.
     """
-    if kind == QtMsgType.QtFatalMsg and NO_WINDOW in words:
+    if kind == QtMsgType.QtFatalMsg and NO_PLATFORM_MESSAGE in words:
         _log.critical(
             "no window can open; see that the screen is there and lets you in (DISPLAY is %r), and that the "
             "libraries that Qt names above are installed, or run a behaviour with no window: "
@@ -72,13 +72,13 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> 
         _log.log(LEVELS.get(kind, logging.WARNING), "%s", words)
 
 
-class Log(logging.Handler):
+class ConsoleHandler(logging.Handler):
     """Logging handler that stores warnings and errors of all threads for the Console."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self._repeat_filter = RepeatFilter()
-        self._records: deque[tuple[str, str, str]] = deque(maxlen=KEPT)
+        self._records: deque[tuple[str, str, str]] = deque(maxlen=MAX_RECORDS)
 
     def emit(self, record: logging.LogRecord) -> None:
         """Store a record. Repeated records are stored with their count."""
@@ -121,7 +121,7 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
         super().close()
 
 
-def listen() -> Log:
+def install_handlers() -> ConsoleHandler:
     """Install handlers for Qt's messages, uncaught exceptions and log records.
 
     Records also go to stderr and to the log files (`app.core.faults`).
@@ -134,7 +134,7 @@ def listen() -> Log:
     root = logging.getLogger()
     if not root.handlers:
         root.addHandler(TerminalHandler(sys.stderr))
-    log = Log()
+    log = ConsoleHandler()
     root.addHandler(log)
     root.addHandler(faults.LogFile(faults.log_folder()))
     return log

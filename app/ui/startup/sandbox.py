@@ -19,10 +19,10 @@ from pathlib import Path
 
 from app.ui.startup.qt_log import FLAGS
 
-FILTER_ALONE = "--disable-namespace-sandbox"
-OFF = "QTWEBENGINE_DISABLE_SANDBOX"
+NO_NAMESPACES_FLAG = "--disable-namespace-sandbox"
+DISABLE_VARIABLE = "QTWEBENGINE_DISABLE_SANDBOX"
 NEW_USER, NEW_PROCESSES = 0x10000000, 0x20000000
-NOWHERE = b"/proc/self/fdinfo"
+EMPTY_ROOT = b"/proc/self/fdinfo"
 """Root folder of Chromium's isolated processes; it is empty once its process has ended."""
 MAX_S = 2.0
 
@@ -40,7 +40,7 @@ class SandboxTrial:
             if self._process == 0:
                 code = 1
                 try:
-                    code = 0 if shuts_itself_off() else 1
+                    code = 0 if try_isolation() else 1
                 finally:
                     os._exit(code)
         except OSError:
@@ -48,7 +48,7 @@ class SandboxTrial:
         finally:
             os.close(writer)
 
-    def allowed(self) -> bool:
+    def is_allowed(self) -> bool:
         """Return True if namespaces are allowed, False if they are denied or the result is unknown.
 
         Waits at most 2 s. Call it once.
@@ -61,30 +61,34 @@ class SandboxTrial:
         return os.waitpid(self._process, 0)[1] == 0
 
 
-def begin_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | None:
+def start_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | None:
     """Start the test. Return None where it isn't needed.
 
     It isn't needed if the user has disabled the sandbox, or chosen another one by Chromium's flags.
     ``platform`` is a value of `sys.platform`.
     """
-    if not platform.startswith("linux") or environ.get(OFF) or "sandbox" in environ.get(FLAGS, ""):
+    if (
+        not platform.startswith("linux")
+        or environ.get(DISABLE_VARIABLE)
+        or "sandbox" in environ.get(FLAGS, "")
+    ):
         return None
     return SandboxTrial()
 
 
-def fit_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -> None:
+def configure_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -> None:
     """Restrict Chromium to the system call filter if the test failed.
 
     Call this before the web engine starts.
     """
-    if trial is not None and not trial.allowed():
+    if trial is not None and not trial.is_allowed():
         _log.info(
             "user namespaces are not permitted: the block editor's browser uses the system call filter only"
         )
-        environ[FLAGS] = f"{environ.get(FLAGS, '')} {FILTER_ALONE}".strip()
+        environ[FLAGS] = f"{environ.get(FLAGS, '')} {NO_NAMESPACES_FLAG}".strip()
 
 
-def shuts_itself_off() -> bool:
+def try_isolation() -> bool:
     """Isolate this process as Chromium does. Return False if the system denies it."""
     if sys.platform == "win32":
         return False
@@ -99,4 +103,4 @@ def shuts_itself_off() -> bool:
         (own / "gid_map").write_text(f"{group} {group} 1")
     except OSError:
         return False
-    return bool(system.chroot(NOWHERE) == 0)
+    return bool(system.chroot(EMPTY_ROOT) == 0)

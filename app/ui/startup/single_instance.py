@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject
 from shiboken6 import isValid
 
-from app.core.storage.atomic_file import private_folder
+from app.core.storage.atomic_file import create_private_folder
 from app.core.storage.file_lock import FileLock
 from nep.system.lazy_import import lazy_module
 
@@ -35,7 +35,7 @@ else:
     QtNetwork = lazy_module("PySide6.QtNetwork")
 
 CONNECT_MS = 300
-ANSWER_MS = 3000
+REPLY_TIMEOUT_MS = 3000
 START_S, POLL_S = 20.0, 0.05
 MAX_LENGTH = 1_000_000
 MAX_PATH_LENGTH = 100  # the path of a Unix socket has at most 108 bytes
@@ -50,7 +50,7 @@ class StartRequest:
     demo: bool = False
 
 
-def place(folder: Path) -> str:
+def socket_name(folder: Path) -> str:
     """Return the name of the socket for Studio's folder; "" if there is no private folder for it.
 
     The socket is in the user's runtime folder, else in Studio's folder, else in a private temporary one: in a
@@ -66,7 +66,7 @@ def place(folder: Path) -> str:
         if len(os.fsencode(path)) >= MAX_PATH_LENGTH:
             continue
         with contextlib.suppress(OSError):
-            private_folder(each)
+            create_private_folder(each)
             if is_private(each):
                 return str(path)
     return ""
@@ -81,7 +81,7 @@ def is_private(folder: Path) -> bool:
     return stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid() and not about.st_mode & 0o077
 
 
-def is_ours(name: str) -> bool:
+def is_own_socket(name: str) -> bool:
     """Return True if the socket exists, belongs to this user, and is in a private folder."""
     if os.name != "posix":
         return bool(name)
@@ -92,7 +92,7 @@ def is_ours(name: str) -> bool:
     return stat.S_ISSOCK(about.st_mode) and about.st_uid == os.geteuid() and is_private(Path(name).parent)
 
 
-def peer_of(descriptor: int) -> int | None:
+def peer_user(descriptor: int) -> int | None:
     """Return the user id of the peer of a local socket; None where the system doesn't report it."""
     asked = getattr(socket, "SO_PEERCRED", None)
     copy = os.dup(descriptor)
@@ -112,12 +112,12 @@ def peer_of(descriptor: int) -> int | None:
     return None
 
 
-def hand_over(name: str, asked: StartRequest) -> bool:
+def send_request(name: str, asked: StartRequest) -> bool:
     """Pass a request to the running window. Return False if there is none. Waits at most 3 s.
 
     Sockets of other users are ignored.
     """
-    if not is_ours(name):
+    if not is_own_socket(name):
         return False  # checked on Unix before Qt's network module is loaded, which takes time
     line = QtNetwork.QLocalSocket()
     line.connectToServer(name)
@@ -126,7 +126,7 @@ def hand_over(name: str, asked: StartRequest) -> bool:
     files = [str(path.absolute()) for path in asked.files]
     line.write(json.dumps({"files": files, "demo": asked.demo}).encode() + b"\n")
     line.flush()
-    answer, until = b"", time.monotonic() + ANSWER_MS / 1000
+    answer, until = b"", time.monotonic() + REPLY_TIMEOUT_MS / 1000
     while len(answer) < len(OK) and (left_ms := int((until - time.monotonic()) * 1000)) > 0:
         if not line.waitForReadyRead(left_ms):
             break
@@ -135,18 +135,18 @@ def hand_over(name: str, asked: StartRequest) -> bool:
     return answer == OK
 
 
-def found(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
+def pass_to_running(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
     """Return True if a running or starting window accepted the request.
 
     Otherwise this process holds the lock ``turn`` and has to open a window; it releases the lock when the
     window can be reached. A double click on Studio's icon therefore opens only one window.
     """
     until, pause, waited = time.monotonic() + within_s, threading.Event(), False
-    while not hand_over(name, asked):
+    while not send_request(name, asked):
         if not name or time.monotonic() >= until:
             return False
         if turn.acquire():
-            if waited and hand_over(name, asked):  # the window appeared between the two attempts
+            if waited and send_request(name, asked):  # the window appeared between the two attempts
                 turn.release()
                 return True
             return False
@@ -158,7 +158,7 @@ def found(name: str, asked: StartRequest, turn: FileLock, within_s: float = STAR
 def _belongs_to_other_user(line: QtNetwork.QLocalSocket) -> bool:
     if os.name != "posix":
         return False
-    user = peer_of(int(line.socketDescriptor()))
+    user = peer_user(int(line.socketDescriptor()))
     return user is not None and user != os.geteuid()
 
 

@@ -7,35 +7,35 @@ import datetime as dt
 from nep.i18n import _, day_text
 
 
-def day_words(then: dt.datetime, now: dt.datetime) -> str:
+def relative_day_text(then: dt.datetime, now: dt.datetime) -> str:
     """Format a day, such as "Today, 8:12", "Yesterday", "17 November" or "17 November 2025"."""
     days = (now.date() - then.date()).days
     if days == 0:
-        return _("Today, {clock}").format(clock=clock_words(then))
+        return _("Today, {clock}").format(clock=clock_text(then))
     if days == 1:
         return _("Yesterday")
     return day_text(then.day, then.month, then.year if then.year != now.year else None)
 
 
-def when_words(then: dt.datetime, now: dt.datetime) -> str:
+def date_time_text(then: dt.datetime, now: dt.datetime) -> str:
     """Format a date and time, such as "Today, 8:12", "Yesterday, 8:12" or "17 November, 8:12"."""
-    day = day_words(then, now)
+    day = relative_day_text(then, now)
     if then.date() == now.date():
         return day
-    return _("{day}, {clock}").format(day=day, clock=clock_words(then))
+    return _("{day}, {clock}").format(day=day, clock=clock_text(then))
 
 
-def seen_words(then: dt.datetime, now: dt.datetime) -> str:
+def last_seen_text(then: dt.datetime, now: dt.datetime) -> str:
     """Format when something was last seen, such as "seen today, 8:12" or "seen 17 November, 16:20"."""
-    clock = clock_words(then)
+    clock = clock_text(then)
     days = (now.date() - then.date()).days
     if days == 0:
         return _("seen today, {clock}").format(clock=clock)
     if days == 1:
         return _("seen yesterday, {clock}").format(clock=clock)
-    return _("seen {day}, {clock}").format(day=day_words(then, now), clock=clock)
+    return _("seen {day}, {clock}").format(day=relative_day_text(then, now), clock=clock)
 
 
-def clock_words(then: dt.datetime) -> str:
+def clock_text(then: dt.datetime) -> str:
     """Format a time of day, such as "8:12"."""
     return f"{then.hour}:{then.minute:02d}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.core.network.nodes import NodeEntry
-from app.core.networks.kinds import kind_named
+from app.core.networks.kinds import find_kind
 from nep.i18n import _, lazy, number
 
 GENERATIONS = {
@@ -13,15 +13,15 @@ GENERATIONS = {
 }
 
 
-def generation_words(node: NodeEntry) -> str:
+def generation_text(node: NodeEntry) -> str:
     """Return "native", the version of the original NEP, or the name of the other network."""
-    kind = kind_named(node.network)
+    kind = find_kind(node.network)
     if kind is not None:
-        return kind.words
+        return kind.product_name
     return _(GENERATIONS.get(node.generation, f"NEP {node.generation}"))
 
 
-def cpu_words(ratio: float | None) -> str:
+def cpu_text(ratio: float | None) -> str:
     """Format a share of a core, such as "0.4 %", "12 %" or "130 %"; "" if it is unknown."""
     if ratio is None:
         return ""

@@ -37,19 +37,19 @@ _KEY = re.compile(r"[A-Z][A-Za-z]+")
 THIN = "\u2009"  # thin space, as thousands separator
 
 
-def rate_words(rate_hz: float | None) -> str:
+def rate_text(rate_hz: float | None) -> str:
     """Format a rate in messages per second, such as "30.0", "0.4" or "1 204"; "" if it is unknown."""
     if rate_hz is None:
         return ""
-    return number(rate_hz, ".1f") if rate_hz < 1000 else grouped(round(rate_hz))
+    return number(rate_hz, ".1f") if rate_hz < 1000 else group_digits(round(rate_hz))
 
 
-def bandwidth_words(bytes_per_s: float | None) -> str:
+def bandwidth_text(bytes_per_s: float | None) -> str:
     """Format a bandwidth, such as "92 B/s", "1.6 kB/s" or "5.1 MB/s"; "" if it is unknown."""
-    return "" if bytes_per_s is None else f"{size_words(bytes_per_s)}/s"
+    return "" if bytes_per_s is None else f"{size_text(bytes_per_s)}/s"
 
 
-def size_words(size_bytes: float) -> str:
+def size_text(size_bytes: float) -> str:
     """Format a size, such as "412 B", "1.6 kB", "46 kB" or "5.1 MB"."""
     if size_bytes < 1000:
         return f"{round(size_bytes)} B"
@@ -61,7 +61,7 @@ def size_words(size_bytes: float) -> str:
     return f"{number(value, '.1f')} {unit}" if value < 9.95 else f"{round(value)} {unit}"
 
 
-def age_words(age_s: float | None) -> str:
+def age_text(age_s: float | None) -> str:
     """Format an age, such as "12 ms", "0.4 s", "6 s", "2 min" or "3 h"; "" if it is unknown."""
     if age_s is None:
         return ""
@@ -74,26 +74,26 @@ def age_words(age_s: float | None) -> str:
     return f"{round(age_s / 60)} min" if age_s < 3600 else f"{round(age_s / 3600)} h"
 
 
-def latency_words(latency_s: float) -> str:
+def latency_text(latency_s: float) -> str:
     """Format a latency, such as "0.6 ms", "41 ms" or "1.2 s"."""
     if latency_s < 0.00995:
         return f"{number(latency_s * 1000, '.1f')} ms"
     return f"{round(latency_s * 1000)} ms" if latency_s < 0.9995 else f"{number(latency_s, '.1f')} s"
 
 
-def grouped(count: int) -> str:
+def group_digits(count: int) -> str:
     """Format a count with a thousands separator, such as "18 204"."""
     return f"{count:,}".replace(",", THIN)
 
 
-def seconds_words(value_s: float) -> str:
+def seconds_text(value_s: float) -> str:
     """Format a duration, such as "0.4 s", "14 s" or "2 min"."""
     if value_s < 10:
         return f"{number(value_s, '.1f')} s"
     return f"{round(value_s)} s" if value_s < 120 else f"{round(value_s / 60)} min"
 
 
-def spoken_key(shortcut: str, platform: str = sys.platform) -> str:
+def shortcut_text(shortcut: str, platform: str = sys.platform) -> str:
     """Format shortcuts, separated by commas, such as "Ctrl+Shift+S", or "⇧⌘S" on a Mac, where Ctrl is Cmd."""
     if platform != "darwin":
         return _named_keys(shortcut, {})
@@ -108,14 +108,14 @@ def _mac_key(shortcut: str) -> str:
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
     """Append a shortcut to a tooltip, such as "Save (Ctrl+S)", or "Save (⌘S)" on a Mac."""
-    return f"{tip} ({spoken_key(shortcut, platform)})" if shortcut else tip
+    return f"{tip} ({shortcut_text(shortcut, platform)})" if shortcut else tip
 
 
 def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:
     return _KEY.sub(lambda key: signs.get(key[0]) or _(KEYS.get(key[0], key[0])), shortcut)
 
 
-def length_words(seconds: float) -> str:
+def length_text(seconds: float) -> str:
     """Format the length of a recording, such as "0:42", "12:04" or "1:32:10"."""
     whole = int(seconds) if 0 <= seconds < 1e9 else 0
     minutes, rest = divmod(whole, 60)

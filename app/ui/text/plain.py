@@ -12,10 +12,10 @@ import unicodedata
 from PySide6.QtGui import Qt
 
 LONG_WORD, PIECE = 20, 4
-MAY_BREAK = "\u200b"  # zero-width space, at which a line may break
+ZERO_WIDTH_SPACE = "\u200b"  # zero-width space, at which a line may break
 
 
-def breakable(words: str) -> str:
+def make_breakable(words: str) -> str:
     """Insert line break opportunities into very long words, which a label would otherwise cut off."""
     return " ".join(_pieces(word) if len(word) > LONG_WORD else word for word in words.split(" "))
 
@@ -25,7 +25,7 @@ def _pieces(word: str) -> str:
     result, since = "", 0
     for letter in word:
         if since >= PIECE and not unicodedata.combining(letter) and unicodedata.category(letter)[0] in "LN":
-            result, since = result + MAY_BREAK, 0
+            result, since = result + ZERO_WIDTH_SPACE, 0
         result, since = result + letter, since + 1
     return result
 
@@ -37,6 +37,6 @@ def tip(words: str) -> str:
     return f'<span style="white-space: pre-wrap">{html.escape(words)}</span>'
 
 
-def entry(name: str) -> str:
+def escape_menu_text(name: str) -> str:
     """Escape a name for a menu entry: an ampersand makes no mnemonic, and a tab no shortcut."""
     return name.replace("&", "&&").replace("\t", " ")

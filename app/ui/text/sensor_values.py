@@ -15,7 +15,7 @@ _MAX_NAMES = 20
 
 
 @dataclass(frozen=True, slots=True)
-class ReadingWords:
+class ReadingText:
     """Formatted sensor value.
 
     Attributes:
@@ -25,36 +25,36 @@ class ReadingWords:
     """
 
     value: str = ""
-    beside: str = ""
-    share: float | None = None
+    details: str = ""
+    fraction: float | None = None
 
 
-def reading_of(sensor: Sensor, value: object) -> ReadingWords:
+def reading_text(sensor: Sensor, value: object) -> ReadingText:
     """Format a sensor's newest value. All texts are empty if there is none."""
     if value is None:
-        return ReadingWords()
+        return ReadingText()
     if sensor.kind == "boolean" or isinstance(value, bool):
-        return ReadingWords(yes_words(value))
+        return ReadingText(yes_no_text(value))
     if sensor.kind == "detections" and isinstance(value, Mapping):
         return _detections(value)
     if isinstance(value, Mapping):
         return _object(sensor, value)
     if isinstance(value, (int, float)):
-        return ReadingWords(number_words(value, sensor.unit), share=_share(sensor, value))
+        return ReadingText(quantity_text(value, sensor.unit), fraction=_fraction(sensor, value))
     if isinstance(value, str):
         title = next((choice.title for choice in sensor.choices if choice.value == value), value)
-        return ReadingWords(title if sensor.kind == "choice" else f"“{title}”" if title else "")
+        return ReadingText(title if sensor.kind == "choice" else f"“{title}”" if title else "")
     if isinstance(value, Sequence):
-        return ReadingWords(str(len(value)), ", ".join(_name(item) for item in value))
-    return ReadingWords(str(value))
+        return ReadingText(str(len(value)), ", ".join(_name(item) for item in value))
+    return ReadingText(str(value))
 
 
-def yes_words(value: object) -> str:
+def yes_no_text(value: object) -> str:
     """Return "yes" or "no", translated."""
     return _("yes") if value else _("no")
 
 
-def number_words(value: float, unit: str | None) -> str:
+def quantity_text(value: float, unit: str | None) -> str:
     """Format a number with its significant decimals, such as "0.82 m", "84 %" or "31°"."""
     if isinstance(value, int) or float(value).is_integer():
         words = f"{value:.0f}"
@@ -68,14 +68,14 @@ def number_words(value: float, unit: str | None) -> str:
     return f"{words}{unit}" if unit.startswith("°") else f"{words} {unit}"
 
 
-def _share(sensor: Sensor, value: float) -> float | None:
+def _fraction(sensor: Sensor, value: float) -> float | None:
     low, high = sensor.minimum, sensor.maximum
     if low is None or high is None or high <= low:
         return None
     return min(1.0, max(0.0, (value - low) / (high - low)))
 
 
-def _detections(value: Mapping[str, object]) -> ReadingWords:
+def _detections(value: Mapping[str, object]) -> ReadingText:
     items = value.get("items")
     found = [item for item in items if isinstance(item, Mapping)] if isinstance(items, list) else []
     count = value.get("count")
@@ -85,16 +85,16 @@ def _detections(value: Mapping[str, object]) -> ReadingWords:
         if name
         else ", ".join(bounded_str(item.get("name", "")) for item in found[:_MAX_NAMES])
     )
-    return ReadingWords(str(count if isinstance(count, int) else len(found)), names)
+    return ReadingText(str(count if isinstance(count, int) else len(found)), names)
 
 
-def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
+def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingText:
     # Fields with the same unit are combined ("1.3, 0.3 m"); others follow ("facing 31°").
     fields = sensor.fields or tuple(DataField(str(name), str(name), "number") for name in value)
     known = [(field, value.get(field.name)) for field in fields]
     numbers = [(field, measured) for field, measured in known if _is_number(measured)]
     if not numbers:
-        return ReadingWords(
+        return ReadingText(
             "", ", ".join(f"{field.title} {words}" for field, words in known if words is not None)
         )
     unit = numbers[0][0].unit
@@ -103,9 +103,9 @@ def _object(sensor: Sensor, value: Mapping[str, object]) -> ReadingWords:
     ]
     others = [(field, measured) for field, measured in numbers if field.unit != unit]
     beside = ", ".join(
-        f"{field.title} {number_words(round(measured), field.unit)}" for field, measured in others
+        f"{field.title} {quantity_text(round(measured), field.unit)}" for field, measured in others
     )
-    return ReadingWords(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
+    return ReadingText(f"{', '.join(together)}{f' {unit}' if unit else ''}", beside)
 
 
 def _is_number(value: object) -> TypeGuard[float]:

@@ -9,7 +9,7 @@ from PySide6.QtGui import QFont, QFontDatabase
 
 from app import resources
 
-LOADED = "fontsRefused"
+REJECTED_PROPERTY = "fontsRefused"
 """Application property with the font files that Qt rejected; set once all are loaded."""
 FILES = (
     "Inter-Regular.otf",
@@ -32,15 +32,15 @@ def load() -> tuple[str, ...]:
     text sizes.
     """
     application = QCoreApplication.instance()
-    if application is not None and application.property(LOADED) is not None:
-        return tuple(application.property(LOADED))
+    if application is not None and application.property(REJECTED_PROPERTY) is not None:
+        return tuple(application.property(REJECTED_PROPERTY))
     refused: list[str] = []
     for name in FILES:
         number = QFontDatabase.addApplicationFont(str(resources.path("fonts", name)))
         if number < 0:
             refused.append(name)
     if application is not None:
-        application.setProperty(LOADED, refused)
+        application.setProperty(REJECTED_PROPERTY, refused)
     return tuple(refused)
 
 

@@ -45,12 +45,12 @@ def names() -> frozenset[str]:
 def _source(name: str) -> str:
     shape = _shapes().get(name)
     if shape is None:
-        _log.warning("unknown icon '%s'%s; using a placeholder", name[:80], _near(name))
+        _log.warning("unknown icon '%s'%s; using a placeholder", name[:80], _suggestion(name))
         shape = _shapes()[UNKNOWN]
     return f"{HEAD}{shape}</svg>"
 
 
-def _near(name: str) -> str:
+def _suggestion(name: str) -> str:
     near = difflib.get_close_matches(name[:80], names(), 1)
     return f" (did you mean '{near[0]}'?)" if near else ""
 
@@ -86,7 +86,7 @@ def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, fi
 
 
 @lru_cache(maxsize=256)
-def _drawn(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
+def _cached_pixmap(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
     pixmap = QPixmap(round(side * ratio), round(side * ratio))
     pixmap.setDevicePixelRatio(ratio)
     pixmap.fill(Qt.GlobalColor.transparent)
@@ -96,11 +96,11 @@ def _drawn(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
     return pixmap
 
 
-def paint_icon_again(painter: QPainter, rect: QRectF, name: str, colour: QColor) -> None:
+def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor) -> None:
     """Paint an icon like `paint_icon`, but from a cached pixmap at whole pixels, for frequent repaints."""
     ratio = painter.device().devicePixelRatioF()
     place = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
-    painter.drawPixmap(place, _drawn(name, rect.width(), colour.rgba(), ratio))
+    painter.drawPixmap(place, _cached_pixmap(name, rect.width(), colour.rgba(), ratio))
 
 
 @guard  # not a QObject

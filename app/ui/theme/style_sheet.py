@@ -15,7 +15,7 @@ LABEL_ROLES = (
     "changed", "onAccent", "selectedText",
 )  # fmt: skip
 
-OUR_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
+EXTRA_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
 """Size and weight of additional kinds of labels."""
 
 
@@ -126,7 +126,7 @@ Workbench > QTabBar::tab {{ width: 0; height: 0; margin: 0; padding: 0; border: 
 
 
 def _labels(theme: ThemeValues) -> str:
-    kinds = {name: (kind.size_px, kind.weight) for name, kind in theme.text_kinds().items()} | OUR_KINDS
+    kinds = {name: (kind.size_px, kind.weight) for name, kind in theme.text_kinds().items()} | EXTRA_KINDS
     rules = []
     for name, (size_px, weight) in kinds.items():
         family = theme.family("mono" if name == "code" else "text")

@@ -15,27 +15,27 @@ PREFERENCES: tuple[Preference, ...] = ("system", "on", "off")
 CLIENT_AREA_ANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
 
 
-def preference_of(kept: object) -> Preference:
+def parse_preference(kept: object) -> Preference:
     """Parse a preference from the settings, where older versions stored a boolean."""
     if isinstance(kept, bool):
         return "on" if kept else "system"
     return next((wish for wish in PREFERENCES if wish == kept), "system")
 
 
-def wants_contrast(hints: QStyleHints) -> bool:
+def prefers_contrast(hints: QStyleHints) -> bool:
     """Return True if the system requests high contrast; False if Qt doesn't report it."""
     asked = getattr(hints, "accessibility", None)
     return asked is not None and asked().contrastPreference() == Qt.ContrastPreference.HighContrast
 
 
-def on_contrast(hints: QStyleHints, call: Callable[[], object]) -> None:
+def on_contrast_changed(hints: QStyleHints, call: Callable[[], object]) -> None:
     """Call ``call`` when the system's contrast preference changes, if Qt supports that."""
     asked = getattr(hints, "accessibility", None)
     if asked is not None:
         asked().contrastPreferenceChanged.connect(call)
 
 
-def wants_less_motion(platform: str = sys.platform) -> bool:
+def prefers_reduced_motion(platform: str = sys.platform) -> bool:
     """Return True if the system requests reduced motion; False if programs can't query it."""
     if platform != "win32":
         return False

@@ -24,9 +24,9 @@ Mode = Literal["light", "dark", "system"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 MONO_KINDS = frozenset({"code", "mono"})
 DISPLAY_SPACING_EM = -0.02
-TEXT_PERCENT = (100, 200)
-HC_STRONGER = frozenset({"border", "borderStrong", "okBorder", "warnBorder", "errorBorder"})
-HC_FLATTENED = ("okTint", "warnTint", "errorTint", "infoTint", "accentTint", "changedTint")
+TEXT_PERCENT_RANGE = (100, 200)
+HC_STRONG_ROLES = frozenset({"border", "borderStrong", "okBorder", "warnBorder", "errorBorder"})
+HC_FLAT_ROLES = ("okTint", "warnTint", "errorTint", "infoTint", "accentTint", "changedTint")
 PALETTE_ROLES: Mapping[QPalette.ColorRole, str] = {
     QPalette.ColorRole.Window: "window",
     QPalette.ColorRole.WindowText: "text",
@@ -52,7 +52,7 @@ PALETTE_ROLES: Mapping[QPalette.ColorRole, str] = {
 DISABLED_ROLES = (QPalette.ColorRole.Text, QPalette.ColorRole.WindowText, QPalette.ColorRole.ButtonText)
 
 
-STYLED = "isFusion"
+STYLED_PROPERTY = "isFusion"
 """Application property that is set with the style, which Qt doesn't report once a style sheet is set."""
 
 
@@ -69,15 +69,15 @@ class Theme(QObject):
         self._tokens = tokens if tokens is not None else theme_tokens.load()
         self._hints = hints if hints is not None else QGuiApplication.styleHints()
         self._mode: Mode = mode
-        self._text_percent = TEXT_PERCENT[0]
+        self._text_percent = TEXT_PERCENT_RANGE[0]
         self.motion: Preference = "off"  # "on" means reduced motion
         self.contrast: Preference = "off"  # "on" means high contrast
         self.reduced_motion = self.high_contrast = False
-        self._dark = self._wanted_dark()
+        self._dark = self._resolve_dark()
         self._icons: dict[tuple[str, str, str], QIcon] = {}
         self._fonts: dict[str, QFont] = {}
         self._hints.colorSchemeChanged.connect(self._system_changed)
-        system.on_contrast(self._hints, lambda: self.set_contrast(self.contrast))
+        system.on_contrast_changed(self._hints, lambda: self.set_contrast(self.contrast))
 
     # -- mode -------------------------------------------------------------------------------------
 
@@ -101,38 +101,38 @@ class Theme(QObject):
         self._mode = mode
         self._refresh()
 
-    def begin(self, mode: Mode, text_percent: int, motion: Preference, contrast: Preference) -> None:
+    def apply_settings(self, mode: Mode, text_percent: int, motion: Preference, contrast: Preference) -> None:
         """Apply all saved settings at once."""
         self._mode, self.contrast = mode, contrast
-        self.high_contrast = self._wanted_contrast()
-        self._text_percent = min(max(text_percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
+        self.high_contrast = self._resolve_contrast()
+        self._text_percent = min(max(text_percent, TEXT_PERCENT_RANGE[0]), TEXT_PERCENT_RANGE[1])
         self._fonts.clear()
         self.set_motion(motion)
         self._refresh()
 
     def set_text_percent(self, percent: int) -> None:
         """Set the text size in per cent (100 to 200), which also scales lengths that depend on text."""
-        self._text_percent = min(max(percent, TEXT_PERCENT[0]), TEXT_PERCENT[1])
+        self._text_percent = min(max(percent, TEXT_PERCENT_RANGE[0]), TEXT_PERCENT_RANGE[1])
         self._fonts.clear()
         self.apply()
 
     def set_motion(self, wish: Preference) -> None:
         """Set reduced motion: "on", "off", or "system" for the system's preference."""
         self.motion = wish
-        self.reduced_motion = wish == "on" or (wish == "system" and system.wants_less_motion())
+        self.reduced_motion = wish == "on" or (wish == "system" and system.prefers_reduced_motion())
         self.changed.emit()
 
     def set_contrast(self, wish: Preference) -> None:
         """Set high contrast (strong borders, no tints): "on", "off", or "system" to follow the system."""
         self.contrast = wish
-        if self._wanted_contrast() != self.high_contrast:
+        if self._resolve_contrast() != self.high_contrast:
             self.high_contrast = not self.high_contrast
             self.apply()
         else:
             self.changed.emit()
 
-    def _wanted_contrast(self) -> bool:
-        asked = self.contrast == "system" and system.wants_contrast(self._hints)
+    def _resolve_contrast(self) -> bool:
+        asked = self.contrast == "system" and system.prefers_contrast(self._hints)
         return self.contrast == "on" or asked
 
     @property
@@ -145,9 +145,9 @@ class Theme(QObject):
         application = QApplication.instance()
         if isinstance(application, QApplication):
             # Each of these visits all widgets, even if nothing changes.
-            if application.property(STYLED) is None:
+            if application.property(STYLED_PROPERTY) is None:
                 application.setStyle(QStyleFactory.create("Fusion"))
-                application.setProperty(STYLED, True)
+                application.setProperty(STYLED_PROPERTY, True)
             palette, font, sheet = self.palette(), self.font("body"), self.style_sheet()
             if application.palette() != palette:
                 application.setPalette(palette)
@@ -157,7 +157,7 @@ class Theme(QObject):
                 application.setStyleSheet(sheet)
         self.changed.emit()
 
-    def _wanted_dark(self) -> bool:
+    def _resolve_dark(self) -> bool:
         if self._mode == "system":
             return self._hints.colorScheme() == Qt.ColorScheme.Dark
         return self._mode == "dark"
@@ -167,7 +167,7 @@ class Theme(QObject):
             self._refresh()
 
     def _refresh(self) -> None:
-        self._dark = self._wanted_dark()
+        self._dark = self._resolve_dark()
         self.apply()
 
     # -- colours ----------------------------------------------------------------------------------
@@ -179,9 +179,9 @@ class Theme(QObject):
     def hex(self, role: str) -> str:
         """Return the colour of a role as in the tokens. Raises KeyError for an unknown role."""
         if self.high_contrast:
-            if role in HC_STRONGER:
+            if role in HC_STRONG_ROLES:
                 role = "controlBorder"
-            elif role in HC_FLATTENED:
+            elif role in HC_FLAT_ROLES:
                 role = "panel"
         return self._tokens.colours[self._scheme][role]
 

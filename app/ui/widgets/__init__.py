@@ -33,4 +33,4 @@ from app.ui.widgets.labels import Separator as Separator
 from app.ui.widgets.labels import SteadyLabel as SteadyLabel
 from app.ui.widgets.labels import label as label
 from app.ui.widgets.labels import set_role as set_role
-from app.ui.widgets.lists.scroll_areas import Scrolled as Scrolled
+from app.ui.widgets.lists.scroll_areas import ContentScrollArea as ContentScrollArea

@@ -31,10 +31,10 @@ _COLOURS: dict[str, tuple[str | None, str | None, str | None, str | None, str]] 
 }
 ARROW = 16
 CHEVRON, CHEVRON_GAP = 14, 6
-Place = Literal["runBar", "toolBar", "appBar"]
+BarName = Literal["runBar", "toolBar", "appBar"]
 RUN_WIDTH = 112
-BARE_WIDTH = 56
-AIM_WIDTH = 2.0
+ICON_ONLY_WIDTH = 56
+DROP_TARGET_WIDTH = 2.0
 RING = 4  # px around Stop, for the ring that shows pending replies
 
 
@@ -68,7 +68,7 @@ class PaintedButton(QAbstractButton):
     set.
     """
 
-    shortens = False
+    elides_text = False
     """True if the text is elided when the button is narrow; the tooltip then has the full text."""
 
     def __init__(
@@ -93,11 +93,11 @@ class PaintedButton(QAbstractButton):
         self._aimed = False
 
     @property
-    def is_aimed(self) -> bool:
+    def is_drop_target(self) -> bool:
         """True if the button is the drop target of a drag."""
         return self._aimed
 
-    def set_aimed(self, aimed: bool) -> None:
+    def set_drop_target(self, aimed: bool) -> None:
         """Draw a ring around the button, or remove it, to show that it is the drop target."""
         if aimed != self._aimed:
             self._aimed = aimed
@@ -120,8 +120,8 @@ class PaintedButton(QAbstractButton):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        if self.shortens:
-            paint.tell_whole(self, self.text())
+        if self.elides_text:
+            paint.set_elision_tooltip(self, self.text())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Click on Enter as well as on Space, without auto-repeat.
@@ -141,7 +141,7 @@ class PaintedButton(QAbstractButton):
         self.paint_button(painter, rect)
         # above the button's own painting, because the tab that opens under dragged blocks is filled
         if self._aimed:
-            paint.box(painter, rect, radius, None, role("accent"), AIM_WIDTH)
+            paint.box(painter, rect, radius, None, role("accent"), DROP_TARGET_WIDTH)
         painter.end()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -151,7 +151,7 @@ class PaintedButton(QAbstractButton):
 class Button(PaintedButton):
     """Button with a text and optionally an icon. Filled kinds are for primary actions."""
 
-    shortens = True
+    elides_text = True
 
     def __init__(
         self,
@@ -173,7 +173,7 @@ class Button(PaintedButton):
         self._least: int | None = None
         self.setCursor(Qt.CursorShape.ArrowCursor)
 
-    def set_word(self, text: str, icon: str | None = None, *, name: str = "") -> None:
+    def set_label(self, text: str, icon: str | None = None, *, name: str = "") -> None:
         """Set the text and, if given, the icon.
 
         ``name`` is the accessible name if it differs from the text.
@@ -215,7 +215,7 @@ class Button(PaintedButton):
         wanted = self.sizeHint()
         return wanted if self._least is None else QSize(min(self._least, wanted.width()), wanted.height())
 
-    def let_shrink(self, least: int = 72) -> None:
+    def allow_shrinking(self, least: int = 72) -> None:
         """Elide the text if the button is narrow, down to a minimum width.
 
         The tooltip then has the full text.
@@ -227,7 +227,7 @@ class Button(PaintedButton):
         """Return the size of the icon in px, which scales with the text size."""
         return round(self._theme.scaled(self.measure.icon))
 
-    def shown_word(self) -> str:
+    def displayed_text(self) -> str:
         """Return the text that is painted."""
         return self.text()
 
@@ -242,7 +242,7 @@ class Button(PaintedButton):
         if self.measure.font == "body":
             font.setWeight(font.Weight.Medium)
         frame = QRectF(self.rect())
-        word = self.shown_word()
+        word = self.displayed_text()
         text_width = paint.width_of(font, word)
         icon = self.icon_side() if self.icon_name is not None else 0
         gap = self.measure.gap if icon and word else 0
@@ -254,7 +254,7 @@ class Button(PaintedButton):
             paint_icon(painter, QRectF(left, top, icon, icon), self.icon_name, own, filled=filled)
         end = frame.bottomRight() - QPointF(4, 0)
         area = QRectF(QPointF(left + icon + gap, frame.top()), end)
-        paint.words(painter, area, word, font, ink)
+        paint.text_line(painter, area, word, font, ink)
 
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         # Colours of fill, border and text.
@@ -363,14 +363,14 @@ class IconButton(PaintedButton):
 class LinkButton(PaintedButton):
     """Link in the accent colour, optionally with an arrow."""
 
-    shortens = True
+    elides_text = True
 
     def __init__(self, theme: Theme, text: str, icon: str | None = None) -> None:
         super().__init__(theme, text)
         self._icon = icon
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
-    def set_word(self, text: str, icon: str | None) -> None:
+    def set_label(self, text: str, icon: str | None) -> None:
         """Set the text and, if given, the arrow icon."""
         self._icon = icon
         self.set_text(text)
@@ -392,7 +392,7 @@ class LinkButton(PaintedButton):
             square = QRectF(rect.right() - ARROW, rect.center().y() - ARROW / 2, ARROW, ARROW)
             paint_icon(painter, square, self._icon, ink)
             rect.adjust(0, 0, -ARROW - 6, 0)
-        paint.words(painter, rect, self.text(), font, ink)
+        paint.text_line(painter, rect, self.text(), font, ink)
 
 
 class RunButton(Button):
@@ -412,7 +412,7 @@ class RunButton(Button):
         self.fill_icon = filled
         self.set_kind("run" if filled else "plain")
 
-    def set_bare(self, bare: bool) -> None:
+    def set_icon_only(self, bare: bool) -> None:
         """Show only the icon if `bare`, where large text leaves no space. The accessible name stays."""
         if bare != self._bare:
             self._bare = bare
@@ -422,14 +422,14 @@ class RunButton(Button):
     def icon_side(self) -> int:
         return self.measure.icon  # the text needs the space
 
-    def shown_word(self) -> str:
+    def displayed_text(self) -> str:
         return "" if self._bare else self.text()
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("button")
         if self._bare:
             return QSize(
-                max(BARE_WIDTH, self.icon_side() + 28),
+                max(ICON_ONLY_WIDTH, self.icon_side() + 28),
                 max(self.measure.height, round(paint.height_of(font)) + 12),
             )
         height = max(self.measure.height, round(paint.height_of(font)) + 12)
@@ -447,10 +447,10 @@ class StopButton(PaintedButton):
     The button has a margin of 4 px for the ring.
     """
 
-    def __init__(self, theme: Theme, place: Place = "runBar", parent: QWidget | None = None) -> None:
+    def __init__(self, theme: Theme, place: BarName = "runBar", parent: QWidget | None = None) -> None:
         self._corners = "large" if place == "runBar" else "control"
         super().__init__(theme, _("Stop"), radius=self._corners, parent=parent)
-        self._place: Place = place
+        self._place: BarName = place
         self._ring = False
         self.filled = True
         # A click doesn't take the focus, so sheets stay open and typing continues.
@@ -503,9 +503,9 @@ class StopButton(PaintedButton):
             fill = theme.colour("errorTint" if self.is_highlighted else "panel")
             paint.box(painter, frame, radius, fill, theme.colour("stop"))
             ink = theme.colour("error")
-        self._paint_words(painter, frame, ink)
+        self._paint_text(painter, frame, ink)
 
-    def _paint_words(self, painter: QPainter, frame: QRectF, ink: QColor) -> None:
+    def _paint_text(self, painter: QPainter, frame: QRectF, ink: QColor) -> None:
         font, key_font = self._fonts()
         key = "F12" if self.text() == _("Stop") or self._place != "runBar" else ""
         side = self._side()
@@ -517,7 +517,7 @@ class StopButton(PaintedButton):
         square = QRectF(left, frame.center().y() - side / 2, side, side)
         paint.box(painter, square, side / 6, ink)
         area = QRectF(QPointF(square.right() + gap, frame.top()), frame.bottomRight())
-        paint.words(painter, area, self.text(), font, ink)
+        paint.text_line(painter, area, self.text(), font, ink)
         if key:
             area.setLeft(area.left() + word_width + key_gap)
-            paint.words(painter, area, key, key_font, ink)
+            paint.text_line(painter, area, key, key_font, ink)

@@ -13,7 +13,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
-from app.ui.widgets.indicators import spoken
+from app.ui.widgets.indicators import status_name
 from app.ui.widgets.labels import label
 from nep.i18n import _
 
@@ -61,7 +61,7 @@ class AlertBox(QWidget):
     """
 
     icon_side, icon_left, left, high, gap = 18, 12, 40, 10, 10
-    least_words = 220  # minimum width of the text beside the buttons, in px at 100 %
+    min_text_width = 220  # minimum width of the text beside the buttons, in px at 100 %
 
     def __init__(self, theme: Theme, *, framed: bool = True) -> None:
         # Without a frame only the icon shows the status; used for "ok".
@@ -94,7 +94,7 @@ class AlertBox(QWidget):
     def _fit(self) -> None:
         # If the text is large or long, the buttons are below it.
         room = self.width() - self.button_row.sizeHint().width()
-        beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.least_words)
+        beside = self.button_row.isEmpty() or room >= self._theme.scaled(self.min_text_width)
         wanted = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         if self._whole.direction() != wanted:
             self._whole.setDirection(wanted)
@@ -146,10 +146,10 @@ class AlertRow(AlertBox):
         for line, text in zip(self._lines, (title, detail, command, note), strict=True):
             line.setText(text)
             paint.show_when(line, bool(text))
-        self.button.set_word(button)
+        self.button.set_label(button)
         paint.show_when(self.button, bool(button))
         spoken_text = _("{status}: {sentence}").format(
-            status=spoken(status), sentence=f"{title} {detail}".strip()
+            status=status_name(status), sentence=f"{title} {detail}".strip()
         )
         self.setAccessibleName(spoken_text)
 

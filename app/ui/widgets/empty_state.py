@@ -15,7 +15,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import Button
 from app.ui.widgets.labels import label
-from app.ui.widgets.lists.scroll_areas import Scrolled
+from app.ui.widgets.lists.scroll_areas import ContentScrollArea
 
 TILE, BELOW_TILE = 56, 16
 TEXT_WIDTH = 400
@@ -30,7 +30,7 @@ class EmptyAction:
     text: str
     run: Callable[[], object]
     icon: str | None = None
-    primary: bool = False
+    is_primary: bool = False
 
 
 class _Tile(QWidget):
@@ -85,7 +85,7 @@ class EmptyState(QWidget):
         self._buttons: list[Button] = []
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
-        area = Scrolled(inside)
+        area = ContentScrollArea(inside)
         area.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         whole.addWidget(area)
         self.set_actions(actions)
@@ -128,8 +128,8 @@ class EmptyState(QWidget):
         self._row.addStretch(1)
         for action in actions:
             button = Button(self._theme, action.text, action.icon, size="form")
-            button.let_shrink()
-            button.set_kind("primary" if action.primary else "plain")
+            button.allow_shrinking()
+            button.set_kind("primary" if action.is_primary else "plain")
             button.clicked.connect(lambda _on=False, run=action.run: run())
             self._row.addWidget(button)
             self._buttons.append(button)

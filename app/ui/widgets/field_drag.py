@@ -16,7 +16,7 @@ MODIFIERS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Me
 """Modifier keys, which choose the drop action and are no shortcuts of commands."""
 
 
-def field_in_hand(topic: str, path: str) -> QMimeData:
+def field_mime_data(topic: str, path: str) -> QMimeData:
     """Return the drag data of a field, also as text; ``topic`` is a topic's key with its network."""
     data = QMimeData()
     data.setData(MIME, json.dumps([topic, path]).encode())
@@ -79,9 +79,9 @@ def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str],
     keys = DragKeys(press)
     QTimer.singleShot(0, keys.begin)  # runs in the event loop of the drag, after Qt has installed its filter
     drag = QDrag(source)
-    data = field_in_hand(topic, path)
+    data = field_mime_data(topic, path)
     drag.setMimeData(data)
-    drag.setPixmap(_words(data.text()))
+    drag.setPixmap(_drag_pixmap(data.text()))
     drag.setHotSpot(QPoint(-12, -4))
     try:
         drag.exec(Qt.DropAction.CopyAction)
@@ -89,7 +89,7 @@ def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str],
         keys.end()
 
 
-def _words(text: str) -> QPixmap:
+def _drag_pixmap(text: str) -> QPixmap:
     shown = label(text, "code")
     shown.setProperty("raised", "true")
     shown.setContentsMargins(8, 4, 8, 4)

@@ -18,16 +18,16 @@ from nep.i18n import _, lazy
 class FileKind:
     """Type of file: label, wrapped in `lazy`, and suffix."""
 
-    words: str
-    ending: str
+    label: str
+    suffix: str
 
 
-def meant(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
+def resolve_kind(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
     """Return path and type for a chosen name. A typed suffix takes precedence over the chosen type."""
     ending = chosen.suffix.lower()
-    if ending != kind.ending:
-        typed = next((each for each in kinds if each.ending == ending), None)
-        return (chosen, typed) if typed is not None else (chosen.with_name(chosen.name + kind.ending), kind)
+    if ending != kind.suffix:
+        typed = next((each for each in kinds if each.suffix == ending), None)
+        return (chosen, typed) if typed is not None else (chosen.with_name(chosen.name + kind.suffix), kind)
     return chosen, kind
 
 
@@ -58,11 +58,11 @@ class FileDialogs(Protocol):
     def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a layout file to import."""
 
-    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+    def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a folder."""
 
 
-PICTURE_ENDINGS = (".png", ".jpg", ".jpeg")
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def pictures_folder() -> str:
@@ -74,7 +74,7 @@ def pictures_folder() -> str:
 BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
 RECORDINGS = (lazy("Recordings"), "*.mcap")
 LAYOUTS = (lazy("Layouts"), "*.nep-layout")
-PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_ENDINGS))
+PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_SUFFIXES))
 """Name filter for images in dialogs: label and patterns."""
 
 
@@ -107,17 +107,17 @@ class SystemDialogs:
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], None],
     ) -> None:
-        offered = {f"{_(kind.words)} (*{kind.ending})": kind for kind in kinds}
+        offered = {f"{_(kind.label)} (*{kind.suffix})": kind for kind in kinds}
 
-        def chosen(path: Path) -> None:
-            take(*meant(path, offered.get(dialog.selectedNameFilter(), kinds[0]), kinds))
+        def take_path(path: Path) -> None:
+            take(*resolve_kind(path, offered.get(dialog.selectedNameFilter(), kinds[0]), kinds))
 
-        dialog = self._dialog(title, str(suggestion.parent), chosen)
+        dialog = self._dialog(title, str(suggestion.parent), take_path)
         dialog.setNameFilters(list(offered))
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.setDefaultSuffix(kinds[0].ending.lstrip("."))
+        dialog.setDefaultSuffix(kinds[0].suffix.lstrip("."))
         dialog.filterSelected.connect(
-            lambda words: dialog.setDefaultSuffix(offered[words].ending.lstrip("."))
+            lambda words: dialog.setDefaultSuffix(offered[words].suffix.lstrip("."))
         )
         dialog.selectFile(suggestion.name)
         dialog.show()
@@ -137,7 +137,7 @@ class SystemDialogs:
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.show()
 
-    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+    def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         dialog = self._dialog(_("Choose a folder"), folder, take)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.show()

@@ -57,16 +57,16 @@ class Flow(QLayout):
         return self._arrange(QRect(0, 0, width, 0), move=False)
 
     def sizeHint(self) -> QSize:
-        shown = [*self._shown()]
+        shown = [*self._visible_items()]
         wide = sum(self._preferred_width(item) for item in shown) + self._gap * max(0, len(shown) - 1)
         high = max((item.sizeHint().height() for item in shown), default=0)
-        return self._outside(QSize(wide, high))
+        return self._with_margins(QSize(wide, high))
 
     def minimumSize(self) -> QSize:
-        shown = [*self._shown()]
+        shown = [*self._visible_items()]
         wide = max((self._minimum_width(item) for item in shown), default=0)
         high = max((item.minimumSize().height() for item in shown), default=0)
-        return self._outside(QSize(wide, high))
+        return self._with_margins(QSize(wide, high))
 
     def setGeometry(self, rect: QRect) -> None:
         super().setGeometry(rect)
@@ -75,10 +75,10 @@ class Flow(QLayout):
     # -- arrangement
     # ------------------------------------------------------------------------------------------
 
-    def _shown(self) -> Iterator[QLayoutItem]:
+    def _visible_items(self) -> Iterator[QLayoutItem]:
         return (item for item in self._items if not item.isEmpty())
 
-    def _outside(self, size: QSize) -> QSize:
+    def _with_margins(self, size: QSize) -> QSize:
         edge = self.contentsMargins()
         return size + QSize(edge.left() + edge.right(), edge.top() + edge.bottom())
 
@@ -105,7 +105,7 @@ class Flow(QLayout):
         # Returns the height; places the items only if `move`.
         edge = self.contentsMargins()
         room = rect.marginsRemoved(edge)
-        shown = [*self._shown()]
+        shown = [*self._visible_items()]
         rows = [self._one_row(shown, room.width())] if shown else []
         if rows and not rows[0]:
             rows = self._rows(shown, room.width())

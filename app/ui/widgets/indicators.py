@@ -33,7 +33,7 @@ MIN_ITEM = 64
 SPARK = QSize(56, 16)
 SPARK_STROKE = 1.25
 BAR_HEIGHT = 6
-SPOKEN = {
+STATUS_NAMES = {
     "ok": lazy("ok"),
     "info": lazy("info"),
     "warn": lazy("warning"),
@@ -48,9 +48,9 @@ ROBOT_STATUS = {
 }  # fmt: skip
 
 
-def spoken(status: str) -> str:
+def status_name(status: str) -> str:
     """Return the name of a status for screen readers."""
-    return _(SPOKEN.get(status, status))
+    return _(STATUS_NAMES.get(status, status))
 
 
 class Chip(QWidget):
@@ -102,7 +102,7 @@ class Chip(QWidget):
         self.updateGeometry()
         self.update()
 
-    def set_bare(self, bare: bool) -> None:
+    def set_icon_only(self, bare: bool) -> None:
         """Show only the icon if `bare`, where space is scarce; the tooltip then has the text."""
         if bare != self._bare:
             self._bare = bare
@@ -125,16 +125,16 @@ class Chip(QWidget):
         font.setWeight(font.Weight.Medium)
         return font
 
-    def bare_width(self) -> int:
+    def icon_only_width(self) -> int:
         """Return the width in px with the icon only."""
-        return max(self._high(), round(self._side()) + CHIP_PADDING)
+        return max(self._preferred_height(), round(self._side()) + CHIP_PADDING)
 
-    def _high(self) -> int:
+    def _preferred_height(self) -> int:
         least = CHIP_HEIGHT + (4 if self._large else 0)
         return max(least, round(paint.height_of(self._font())) + 6)
 
     def sizeHint(self) -> QSize:
-        return QSize(self.bare_width() if self._bare else self.full_width(), self._high())
+        return QSize(self.icon_only_width() if self._bare else self.full_width(), self._preferred_height())
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
@@ -144,7 +144,7 @@ class Chip(QWidget):
         self._update_tooltip()
 
     def _update_tooltip(self) -> None:
-        paint.tell_whole(self, self._text)
+        paint.set_elision_tooltip(self, self._text)
         if self._bare:
             self.setProperty("shortened", True)
             self.setToolTip(plain.tip(self._text))
@@ -168,7 +168,7 @@ class Chip(QWidget):
             paint_icon(painter, square, name, theme.colour(status.colour) if name == "dot" else ink)
             left += side + CHIP_GAP
         if not self._bare:
-            paint.words(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
+            paint.text_line(painter, rect.adjusted(left, 0, -3, 0), self._text, self._font(), ink)
         painter.end()
 
 
@@ -186,7 +186,7 @@ class StatusIcon(QWidget):
         """Set the status."""
         if status != self._status:
             self._status = status
-            self.setAccessibleName(spoken(status))
+            self.setAccessibleName(status_name(status))
             self.update()
 
     def sizeHint(self) -> QSize:
@@ -271,7 +271,7 @@ class StatusItem(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        paint.tell_whole(self, self._text)
+        paint.set_elision_tooltip(self, self._text)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -286,7 +286,7 @@ class StatusItem(QWidget):
             side = self._side()
             paint_icon(painter, QRectF(0, rect.center().y() - side / 2, side, side), self._icon, colour)
             rect.setLeft(side + 6)
-        paint.words(painter, rect, self._text, theme.font("small"), ink or theme.colour("textSecondary"))
+        paint.text_line(painter, rect, self._text, theme.font("small"), ink or theme.colour("textSecondary"))
         painter.end()
 
 

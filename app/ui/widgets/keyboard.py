@@ -15,7 +15,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QWidget
 from shiboken6 import isValid
 
-_LEADS_PROPERTY = "keyboardLeads"
+_NAVIGATION_PROPERTY = "keyboardLeads"
 
 
 def is_plain(event: QKeyEvent) -> bool:
@@ -27,34 +27,34 @@ def is_plain(event: QKeyEvent) -> bool:
     return not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
 
 
-def is_pressed_key(key: int) -> bool:
+def is_activation_key(key: int) -> bool:
     """Return True if a key activates the focused widget."""
     return key in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}
 
 
-def keyboard_leads() -> bool:
+def is_keyboard_navigation() -> bool:
     """Return True if the keyboard moved the focus. Only then a focus ring is shown."""
     application = QApplication.instance()
-    return bool(application is not None and application.property(_LEADS_PROPERTY))
+    return bool(application is not None and application.property(_NAVIGATION_PROPERTY))
 
 
-def set_keyboard_leads(leads: bool) -> None:
+def set_keyboard_navigation(leads: bool) -> None:
     """Record whether the last input was a key that moves the focus, or a mouse button."""
     application = QApplication.instance()
     if application is not None:
-        application.setProperty(_LEADS_PROPERTY, leads)
+        application.setProperty(_NAVIGATION_PROPERTY, leads)
 
 
-def following(widget: QWidget, *, forward: bool = True) -> QWidget:
+def next_in_focus_chain(widget: QWidget, *, forward: bool = True) -> QWidget:
     """Return the next (or previous) widget in the window's focus chain; the widget itself if it is alone."""
     found = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
-    return widget if found is None else _with_own_parent(found)
+    return widget if found is None else _restore_parent(found)
 
 
-def proxy_of(widget: QWidget) -> QWidget | None:
+def focus_proxy(widget: QWidget) -> QWidget | None:
     """Return the focus proxy of a widget, or None."""
     found = widget.focusProxy()
-    return None if found is None else _with_own_parent(found)
+    return None if found is None else _restore_parent(found)
 
 
 def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
@@ -63,15 +63,15 @@ def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Itera
     Ends early at a widget that PySide confuses with a deleted one at the same address: only Qt knows the next
     one.
     """
-    step = following(begin, forward=forward)
+    step = next_in_focus_chain(begin, forward=forward)
     while step is not begin and isValid(step):
         takes = bool(step.focusPolicy() & Qt.FocusPolicy.TabFocus)
         if takes and step.isVisible() and step.isEnabled() and widget.isAncestorOf(step):
             yield step
-        step = following(step, forward=forward)
+        step = next_in_focus_chain(step, forward=forward)
 
 
-def stops_of(widget: QWidget) -> list[QWidget]:
+def tab_stops_of(widget: QWidget) -> list[QWidget]:
     """Return the tab stops of a widget and its children, in the order of their creation.
 
     The popup of a combo box is a child, but a separate window that Tab does not reach.
@@ -83,7 +83,7 @@ def stops_of(widget: QWidget) -> list[QWidget]:
     ]
 
 
-def _with_own_parent(found: QWidget) -> QWidget:
+def _restore_parent(found: QWidget) -> QWidget:
     # Restores the ownership in PySide; has no effect in Qt.
     if not isValid(found):
         return found

@@ -123,7 +123,7 @@ class BoldInLine(QWidget):
             if strong:
                 font.setWeight(font.Weight.Bold)
             if words and rect.width() > 4:
-                paint.words(painter, rect, words, font, self._theme.colour("text"))
+                paint.text_line(painter, rect, words, font, self._theme.colour("text"))
             rect.setLeft(rect.left() + QFontMetricsF(font).horizontalAdvance(words))
         painter.end()
 

@@ -10,18 +10,18 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 
 
-def plain_words(text: str) -> str:
+def strip_mnemonic(text: str) -> str:
     """Return the text of an entry without mnemonic mark and shortcut."""
     return re.sub("&(.)", r"\1", text.partition("\t")[0])
 
 
-def letters_of(texts: Sequence[str]) -> list[int]:
+def mnemonic_positions(texts: Sequence[str]) -> list[int]:
     """Return the position of the mnemonic letter in each text, or -1 for none; letters are unique.
 
     First letters of texts take precedence, then first letters of other words, then any letter.
     """
     found, taken = [-1] * len(texts), set[str]()
-    for places in (_beginning, _beginnings, _all):
+    for places in (_first_position, _word_starts, _all):
         for number, text in enumerate(texts):
             free = (place for place in places(text) if (key := key_of(text[place])) and key not in taken)
             place = next(free, -1) if found[number] < 0 else -1
@@ -37,7 +37,7 @@ def key_of(letter: str) -> str:
     return base if base.isascii() and base.isalpha() else ""
 
 
-def marked(texts: Sequence[str]) -> list[str]:
+def with_mnemonics(texts: Sequence[str]) -> list[str]:
     """Return the texts with Qt's mnemonic mark.
 
     Letters with accents are not used, because Alt can't type them.
@@ -45,16 +45,16 @@ def marked(texts: Sequence[str]) -> list[str]:
     bare = [re.sub(r"[^\x00-\x7f]", "\N{BULLET}", text) for text in texts]
     return [
         text if place < 0 else f"{text[:place]}&{text[place:]}"
-        for text, place in zip(texts, letters_of(bare), strict=True)
+        for text, place in zip(texts, mnemonic_positions(bare), strict=True)
     ]
 
 
-def _beginning(text: str) -> Iterator[int]:
+def _first_position(text: str) -> Iterator[int]:
     if text:
         yield 0
 
 
-def _beginnings(text: str) -> Iterator[int]:
+def _word_starts(text: str) -> Iterator[int]:
     return (found.start() for found in re.finditer(r"\b\w", text))
 
 

@@ -25,32 +25,34 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLineEdit, QMenu, QPlainTextEdit, QWidget
 
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import shortcut_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets.buttons import Button, StopButton
-from app.ui.widgets.keyboard import keyboard_leads
-from app.ui.widgets.letters import key_of, letters_of, plain_words
-from app.ui.widgets.paint import RIGHT, box, width_of, words
+from app.ui.widgets.keyboard import is_keyboard_navigation
+from app.ui.widgets.letters import key_of, mnemonic_positions, strip_mnemonic
+from app.ui.widgets.paint import RIGHT, box, text_line, width_of
 
-CUT_ON = frozenset({"xcb"})
+MASKED_PLATFORMS = frozenset({"xcb"})
 MARK, MAX_MARK, TEXT_LEFT = 15, 22, 33
 SCROLLER = 22  # px, as in the style sheet
-GUESSED = QAction.MenuRole.TextHeuristicRole
+GUESSED_ROLE = QAction.MenuRole.TextHeuristicRole
 MIN_WIDTH = 160  # px; narrower menus are unreadable and better placed over Stop
 
 
 def make_round(widget: QWidget) -> None:
     """Prepare a popup for its first show: no system frame, transparent corners."""
     widget.setWindowFlag(Qt.WindowType.FramelessWindowHint, True)
-    widget.setWindowFlag(Qt.WindowType.NoDropShadowWindowHint, QGuiApplication.platformName() in CUT_ON)
-    if QGuiApplication.platformName() not in CUT_ON:
+    widget.setWindowFlag(
+        Qt.WindowType.NoDropShadowWindowHint, QGuiApplication.platformName() in MASKED_PLATFORMS
+    )
+    if QGuiApplication.platformName() not in MASKED_PLATFORMS:
         widget.setAttribute(Qt.WidgetAttribute.WA_TranslucentBackground)
 
 
 def cut(widget: QWidget, radius: float) -> None:
     """Clip a popup to its round corners, on systems without a compositor."""
-    if QGuiApplication.platformName() in CUT_ON:
+    if QGuiApplication.platformName() in MASKED_PLATFORMS:
         widget.setMask(round_region(widget.size(), radius))
 
 
@@ -61,7 +63,7 @@ def round_region(size: QSize, radius: float) -> QRegion:
     return QRegion(path.toFillPolygon().toPolygon())
 
 
-def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
+def avoid_stop(menu: QRect, stop: QRect, screen: QRect) -> QRect:
     """Return a position of a menu that doesn't cover Stop: left of it, below it, or narrower.
 
     If there is no such space on the screen, the position is unchanged.
@@ -77,7 +79,7 @@ def beside(menu: QRect, stop: QRect, screen: QRect) -> QRect:
     return next((place for place in (left, low) if screen.contains(place)), narrow)
 
 
-def stop_at(place: QPoint) -> QAbstractButton | None:
+def stop_button_at(place: QPoint) -> QAbstractButton | None:
     """Return the Stop button at a screen position, unless a popup covers it."""
     windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
@@ -92,7 +94,7 @@ def stop_at(place: QPoint) -> QAbstractButton | None:
 
 def press_stop(place: QPoint) -> bool:
     """Click the Stop button at a position, if there is one, and close all popups. Return True if clicked."""
-    stop = stop_at(place)
+    stop = stop_button_at(place)
     if stop is None:
         return False
     while (popup := QApplication.activePopupWidget()) is not None and popup.close():
@@ -122,14 +124,14 @@ class Menu(QMenu):
         application menu.
         """
         action = event.action()
-        if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED:
+        if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED_ROLE:
             action.setMenuRole(QAction.MenuRole.NoRole)
         super().actionEvent(event)
 
-    def letters(self) -> dict[QAction, int]:
+    def mnemonics(self) -> dict[QAction, int]:
         """Return the position of each entry's mnemonic letter, or -1 for none."""
         entries = [action for action in self.actions() if action.isVisible() and not action.isSeparator()]
-        places = letters_of([plain_words(action.text()) for action in entries])
+        places = mnemonic_positions([strip_mnemonic(action.text()) for action in entries])
         return dict(zip(entries, places, strict=True))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -138,8 +140,8 @@ class Menu(QMenu):
         self.update()
         held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
         pressed = "" if held else key_of(event.text())
-        for action, place in self.letters().items() if pressed else ():
-            if place >= 0 and key_of(plain_words(action.text())[place]) == pressed and action.isEnabled():
+        for action, place in self.mnemonics().items() if pressed else ():
+            if place >= 0 and key_of(strip_mnemonic(action.text())[place]) == pressed and action.isEnabled():
                 self.setActiveAction(action)
                 if action.menu() is None:
                     nothing = Qt.KeyboardModifier.NoModifier
@@ -150,11 +152,11 @@ class Menu(QMenu):
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         held = QGuiApplication.queryKeyboardModifiers() & Qt.KeyboardModifier.AltModifier
-        self._by_keys = bool(held) or keyboard_leads()
+        self._by_keys = bool(held) or is_keyboard_navigation()
         cut(self, self._theme.radius("panel"))
-        self._move_off_stop()
+        self._avoid_stop()
 
-    def _move_off_stop(self) -> None:
+    def _avoid_stop(self) -> None:
         # Moves the menu if it covers Stop, because Qt may have moved it in a small window.
         owner = self.parentWidget()
         while isinstance(owner, QMenu):
@@ -165,7 +167,7 @@ class Menu(QMenu):
         for stop in owner.window().findChildren(StopButton):
             if stop.isVisible():
                 place = QRect(stop.mapToGlobal(QPoint()), stop.size())
-                self.setGeometry(beside(self.geometry(), place, screen))
+                self.setGeometry(avoid_stop(self.geometry(), place, screen))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         """Close the menu on a click outside it, and trigger Stop if the click is on a Stop button.
@@ -196,7 +198,7 @@ class Menu(QMenu):
                 square = QRectF((rect.width() - 14) / 2, top + (SCROLLER - 14) / 2, 14, 14)
                 paint_icon(painter, square, icon, theme.colour("textSecondary"))
         painter.setClipRect(inside)
-        letters = self.letters()
+        letters = self.mnemonics()
         for action in shown:
             place = QRectF(self.actionGeometry(action))
             place.setRight(min(place.right(), rect.right() - 6))
@@ -233,14 +235,14 @@ class Menu(QMenu):
             mode = QIcon.Mode.Normal if action.isEnabled() else QIcon.Mode.Disabled
             action.icon().paint(painter, mark.toRect(), Qt.AlignmentFlag.AlignCenter, mode)
         own = action.shortcut().toString(QKeySequence.SequenceFormat.PortableText)
-        key = spoken_key(own or action.text().partition("\t")[2])
+        key = shortcut_text(own or action.text().partition("\t")[2])
         ink = theme.colour("text" if action.isEnabled() else "textDisabled")
         inside = place.adjusted(TEXT_LEFT, 0, -12, 0)
-        text = plain_words(action.text())
+        text = strip_mnemonic(action.text())
         whole = width_of(self.font(), text)
         if whole + 12 + width_of(self.font(), key) > inside.width():
             key = ""  # in a narrow menu the text takes precedence; shortcuts are listed on F1
-        words(painter, inside, text, self.font(), ink)
+        text_line(painter, inside, text, self.font(), ink)
         if self._by_keys and letter >= 0 and whole <= inside.width():
             self._underline(painter, inside, text, letter)
         if action.menu() is not None:
@@ -248,10 +250,10 @@ class Menu(QMenu):
             paint_icon(painter, chevron, "chevron-right", theme.colour("textTertiary"))
         elif key:
             quiet = theme.colour("textTertiary" if action.isEnabled() else "textDisabled")
-            words(painter, inside, key, self.font(), quiet, RIGHT)
+            text_line(painter, inside, key, self.font(), quiet, RIGHT)
 
 
-def drop_below(menu: Menu, anchor: QWidget) -> None:
+def open_below(menu: Menu, anchor: QWidget) -> None:
     """Open a menu below a button; right-aligned if it would exceed the window."""
     place = anchor.rect().bottomLeft() + QPoint(0, 3)
     over = anchor.mapTo(anchor.window(), place).x() + menu.sizeHint().width() - anchor.window().width()

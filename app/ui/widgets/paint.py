@@ -21,7 +21,7 @@ LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 CENTRE = Qt.AlignmentFlag.AlignCenter
 KEY_PADDING = 6.0
-SMALLEST_KEY = 18.0
+MIN_KEY_SIZE = 18.0
 
 
 def box(
@@ -64,7 +64,7 @@ def hairline(painter: QPainter, rect: QRectF, edge: Qt.Edge, colour: QColor) -> 
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, smooth)
 
 
-def words(
+def text_line(
     painter: QPainter,
     rect: QRectF,
     text: str,
@@ -99,20 +99,20 @@ def height_of(font: QFont) -> float:
 
 def key_width(theme: Theme, key: str) -> float:
     """Return the width in px of a key cap."""
-    return max(SMALLEST_KEY, width_of(theme.font("caption"), key) + 2 * KEY_PADDING)
+    return max(MIN_KEY_SIZE, width_of(theme.font("caption"), key) + 2 * KEY_PADDING)
 
 
 def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: str) -> QRectF:
     """Paint a key cap whose right edge is at ``right``. Return its rectangle."""
-    height = max(SMALLEST_KEY, theme.scaled(SMALLEST_KEY))
+    height = max(MIN_KEY_SIZE, theme.scaled(MIN_KEY_SIZE))
     width = key_width(theme, key)
     rect = QRectF(right - width, middle - height / 2, width, height)
     box(painter, rect, theme.radius("key"), theme.colour("sunken"), theme.colour("borderStrong"))
-    words(painter, rect, key, theme.font("caption"), theme.colour("textSecondary"), CENTRE)
+    text_line(painter, rect, key, theme.font("caption"), theme.colour("textSecondary"), CENTRE)
     return rect
 
 
-def tell_whole(widget: QWidget, words: str) -> None:
+def set_elision_tooltip(widget: QWidget, words: str) -> None:
     """Set a tooltip with the full text if it is elided. An explicit tooltip is kept."""
     own = widget.property("tip") or (widget.toolTip() and not widget.property("shortened"))
     if own:

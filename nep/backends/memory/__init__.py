@@ -16,14 +16,14 @@ from contextlib import contextmanager
 from nep.backends.base import Backend, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.memory.services import MemoryClient, MemoryServer, MemoryServices, ServiceHub
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
 from nep.backends.waking import WakingSubscriber
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.messages.clocks import OWN_CLOCK
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
-from nep.messages.message import Message, arrived, kind_of
+from nep.messages.message import Message, message_kind, received_message
 from nep.messages.queue import Inbox
 from nep.protocol import requests
 from nep.protocol.graph_view import GraphView
@@ -44,7 +44,7 @@ _logger = logging.getLogger("nep")
 _BATCH_BYTES = 64 * 2**20
 """Maximum size of a sink's batch. The inbox is smaller by this size, so that the sum stays within the bound.
 """
-_BATCH_S = 0.005  # at most 200 calls of a sink per second
+_BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
 class _Hub(ServiceHub):
@@ -57,22 +57,22 @@ class _Hub(ServiceHub):
         self.patterns: tuple[MemorySubscriber, ...] = ()
         """Subscribers to patterns."""
 
-    def hearing(self, topic: str) -> tuple[MemorySubscriber, ...]:
+    def subscribers_of(self, topic: str) -> tuple[MemorySubscriber, ...]:
         found = self.subscribers.get(topic, ())
         if not self.patterns:
             return found
         return (*found, *(each for each in self.patterns if matches(each.spec.topic, topic)))
 
-    def forget(self, node_id: str) -> None:
+    def remove_node(self, node_id: str) -> None:
         with self.lock:
             if self.transports.pop(node_id, None) is not None:
-                self.ask(requests.Leave(node_id))
+                self.apply(requests.Leave(node_id))
 
     def view(self) -> GraphView:
         # Collects the current statistics of all nodes first.
         with self.lock:
             for transport in self.transports.values():
-                self.ask(transport.renewal(self))
+                self.apply(transport.renewal(self))
             return self.graph.view()
 
 
@@ -87,7 +87,7 @@ def _forked() -> None:
     _hubs.clear()
 
 
-forks.in_child(_forked)
+forks.call_in_child(_forked)
 
 
 def _hub(configuration: Configuration) -> _Hub:
@@ -106,7 +106,7 @@ class MemoryPublisher:
         self.spec = spec
         self.count = 0
         self.bytes = 0
-        self._kind = kind_of(
+        self._kind = message_kind(
             spec.topic, spec.codec.name, spec.msg_type, is_latched=spec.is_latched, clock=OWN_CLOCK
         )
         self.last_stamp_ns: int | None = None
@@ -118,14 +118,14 @@ class MemoryPublisher:
     @property
     def subscribers(self) -> int:
         """Number of subscribers of the topic."""
-        return len(self.hub.hearing(self.spec.topic))
+        return len(self.hub.subscribers_of(self.spec.topic))
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if the topic has subscribers."""
         return self.subscribers > 0
 
-    def lend(self, _size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
         """Return None: no shared memory is needed."""
         return None
 
@@ -156,12 +156,12 @@ class MemoryPublisher:
         with self.hub.lock:
             self.skip()
             self.bytes += len(data)
-            message = arrived(
+            message = received_message(
                 self._kind, data, self.last_stamp_ns, self.count, self.spec.id, encoded.extension or {}
             )
             self.history.add(message, len(data))
-            for subscriber in self.hub.hearing(self.spec.topic):
-                subscriber.put(message)
+            for subscriber in self.hub.subscribers_of(self.spec.topic):
+                subscriber.enqueue(message)
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - nothing to flush
         """Unregister. Nothing needs flushing, because messages are delivered when they are sent."""
@@ -172,8 +172,8 @@ class MemoryPublisher:
                 self.hub.publishers[self.spec.topic] = left
                 if not left:
                     del self.hub.publishers[self.spec.topic]
-                self._transport.forget(self)
-                self.hub.ask(requests.RemovePublisher(self._transport.node.id, self.spec.id, self.count))
+                self._transport.discard(self)
+                self.hub.apply(requests.RemovePublisher(self._transport.node.id, self.spec.id, self.count))
 
 
 class MemorySubscriber(WakingSubscriber):
@@ -191,7 +191,7 @@ class MemorySubscriber(WakingSubscriber):
         self.problem = ""
         self.is_closed = False
 
-    def put(self, message: Message) -> None:
+    def enqueue(self, message: Message) -> None:
         """Append a message to the inbox. Called by publishers."""
         with self._transport.changed:
             if self.is_closed:
@@ -219,7 +219,7 @@ class MemorySubscriber(WakingSubscriber):
     def take_batch(self) -> list[Message]:
         """Remove and return the messages for one call of the sink."""
         with self._transport.changed:
-            return self.inbox.take_all(_BATCH_BYTES)
+            return self.inbox.pop_all(_BATCH_BYTES)
 
     def report(self, problem: str) -> None:
         """Set the reason why messages can't be decoded, which the graph shows as an alert; "" clears it."""
@@ -240,11 +240,11 @@ class MemorySubscriber(WakingSubscriber):
             others = tuple(each for each in subscribers if each is not self)
             if others:
                 self.hub.subscribers[self.spec.topic] = others
-            self._transport.forget(self)
-            self.hub.ask(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
+            self._transport.discard(self)
+            self.hub.apply(requests.RemoveSubscriber(self._transport.node.id, self.spec.id))
         self._transport.wake()
         with self._changed:
-            self.inbox.take_all()
+            self.inbox.pop_all()
             self.notify_waiting()
 
 
@@ -261,11 +261,11 @@ class MemoryTransport:
         self._sinks: list[MemorySubscriber] = []
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
-        self._services = MemoryServices(node, self._joined)
+        self._services = MemoryServices(node, self._joined_hub)
 
-    def publisher(self, spec: PublisherSpec) -> MemoryPublisher:
+    def create_publisher(self, spec: PublisherSpec) -> MemoryPublisher:
         """Register a publisher."""
-        with self._joined(spec.configuration) as hub:
+        with self._joined_hub(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id,
                 spec.topic,
@@ -275,22 +275,22 @@ class MemoryTransport:
                 spec.is_latched,
                 history=spec.history,
             )
-            hub.ask(requests.AddPublisher(self.node, record))
+            hub.apply(requests.AddPublisher(self.node, record))
             publisher = MemoryPublisher(self, hub, spec)
             hub.publishers.setdefault(spec.topic, []).append(publisher)
             self._publishers = (*self._publishers, publisher)
         return publisher
 
-    def subscriber(self, spec: SubscriberSpec) -> MemorySubscriber:
+    def create_subscriber(self, spec: SubscriberSpec) -> MemorySubscriber:
         """Register a subscriber and deliver the histories of the topic's publishers to it."""
-        with self._joined(spec.configuration) as hub:
+        with self._joined_hub(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, pattern=spec.is_pattern)
-            hub.ask(requests.AddSubscriber(self.node, record))
+            hub.apply(requests.AddSubscriber(self.node, record))
             subscriber = MemorySubscriber(self, hub, spec)
             for topic, publishers in hub.publishers.items():
                 if topic == spec.topic or (spec.is_pattern and matches(spec.topic, topic)):
                     for message in (each for publisher in publishers for each in publisher.history):
-                        subscriber.put(message)
+                        subscriber.enqueue(message)
             if spec.is_pattern:
                 hub.patterns = (*hub.patterns, subscriber)
             else:
@@ -300,22 +300,22 @@ class MemoryTransport:
             self._add_sink(subscriber)
         return subscriber
 
-    def forget(self, closed: MemoryPublisher | MemorySubscriber) -> None:
+    def discard(self, closed: MemoryPublisher | MemorySubscriber) -> None:
         """Remove a closed publisher or subscriber. Call with the lock of its hub held."""
         self._publishers = tuple(each for each in self._publishers if each is not closed)
         self._subscribers = tuple(each for each in self._subscribers if each is not closed)
         with self.changed:
             self._sinks = [each for each in self._sinks if each is not closed]
 
-    def server(self, spec: ServerSpec) -> MemoryServer:
+    def create_server(self, spec: ServerSpec) -> MemoryServer:
         """Register a server."""
-        return self._services.server(spec)
+        return self._services.create_server(spec)
 
-    def client(self, spec: ClientSpec) -> MemoryClient:
+    def create_client(self, spec: ClientSpec) -> MemoryClient:
         """Register a client."""
-        return self._services.client(spec)
+        return self._services.create_client(spec)
 
-    survey = client
+    create_surveyor = create_client
 
     def wait(
         self,
@@ -326,7 +326,7 @@ class MemoryTransport:
         """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, MemorySubscriber)]
         before = self._wakes
-        with woken_by(calls, self.wake) as is_empty:
+        with wake_on_call(calls, self.wake) as is_empty:
             if is_empty:
                 with self.changed:
                     self.changed.wait_for(
@@ -376,13 +376,13 @@ class MemoryTransport:
         with _hubs_lock:
             hubs = tuple(_hubs.values())
         for hub in hubs:
-            hub.forget(self.node.id)
+            hub.remove_node(self.node.id)
         self.wake()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
 
     @contextmanager
-    def _joined(self, configuration: Configuration) -> Iterator[_Hub]:
+    def _joined_hub(self, configuration: Configuration) -> Iterator[_Hub]:
         # Yields the hub with its lock held, after adding this node. Raises `ClosedError`.
         hub = _hub(configuration)
         with hub.lock:  # closing the node acquires the lock again after setting `_closing`
@@ -409,14 +409,14 @@ class MemoryTransport:
                         subscriber.spec.sink(messages)
                     except BaseException:  # also SystemExit: the sink thread continues with the next batch
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
-            self._closing.wait(_BATCH_S)
+            self._closing.wait(_BATCH_INTERVAL_S)
 
 
-def _name(master: str | None) -> str:
+def _master_name(master: str | None) -> str:
     # Any name is valid because no master process runs.
     return master or "memory"
 
 
 BACKEND = Backend(
-    "memory", MemoryTransport, master=_name, has_history=True, has_patterns=True, is_in_process=True
+    "memory", MemoryTransport, master=_master_name, has_history=True, has_patterns=True, is_in_process=True
 )

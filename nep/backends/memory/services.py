@@ -22,8 +22,8 @@ from nep.backends.services import (
     ServerSpec,
     Tally,
     check_calls,
-    fitting,
-    refusal,
+    limit_reply_size,
+    rejection_reply,
 )
 from nep.errors import ClosedError, NoServerError, RequestRefusedError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
@@ -40,7 +40,7 @@ from nep.protocol.service_wire import SERVICE_TYPE, Reply, topic_of
 
 _logger = logging.getLogger("nep")
 
-Then = Callable[[Outcome], None]
+OutcomeCallback = Callable[[Outcome], None]
 
 
 class ServiceHub:
@@ -52,12 +52,12 @@ class ServiceHub:
         self.servers: dict[str, tuple[MemoryServer, ...]] = {}
         self.clients: dict[str, tuple[MemoryClient, ...]] = {}
 
-    def ask(self, request: requests.Request) -> None:
+    def apply(self, request: requests.Request) -> None:
         """Apply a request to the graph. Raises `RequestRefusedError` if it is rejected."""
         with self.lock:
             for each in self.graph.apply(request, 0, time.monotonic(), ""):
-                if isinstance(each.answer, requests.Refused):
-                    raise RequestRefusedError(each.answer.reason)
+                if isinstance(each.body, requests.Refused):
+                    raise RequestRefusedError(each.body.reason)
 
 
 @dataclass(eq=False)
@@ -68,13 +68,13 @@ class _Call:
     data: bytes
     timeout_s: float | None
     deadline: float
-    then: Then
+    callback: OutcomeCallback
     server: MemoryServer | None = None
 
-    def end(self, outcome: Outcome) -> None:
+    def run_callback(self, outcome: Outcome) -> None:
         # Call without locks.
         try:
-            self.then(outcome)
+            self.callback(outcome)
         except Exception:  # a failing callback must not affect other calls
             _logger.exception("result callback for '%s' raised", self.client.spec.service)
 
@@ -91,20 +91,20 @@ class MemoryServer:
         self.endpoints = ("memory",)
         self.is_closed = False
 
-    def put(self, call: _Call) -> None:
+    def enqueue(self, call: _Call) -> None:
         """Queue or reject a call. Call with the hub's lock held."""
         call.server = self
         incoming = IncomingCall(
             call.data,
             call.client.spec.codec.number,
             None if call.deadline == math.inf else call.deadline,
-            lambda reply: self._answer(call, reply),
+            lambda reply: self._reply(call, reply),
         )
         if not self.calls.put(incoming):
-            incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+            incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _answer(self, call: _Call, reply: Reply) -> bool:
-        reply = fitting(reply)
+    def _reply(self, call: _Call, reply: Reply) -> bool:
+        reply = limit_reply_size(reply)
         self.tally.add(reply)
         with self.hub.lock:
             is_waited_for = call.client.remove_locked(call)
@@ -112,7 +112,7 @@ class MemoryServer:
             call.client.late += not is_waited_for
         if is_waited_for:
             data = reply.data if isinstance(reply.data, bytes) else bytes(reply.data)
-            call.end(reply._replace(data=data))
+            call.run_callback(reply._replace(data=data))
         return is_waited_for
 
     def counts(self) -> PublisherCount:
@@ -129,9 +129,9 @@ class MemoryServer:
             if not left:
                 del self.hub.servers[self.spec.service]
             if is_listed:
-                self.hub.ask(requests.RemovePublisher(self._node_id, self.spec.id, self.tally.calls))
+                self.hub.apply(requests.RemovePublisher(self._node_id, self.spec.id, self.tally.calls))
         for call in self.calls.close():
-            call.answer(refusal(self.spec.service, is_closed=True))
+            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies need no flushing
         """Close the server; calls in flight fail with `ServerGoneError`."""
@@ -147,7 +147,7 @@ class MemoryServer:
             for call in left:
                 call.client.failed += 1
         for call in left:
-            call.end(ServerGoneError(self.spec.service))
+            call.run_callback(ServerGoneError(self.spec.service))
 
     def forked(self) -> None:
         """Mark the server as closed in a forked child process."""
@@ -179,12 +179,18 @@ class MemoryClient:
         """Calls in flight. Read with the hub's lock held."""
         return list(self._calls.values())
 
-    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+    def start_call(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> OpenCall:
         """Send a call. See `ClientTransport.begin`."""
-        return self._begin(data, timeout_s, then, None)
+        return self._start_call(data, timeout_s, then, None)
 
-    def _begin(
-        self, data: bytes | memoryview, timeout_s: float | None, then: Then, server: MemoryServer | None
+    def _start_call(
+        self,
+        data: bytes | memoryview,
+        timeout_s: float | None,
+        then: OutcomeCallback,
+        server: MemoryServer | None,
     ) -> OpenCall:
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         copied = data if isinstance(data, bytes) else bytes(data)
@@ -197,7 +203,7 @@ class MemoryClient:
             self._bytes += len(copied)
             server = server or next(iter(self.hub.servers.get(self.spec.service, ())), None)
             if server is not None:
-                server.put(call)
+                server.enqueue(call)
         self._deadlines.add(deadline)
         return call
 
@@ -206,16 +212,18 @@ class MemoryClient:
         """Number of servers of the service."""
         return len(self.hub.servers.get(self.spec.service, ()))
 
-    def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
+    def start_survey(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> list[OpenCall]:
         """Send a call to each server. See `SurveyTransport.begin_all`."""
         with self.hub.lock:
             servers = self.hub.servers.get(self.spec.service, ())
-            return [self._begin(data, timeout_s, then, server) for server in servers]
+            return [self._start_call(data, timeout_s, then, server) for server in servers]
 
-    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel several calls; their callbacks aren't called."""
         for call in calls:
-            self.forget(call)
+            self.cancel(call)
 
     def remove_locked(self, call: _Call) -> bool:
         """Remove a call; return False if it is not in flight any more. Call with the hub's lock held."""
@@ -224,18 +232,18 @@ class MemoryClient:
         self._bytes -= len(call.data)
         return True
 
-    def forget(self, call: OpenCall) -> None:
+    def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self.hub.lock:
             known = self._calls.get(call.number)
             if known is not None:
                 self.remove_locked(known)
 
-    def served_by(self, server: MemoryServer) -> None:
+    def send_waiting_calls(self, server: MemoryServer) -> None:
         """Send the calls that wait for a server to a new one. Call with the hub's lock held."""
         for call in self.calls:
             if call.server is None:
-                server.put(call)
+                server.enqueue(call)
 
     def expire(self, now: float) -> float:
         """Fail expired calls and return the next deadline."""
@@ -245,7 +253,7 @@ class MemoryClient:
             due = min((each.deadline for each in self._calls.values()), default=math.inf)
         for call in late:
             kind = NoServerError if call.server is None else ServiceTimeoutError
-            call.end(kind(self.spec.service, call.timeout_s or 0.0))
+            call.run_callback(kind(self.spec.service, call.timeout_s or 0.0))
         return due
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
@@ -267,11 +275,11 @@ class MemoryClient:
             self.hub.clients[self.spec.service] = others
             if not others:
                 del self.hub.clients[self.spec.service]
-            self._deadlines.forget(self)
+            self._deadlines.remove_client(self)
             left, self._calls = self.calls, {}
-            self.hub.ask(requests.RemoveSubscriber(self._node_id, self.spec.id))
+            self.hub.apply(requests.RemoveSubscriber(self._node_id, self.spec.id))
         for call in left:
-            call.end(self._closed_error())
+            call.run_callback(self._closed_error())
 
     def forked(self) -> None:
         """Mark the client as closed in a forked child process."""
@@ -294,29 +302,29 @@ class MemoryServices:
         self._servers: tuple[MemoryServer, ...] = ()
         self._clients: tuple[MemoryClient, ...] = ()
 
-    def server(self, spec: ServerSpec) -> MemoryServer:
+    def create_server(self, spec: ServerSpec) -> MemoryServer:
         """Register a server and send it the calls that wait for one."""
         with self._joined(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
             )
-            hub.ask(requests.AddPublisher(self._node, record))
+            hub.apply(requests.AddPublisher(self._node, record))
             server = MemoryServer(self._node.id, hub, spec)
             hub.servers[spec.service] = (*hub.servers.get(spec.service, ()), server)
             self._servers = (*(each for each in self._servers if not each.is_closed), server)
             for client in hub.clients.get(spec.service, ()):
-                client.served_by(server)
+                client.send_waiting_calls(server)
         return server
 
-    def client(self, spec: ClientSpec) -> MemoryClient:
+    def create_client(self, spec: ClientSpec) -> MemoryClient:
         """Register a client."""
         with self._joined(spec.configuration) as hub:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
-            hub.ask(requests.AddSubscriber(self._node, record))
+            hub.apply(requests.AddSubscriber(self._node, record))
             client = MemoryClient(self._node.id, hub, spec, self._deadlines)
             hub.clients[spec.service] = (*hub.clients.get(spec.service, ()), client)
             self._clients = (*(each for each in self._clients if not each.is_closed), client)
-            self._deadlines.watch(client)
+            self._deadlines.add_client(client)
         return client
 
     def server_counts(self, hub: ServiceHub) -> Iterable[PublisherCount]:

@@ -12,8 +12,15 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from nep.backends.nanomsg.library import keep_forever, library
-from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.nanomsg.library import load_pynng, prevent_finalization
+from nep.backends.services import (
+    CallQueue,
+    IncomingCall,
+    ServerSpec,
+    Tally,
+    limit_reply_size,
+    rejection_reply,
+)
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import WireError
 from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
@@ -21,7 +28,7 @@ from nep.protocol.service_wire import HEADER_BYTES, NATIVE, Framing, Reply
 _logger = logging.getLogger("nep")
 REPLY_TIMEOUT_S = 2.0
 """Time limit in seconds for sending a reply to a client that doesn't read."""
-_JOIN_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 _LINGER_S = 0.2
 """Time in seconds to flush the last reply before closing, unless all clients have disconnected.
 
@@ -43,14 +50,17 @@ def receive(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
     """Return the next message, or None on timeout or if the context is closed."""
     try:
         data: bytes = context.recv()
-    except (library().NNGException, TypeError):  # pynng raises TypeError for a context that is already closed
+    except (
+        load_pynng().NNGException,
+        TypeError,
+    ):  # pynng raises TypeError for a context that is already closed
         return None
     return data
 
 
 def close_context(context: Any) -> None:  # noqa: ANN401 - pynng is not typed
     """Close a context. Idempotent."""
-    with contextlib.suppress(library().NNGException, TypeError):
+    with contextlib.suppress(load_pynng().NNGException, TypeError):
         context.close()
 
 
@@ -79,11 +89,11 @@ class NanomsgServer:
         self._contexts: set[Any] = set()
         """Contexts that wait for a call, or whose call is not answered yet."""
         self._disconnected = threading.Event()
-        socket.add_post_pipe_remove_cb(self._pipe_removed)
+        socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
         self._thread = threading.Thread(target=self._receive_calls, name=f"nep-{spec.service}", daemon=True)
         self._thread.start()
 
-    def _pipe_removed(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_removed(self, _pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         if self.is_closed and not self._socket.pipes:
             self._disconnected.set()
 
@@ -99,7 +109,7 @@ class NanomsgServer:
                 call.data, call.codec, deadline, self._reply_function(context, call.number)
             )
             if not self.calls.put(incoming):
-                incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+                incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
     def _reject(self, context: Any, error: WireError) -> None:  # noqa: ANN401 - pynng is not typed
         with self._lock:
@@ -119,16 +129,16 @@ class NanomsgServer:
             return context
 
     def _reply_function(self, context: Any, number: int) -> Callable[[Reply], bool]:  # noqa: ANN401 - see above
-        def answer(reply: Reply) -> bool:
-            checked = fitting(reply)
+        def reply_to_call(reply: Reply) -> bool:
+            checked = limit_reply_size(reply)
             self.tally.add(checked)
             with self._lock:
                 if self.is_closed:
                     return False
                 self._answered_at = time.monotonic()
             try:
-                context.send(join_parts(self._framing, self._framing.answer(number, checked)))
-            except (library().NNGException, TypeError) as error:  # the client has stopped waiting
+                context.send(join_parts(self._framing, self._framing.reply(number, checked)))
+            except (load_pynng().NNGException, TypeError) as error:  # the client has stopped waiting
                 _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
                 return False
             finally:
@@ -140,12 +150,12 @@ class NanomsgServer:
                     close_context(context)
             return True
 
-        return answer
+        return reply_to_call
 
     def begin_close(self) -> None:
         """Reject queued and new calls."""
         for call in self.calls.close():
-            call.answer(refusal(self.spec.service, is_closed=True))
+            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
         """Close the server. Idempotent."""
@@ -163,7 +173,7 @@ class NanomsgServer:
         for context in contexts:  # before the socket: pynng can't close contexts of a closed socket
             close_context(context)
         self._socket.close()
-        self._thread.join(_JOIN_S)
+        self._thread.join(_JOIN_TIMEOUT_S)
 
     def forked(self) -> None:
         """Mark the server as closed in a forked child process, without touching nng."""
@@ -171,4 +181,4 @@ class NanomsgServer:
         self._lock = threading.Lock()
         self.calls.forked()
         for context in self._contexts:
-            keep_forever(context)
+            prevent_finalization(context)

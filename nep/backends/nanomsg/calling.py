@@ -16,19 +16,19 @@ from typing import Any
 
 from nep.backends.deadlines import Deadlines
 from nep.backends.nanomsg.answering import close_context, join_parts, split_parts
-from nep.backends.nanomsg.library import keep_forever, library
+from nep.backends.nanomsg.library import load_pynng, prevent_finalization
 from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL, Framing
 
 _logger = logging.getLogger("nep")
-_JSON = 1
-_JOIN_S = 2.0
+_JSON_CODEC = 1
+_JOIN_TIMEOUT_S = 2.0
 _MAX_LATE_CALLS = 100
 """Maximum number of timed-out calls whose late replies are still received and counted."""
 
-Then = Callable[[Outcome], None]
+OutcomeCallback = Callable[[Outcome], None]
 
 
 @dataclass(eq=False)
@@ -37,7 +37,7 @@ class _Call:
     data: bytes | memoryview
     timeout_s: float | None
     deadline: float
-    then: Then
+    callback: OutcomeCallback
     context: Any
     is_sent: bool = False
     thread: threading.Thread | None = field(default=None)
@@ -58,7 +58,7 @@ class NanomsgClient(ClientCalls[_Call]):
         deadlines: Deadlines,
         on_close: Callable[[NanomsgClient], object],
     ) -> None:
-        if framing is ORIGINAL and spec.codec.number != _JSON:
+        if framing is ORIGINAL and spec.codec.number != _JSON_CODEC:
             raise NepError(_("calls without a master use JSON; omit msg_type, or use wire='native'"))
         super().__init__(spec)
         self._socket = socket
@@ -69,13 +69,13 @@ class NanomsgClient(ClientCalls[_Call]):
         self._late_calls: dict[int, _Call] = {}
         """Calls that timed out or were cancelled, oldest first, to count their late replies."""
         self._threads: set[threading.Thread] = set()
-        socket.add_post_pipe_connect_cb(self._pipe_added)
-        socket.add_post_pipe_remove_cb(self._pipe_removed)
+        socket.add_post_pipe_connect_cb(self._handle_pipe_added)
+        socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
 
-    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._pipes.add(pipe.id)
 
-    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._pipes.discard(pipe.id)
 
     @property
@@ -85,7 +85,9 @@ class NanomsgClient(ClientCalls[_Call]):
 
     # ---- calling
 
-    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+    def start_call(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> OpenCall:
         """Send a call. See `ClientTransport.begin`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
@@ -105,7 +107,7 @@ class NanomsgClient(ClientCalls[_Call]):
 
     def _run(self, call: _Call) -> None:
         try:
-            outcome = self._outcome(call)
+            outcome = self._send_and_receive(call)
         except Exception as error:
             _logger.exception("call of '%s' failed", self.spec.service)
             outcome = NepError(_("the call failed: {reason}").format(reason=type(error).__name__))
@@ -115,9 +117,9 @@ class NanomsgClient(ClientCalls[_Call]):
         with self._lock:
             self._threads.discard(threading.current_thread())
 
-    def _outcome(self, call: _Call) -> Outcome | None:
+    def _send_and_receive(self, call: _Call) -> Outcome | None:
         # Returns None if the context was closed; the call already has its outcome then.
-        nng = library()
+        nng = load_pynng()
         left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         parts = self._framing.call(call.number, self.spec.codec.number, left_s, call.data)
         try:
@@ -130,7 +132,7 @@ class NanomsgClient(ClientCalls[_Call]):
         except (nng.NNGException, TypeError):
             return None
         try:
-            return self._framing.read_answer(split_parts(self._framing, data)).reply
+            return self._framing.read_reply(split_parts(self._framing, data)).reply
         except WireError as error:
             return error
 
@@ -144,7 +146,7 @@ class NanomsgClient(ClientCalls[_Call]):
         if is_waited_for:
             self._run_callback(call, outcome)
 
-    def forget(self, call: OpenCall) -> None:
+    def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
             known = self._calls.get(call.number)
@@ -199,14 +201,14 @@ class NanomsgClient(ClientCalls[_Call]):
             left, self._calls = list(self._calls.values()), {}
             abandoned, self._late_calls = list(self._late_calls.values()), {}
             threads = tuple(self._threads)
-        self._deadlines.forget(self)
+        self._deadlines.remove_client(self)
         self._on_close(self)
         for call in abandoned:
             close_context(call.context)
         for call in left:
             close_context(call.context)
             self._run_callback(call, self._closed_error())
-        deadline = time.monotonic() + _JOIN_S
+        deadline = time.monotonic() + _JOIN_TIMEOUT_S
         for thread in threads:
             if thread is not threading.current_thread():
                 thread.join(max(0.0, deadline - time.monotonic()))
@@ -217,5 +219,5 @@ class NanomsgClient(ClientCalls[_Call]):
         self.is_closed = True
         self._lock = threading.Lock()
         for call in (*self._calls.values(), *self._late_calls.values()):
-            keep_forever(call.context)
+            prevent_finalization(call.context)
         self._calls = {}

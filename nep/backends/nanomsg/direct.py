@@ -10,7 +10,7 @@ from typing import Any
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.connection import Direct
-from nep.backends.nanomsg.library import library, listen, new_socket, queue_length
+from nep.backends.nanomsg.library import listen, load_pynng, new_socket, queue_length
 from nep.backends.nanomsg.sub_socket import PollableSub
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.legacy import from_frame, to_frame
@@ -22,7 +22,7 @@ from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import Message
-from nep.system.addresses import in_numbers
+from nep.system.addresses import resolve_address
 
 _logger = logging.getLogger("nep")
 _LINGER_S = 0.2
@@ -63,9 +63,9 @@ def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str
 def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
     """Connect to `HOST:PORT` and return the endpoint; the peer may bind it later. Raises `NepError`."""
     try:
-        address = in_numbers(address)
+        address = resolve_address(address)
         socket.dial(f"tcp://{address}", block=False)
-    except library().NNGException as error:
+    except load_pynng().NNGException as error:
         raise NepError(
             _("cannot connect to '{address}'; use a computer's address and a port up to 65535").format(
                 address=address
@@ -94,8 +94,8 @@ class DirectPublisher:
         self.fd = -1
         """-1, because the socket receives nothing."""
         self._socket: Any = new_socket("Pub0", send_buffer_size=queue_length(spec.codec.name))
-        self._socket.add_post_pipe_connect_cb(self._pipe_added)
-        self._socket.add_post_pipe_remove_cb(self._pipe_removed)
+        self._socket.add_post_pipe_connect_cb(self._handle_pipe_added)
+        self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
         try:
             self.endpoint = attach(
                 self._socket, direct, is_publisher=True, what=f"a publisher of '{spec.topic}'"
@@ -110,16 +110,16 @@ class DirectPublisher:
         return len(self._pipes)
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if there is any connection."""
         return bool(self._pipes)
 
-    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.add(pipe.id)
             self._changed.notify_all()
 
-    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.discard(pipe.id)
             self._changed.notify_all()
@@ -132,7 +132,7 @@ class DirectPublisher:
     def report(self, problem: str) -> None:
         """Ignore the problem, because a direct connection has no graph to report it in."""
 
-    def lend(self, _size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
         """Return None, because nanomsg has no shared memory."""
         return None
 
@@ -170,7 +170,7 @@ class DirectPublisher:
         """Flush for a limited time (`finish`) and close. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
-    def say_bye(self) -> None:
+    def send_bye(self) -> None:
         """Stop accepting messages."""
         with self._changed:
             self._is_closed = True
@@ -183,7 +183,7 @@ class DirectPublisher:
 
     def release(self) -> None:
         """Close the socket. Call without the lock, because pynng waits for its running callbacks."""
-        self.say_bye()
+        self.send_bye()
         self._socket.close()
 
 
@@ -227,7 +227,7 @@ class DirectSubSocket(UnbatchedReader):
                 return Message(self._spec.topic, data, self._codec, self._spec.msg_type)
         return None
 
-    def dropped(self, count: int) -> None:
+    def count_dropped(self, count: int) -> None:
         """Count messages dropped from the full queue, the only detectable losses."""
         self.received -= count
         self.lost = (self.lost or 0) + count

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 _MAX_MESSAGE_BYTES = PAYLOAD_MAX_BYTES + HEADER_BYTES
-_ANSWER_MS = round(REPLY_TIMEOUT_S * 1000)
+_REPLY_TIMEOUT_MS = round(REPLY_TIMEOUT_S * 1000)
 _NEVER_RESEND = -1
 _RECONNECT_MS = {"reconnect_time_min": 10, "reconnect_time_max": 500}
 """Initial and maximum reconnection interval in milliseconds."""
@@ -43,7 +43,7 @@ class DirectServices:
         self._clients: set[NanomsgClient] = set()
         self._is_closed = False
 
-    def surveyor(self, spec: ClientSpec, direct: Direct, wait_s: float) -> NanomsgSurveyor:
+    def create_surveyor(self, spec: ClientSpec, direct: Direct, wait_s: float) -> NanomsgSurveyor:
         """Create a surveyor and wait up to `wait_s` seconds for a respondent to connect."""
         self._check_open()
         surveyor = NanomsgSurveyor(spec, direct, self._surveyors.discard)
@@ -57,28 +57,28 @@ class DirectServices:
             raise
         return surveyor
 
-    def respondent(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
+    def create_respondent(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
         """Create a respondent."""
 
-        def attached(socket: object) -> str:
+        def attach_socket(socket: object) -> str:
             return attach(socket, direct, is_publisher=False, what=f"a respondent of '{spec.service}'")
 
-        return self._serving(spec, "Respondent0", ORIGINAL, attached)
+        return self._create_server(spec, "Respondent0", ORIGINAL, attach_socket)
 
-    def server(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
+    def create_server(self, spec: ServerSpec, direct: Direct) -> NanomsgServer:
         """Create a server and bind its port. Raises `AddressInUseError`."""
 
-        def attached(socket: object) -> str:
+        def attach_socket(socket: object) -> str:
             listen(socket, f"{direct.ip}:{direct.port}", f"a server of '{spec.service}'")
             return f"tcp://{direct.ip}:{direct.port}"
 
-        return self._serving(spec, "Rep0", _framing(direct), attached)
+        return self._create_server(spec, "Rep0", _framing(direct), attach_socket)
 
-    def _serving(
+    def _create_server(
         self, spec: ServerSpec, kind: str, framing: Framing, attached: Callable[[object], str]
     ) -> NanomsgServer:
         self._check_open()
-        socket = new_socket(kind, send_timeout=_ANSWER_MS, recv_max_size=_MAX_MESSAGE_BYTES)
+        socket = new_socket(kind, send_timeout=_REPLY_TIMEOUT_MS, recv_max_size=_MAX_MESSAGE_BYTES)
         try:
             server = NanomsgServer(socket, attached(socket), spec, framing, self._servers.discard)
         except BaseException:
@@ -93,7 +93,7 @@ class DirectServices:
             raise
         return server
 
-    def client(self, spec: ClientSpec, direct: Direct) -> NanomsgClient:
+    def create_client(self, spec: ClientSpec, direct: Direct) -> NanomsgClient:
         """Create a client and start connecting; the server may start later."""
         self._check_open()
         socket = new_socket(
@@ -107,7 +107,7 @@ class DirectServices:
             raise
         with self._lock:
             self._clients.add(client)
-            self._deadlines.watch(client)
+            self._deadlines.add_client(client)
         try:
             self._check_open()
         except BaseException:

@@ -35,12 +35,12 @@ def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
     return f"{host}:{messages}", f"{host}:{hellos}"
 
 
-def own_part(subscriber: int, topic: str) -> bytes:
+def subscriber_topic_part(subscriber: int, topic: str) -> bytes:
     """Return the topic prefix of messages addressed to this subscriber only."""
     return hello_part(subscriber, topic) + b"\0"
 
 
-def split_one(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes]:
+def split_message(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes]:
     """Return the parts after the first: header, payload and extension, or only the header of a notice.
 
     Raises `WireError`.

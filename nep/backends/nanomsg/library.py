@@ -15,34 +15,34 @@ from nep.backends.zeromq.sockets import LOOPBACK, ORIGINAL_PORTS
 from nep.errors import AddressInUseError, BackendUnavailableError, NepError
 from nep.i18n import _
 from nep.system.addresses import host_of
-from nep.system.descriptors import check_room
-from nep.system.exits import after_nodes, not_after_nodes
-from nep.system.forks import in_child
+from nep.system.descriptors import check_free_descriptors
+from nep.system.exits import call_after_nodes, cancel_after_nodes
+from nep.system.forks import call_in_child
 
-MAX_QUEUE = 8192
+MAX_QUEUE_LENGTH = 8192
 """Maximum queue length that pynng allows, in messages. pynng's defaults are too short for bursts."""
-_QUEUES = {"image": 64, "bytes": 1000}
-SOCKET_FILES = 6
+_QUEUE_LENGTHS = {"image": 64, "bytes": 1000}
+FDS_PER_SOCKET = 6
 """Number of file descriptors per socket: socket, port, signals and a connection."""
 _PORT_ATTEMPTS = 100
-_MODULE = "pynng.nng"
-_at_exit: Callable[[], object] | None = None
+_MODULE_NAME = "pynng.nng"
+_exit_handler: Callable[[], object] | None = None
 _sockets: WeakSet[Any] = WeakSet()
-_inherited: set[str] = set()
+_inherited_libraries: set[str] = set()
 """Names of libraries that were in use before a fork.
 
 In the child process nng would wait for threads that don't exist there.
 """
 
 
-def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - not typed
+def load_pynng(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - not typed
     """Load and return the module pynng.
 
     Raises:
         BackendUnavailableError: pynng is not installed or can't be loaded.
         NepError: The process was forked from one that uses pynng.
     """
-    if _inherited:
+    if _inherited_libraries:
         raise NepError(
             _(
                 "'nanomsg' does not work in a forked process of a program that uses it; start the process "
@@ -55,50 +55,50 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
         raise BackendUnavailableError(
             "nanomsg", _("install it with 'pip install nep-studio[nanomsg]'")
         ) from error
-    _end_after_nodes()
+    _defer_exit_handler()
     return loaded
 
 
-def _end_after_nodes() -> None:
+def _defer_exit_handler() -> None:
     # pynng's own exit handler would run before the nodes are closed.
-    global _at_exit  # noqa: PLW0603 - one per process
-    at_exit = getattr(sys.modules.get(_MODULE), "_pynng_atexit", None)
-    if at_exit is not None and _at_exit is None:
-        _at_exit = at_exit
-        after_nodes(at_exit)
+    global _exit_handler  # noqa: PLW0603 - one per process
+    at_exit = getattr(sys.modules.get(_MODULE_NAME), "_pynng_atexit", None)
+    if at_exit is not None and _exit_handler is None:
+        _exit_handler = at_exit
+        call_after_nodes(at_exit)
 
 
 def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
     """Create a pynng socket, such as "Pub0", with these options."""
-    created = getattr(library(), kind)(**options)
+    created = getattr(load_pynng(), kind)(**options)
     _sockets.add(created)
     return created
 
 
-def keep_forever(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
+def prevent_finalization(owned: Any) -> None:  # noqa: ANN401 - pynng is not typed
     """Prevent an object from ever being finalized, even at exit."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
 
 def _forked() -> None:
     # Closing a socket in a forked child would block forever, even at exit.
-    if _MODULE not in sys.modules:
+    if _MODULE_NAME not in sys.modules:
         return
-    _inherited.add("pynng")
+    _inherited_libraries.add("pynng")
     for socket in _sockets:
-        keep_forever(socket)  # the finalizer would close it
-    at_exit = getattr(sys.modules[_MODULE], "_pynng_atexit", None)
+        prevent_finalization(socket)  # the finalizer would close it
+    at_exit = getattr(sys.modules[_MODULE_NAME], "_pynng_atexit", None)
     if at_exit is not None:
         atexit.unregister(at_exit)
-        not_after_nodes(at_exit)
+        cancel_after_nodes(at_exit)
 
 
-in_child(_forked)
+call_in_child(_forked)
 
 
 def queue_length(codec: str) -> int:
     """Return the queue length per connection in messages. pynng doesn't limit the bytes."""
-    return _QUEUES.get(codec, MAX_QUEUE)
+    return _QUEUE_LENGTHS.get(codec, MAX_QUEUE_LENGTH)
 
 
 def bound_port(listener: Any) -> int:  # noqa: ANN401 - not typed
@@ -111,8 +111,8 @@ def listen(owner: Any, address: str, what: str) -> Any:  # noqa: ANN401 - not ty
 
     Raises `AddressInUseError`, `TooManyFilesError`.
     """
-    nng = library()
-    check_room(SOCKET_FILES, what)
+    nng = load_pynng()
+    check_free_descriptors(FDS_PER_SOCKET, what)
     for _try in range(_PORT_ATTEMPTS):
         try:
             listener = owner.listen(f"tcp://{address}")

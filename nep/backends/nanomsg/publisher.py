@@ -16,10 +16,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from nep.backends.base import PublisherSpec
-from nep.backends.nanomsg.endpoints import endpoint, own_part
-from nep.backends.nanomsg.library import bound_port, library, listen, new_socket, queue_length
+from nep.backends.nanomsg.endpoints import endpoint, subscriber_topic_part
+from nep.backends.nanomsg.library import bound_port, listen, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.io_thread import Pollable, PollState
-from nep.backends.zeromq.publisher import GreetedPublisher
+from nep.backends.zeromq.publisher import HandshakePublisher
 from nep.backends.zeromq.sockets import LOOPBACK, RejectionLog, wait_until
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
@@ -39,11 +39,11 @@ from nep.protocol.wire import (
 
 _logger = logging.getLogger("nep")
 _MAX_HELLOS = 10_000
-_HELLO_QUEUE = 1000
+_HELLO_QUEUE_LENGTH = 1000
 _BYE_RETRY_S = 0.05
 
 
-class NanomsgPublisher(GreetedPublisher):
+class NanomsgPublisher(HandshakePublisher):
     """Publisher with a PUB socket, and a PULL socket for hellos.
 
     Never close pynng objects with the lock held: closing waits for callbacks in other threads, which acquire
@@ -56,7 +56,7 @@ class NanomsgPublisher(GreetedPublisher):
         on_close: Callable[[NanomsgPublisher, float], None],
         serve_soon: Callable[[Pollable], None],
     ) -> None:
-        nng = library()
+        nng = load_pynng()
         self._again = nng.TryAgain
         self.spec = spec
         self.count = 0
@@ -66,7 +66,7 @@ class NanomsgPublisher(GreetedPublisher):
         queue = max(queue_length(spec.codec.name), 2 * spec.history)  # the history is sent in one burst
         self._message_socket: Any = new_socket("Pub0", send_buffer_size=queue)
         self._hello_socket: Any = new_socket(
-            "Pull0", recv_buffer_size=_HELLO_QUEUE, recv_max_size=SUBSCRIPTION_MAX_BYTES
+            "Pull0", recv_buffer_size=_HELLO_QUEUE_LENGTH, recv_max_size=SUBSCRIPTION_MAX_BYTES
         )
         self.fd = int(self._hello_socket.recv_fd)
         self._endpoint = ""
@@ -84,8 +84,8 @@ class NanomsgPublisher(GreetedPublisher):
         self._events: deque[tuple[int, str]] = deque()
         self._refusals = RejectionLog()
         super().__init__(threading.Condition(threading.Lock()), {})
-        self._message_socket.add_post_pipe_connect_cb(self._pipe_added)
-        self._message_socket.add_post_pipe_remove_cb(self._pipe_removed)
+        self._message_socket.add_post_pipe_connect_cb(self._handle_pipe_added)
+        self._message_socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
 
     # ---- subscribers
 
@@ -95,7 +95,7 @@ class NanomsgPublisher(GreetedPublisher):
         return len(self._seen)
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if any subscriber is connected, with or without a hello."""
         return bool(self._pipes)
 
@@ -125,7 +125,7 @@ class NanomsgPublisher(GreetedPublisher):
         """Set the reason why payloads can't be encoded; the next renewal reports it."""
         self._problem = problem
 
-    def lend(self, _size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
         """Return None, because nanomsg has no shared memory."""
         return None
 
@@ -161,7 +161,7 @@ class NanomsgPublisher(GreetedPublisher):
         """Process hellos, connections and disconnections."""
         with self._changed:
             while self._events:
-                self._note_connection_locked(*self._events.popleft())
+                self._update_connection_locked(*self._events.popleft())
             while not self._is_released:
                 try:
                     received = self._hello_socket.recv(block=False)
@@ -170,19 +170,19 @@ class NanomsgPublisher(GreetedPublisher):
                 self._process_hello_locked(received)
         return PollState()
 
-    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._events.append((pipe.id, str(pipe.remote_address)))
         self._serve_soon(self)
 
-    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         self._events.append((pipe.id, ""))
         self._serve_soon(self)
 
-    def _note_connection_locked(self, pipe: int, address: str) -> None:
+    def _update_connection_locked(self, pipe: int, address: str) -> None:
         # `address` is "" for a closed connection. Call with the lock held.
         if address:
             self._pipes[pipe] = address
-            self._greet_locked(address)
+            self._complete_handshake_locked(address)
             return
         gone = self._hellos.pop(self._pipes.pop(pipe, ""), None)
         if gone is not None and gone not in self._hellos.values():  # otherwise it has reconnected
@@ -193,7 +193,7 @@ class NanomsgPublisher(GreetedPublisher):
         address, _space, part = received.partition(b" ")
         hello = parse_hello(part)
         if hello is not None and len(self._hellos) >= _MAX_HELLOS:
-            self._discard_lone_hellos_locked()
+            self._discard_unconnected_hellos_locked()
         if hello is None or hello.topic != self.spec.topic or len(self._hellos) >= _MAX_HELLOS:
             if self._refusals.add(f"an invalid hello of {len(received)} bytes"):
                 _logger.info("'%s' received %s", self.spec.topic, self._refusals.recent_message())
@@ -201,27 +201,29 @@ class NanomsgPublisher(GreetedPublisher):
         remote = address.decode("ascii", "replace")
         self._hellos[remote] = hello.subscriber
         if remote in self._pipes.values():
-            self._greet_locked(remote)
+            self._complete_handshake_locked(remote)
 
-    def _discard_lone_hellos_locked(self) -> None:
+    def _discard_unconnected_hellos_locked(self) -> None:
         # Discards hellos whose connection was never established or is closed. Call with the lock held.
         there = set(self._pipes.values())
         self._hellos = {remote: each for remote, each in self._hellos.items() if remote in there}
 
-    def _greet_locked(self, address: str) -> None:
+    def _complete_handshake_locked(self, address: str) -> None:
         # Sends the history, then the echo, after which the subscriber counts losses. Call with the lock held.
         subscriber = self._hellos.get(address)
         if subscriber is None or self._is_released:
             return
         self._seen[subscriber] = self.count
         for kept in self._history:
-            self._message_socket.send(own_part(subscriber, self.spec.topic) + kept, block=False)
+            self._message_socket.send(subscriber_topic_part(subscriber, self.spec.topic) + kept, block=False)
         self._send_notice_locked(subscriber, 0)
         self._changed.notify_all()
 
     def _send_notice_locked(self, subscriber: int, flags: int) -> None:
         header = Header(self.spec.codec.number, flags, self.count, time.time_ns(), self.spec.id)
-        self._message_socket.send(own_part(subscriber, self.spec.topic) + header.pack(), block=False)
+        self._message_socket.send(
+            subscriber_topic_part(subscriber, self.spec.topic) + header.pack(), block=False
+        )
 
     # ---- closing
 
@@ -229,7 +231,7 @@ class NanomsgPublisher(GreetedPublisher):
         """Unregister, flush and close the sockets. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
-    def say_bye(self) -> None:
+    def send_bye(self) -> None:
         """Send the bye: subscribers read the remaining messages and disconnect."""
         with self._changed:
             self._is_closed = True

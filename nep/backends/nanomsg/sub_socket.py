@@ -12,8 +12,8 @@ from typing import Any
 import zmq
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.nanomsg.endpoints import own_part, parse_endpoint, split_one
-from nep.backends.nanomsg.library import SOCKET_FILES, library, new_socket, queue_length
+from nep.backends.nanomsg.endpoints import parse_endpoint, split_message, subscriber_topic_part
+from nep.backends.nanomsg.library import FDS_PER_SOCKET, load_pynng, new_socket, queue_length
 from nep.backends.zeromq.loss import PublisherTracker
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog
 from nep.backends.zeromq.sub_socket import CarefulParser, MessageBuffer
@@ -25,17 +25,17 @@ from nep.messages.history import MAX_HISTORY
 from nep.messages.message import Message
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import hello_part, topic_part
-from nep.system.descriptors import check_room
+from nep.system.descriptors import check_free_descriptors
 
 _logger = logging.getLogger("nep")
-_HELLO_QUEUE = 8
+_HELLO_QUEUE_LENGTH = 8
 
 
 class PollableSub:
     """SUB socket with a descriptor for polling. `recv` returns None if no message is available."""
 
     def __init__(self, codec: str) -> None:
-        nng = library()
+        nng = load_pynng()
         self._empty_errors = (nng.TryAgain, nng.Timeout, nng.Closed)
         self.socket: Any = new_socket(
             "Sub0",
@@ -52,7 +52,7 @@ class PollableSub:
         """True if a message can be read."""
         return not self._is_closed and bool(zmq.zmq_poll([(self.fd, zmq.POLLIN)], 0))
 
-    def make_room(self, history: int) -> None:
+    def enlarge_queue(self, history: int) -> None:
         """Enlarge the receive queue so that it holds a history of this length."""
         room = 2 * min(history, MAX_HISTORY)
         if room > self._room:
@@ -76,13 +76,13 @@ class _Link:
     # Connection to a publisher, with the PUSH socket for the hello.
     endpoint: str
     address: str
-    greeter: Any
+    hello_socket: Any
     dialer: Any = None
 
     def close(self) -> None:
         if self.dialer is not None:
             self.dialer.close()
-        self.greeter.close()
+        self.hello_socket.close()
 
 
 class NanomsgSubSocket(UnbatchedReader):
@@ -95,15 +95,17 @@ class NanomsgSubSocket(UnbatchedReader):
         self.fd = self._sub.fd
         self._name = spec.topic
         self._topic = topic_part(spec.topic)
-        self._own = own_part(spec.id, spec.topic)
+        self._own = subscriber_topic_part(spec.id, spec.topic)
         self._hello = hello_part(spec.id, spec.topic)
-        self._parser = CarefulParser(spec, self._own, self.sources, self.leave, lambda _publisher, _seq: None)
+        self._parser = CarefulParser(
+            spec, self._own, self.sources, self.disconnect, lambda _publisher, _seq: None
+        )
         self._links: dict[int, _Link] = {}
         self._greeters: dict[str, Any] = {}
         """Sockets for the hellos, by address of the publisher. Also read by pynng's threads."""
         self._sub.socket.subscribe(self._topic)
         self._sub.socket.subscribe(self._own)
-        self._sub.socket.add_post_pipe_connect_cb(self._connected)
+        self._sub.socket.add_post_pipe_connect_cb(self._handle_pipe_added)
 
     @property
     def received(self) -> int:
@@ -128,27 +130,31 @@ class NanomsgSubSocket(UnbatchedReader):
 
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher and disconnect from unresponsive ones that it replaces. Idempotent."""
-        for old in self.sources.replaced_by(remote):
+        for old in self.sources.replaced_publishers(remote):
             self.sources.count_missing(old)
-            self.leave(old)
+            self.disconnect(old)
         source = self.sources.add_listed(remote)
-        self._sub.make_room(remote.publisher.history)
+        self._sub.enlarge_queue(remote.publisher.history)
         source.is_silent = False
-        source.ends_at = None
+        source.bye_deadline = None
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
         link = self._links.get(remote.publisher.id)
-        if not endpoint or endpoint == source.refused or (link is not None and link.endpoint == endpoint):
+        if (
+            not endpoint
+            or endpoint == source.failed_endpoint
+            or (link is not None and link.endpoint == endpoint)
+        ):
             return
         if link is not None:
-            self._unlink(remote.publisher.id)
+            self._remove_link(remote.publisher.id)
             source.has_echoed = False
-        source.refused = source.problem = source.endpoint = ""
+        source.failed_endpoint = source.problem = source.endpoint = ""
         places = parse_endpoint(endpoint)
-        why = "" if places is None else self._link(remote.publisher.id, endpoint, *places)
+        why = "" if places is None else self._create_link(remote.publisher.id, endpoint, *places)
         if places is not None and not why:
             source.endpoint = f"tcp://{places[0]}"
             return
-        source.refused = endpoint
+        source.failed_endpoint = endpoint
         source.problem = _("cannot connect to the endpoint '{shown}' of '{name}': {why}").format(
             shown=ascii(endpoint[:100])[1:-1],
             name=remote.node_name,
@@ -157,23 +163,23 @@ class NanomsgSubSocket(UnbatchedReader):
         if self.refusals.add(source.problem):
             _logger.warning("subscription to '%s': %s", self._name, source.problem)
 
-    def _link(self, publisher: int, endpoint: str, address: str, hellos: str) -> str:
+    def _create_link(self, publisher: int, endpoint: str, address: str, hellos: str) -> str:
         # The hello is sent once the connection is established. Returns the error, or "".
-        nng = library()
+        nng = load_pynng()
         try:
-            check_room(2 * SOCKET_FILES, f"a subscriber of '{self._name}'")
+            check_free_descriptors(2 * FDS_PER_SOCKET, f"a subscriber of '{self._name}'")
             # with a queue, sending never blocks pynng's threads
-            link = _Link(endpoint, address, new_socket("Push0", send_buffer_size=_HELLO_QUEUE))
+            link = _Link(endpoint, address, new_socket("Push0", send_buffer_size=_HELLO_QUEUE_LENGTH))
             self._links[publisher] = link
-            self._greeters[address] = link.greeter
-            link.greeter.dial(f"tcp://{hellos}", block=False)
+            self._greeters[address] = link.hello_socket
+            link.hello_socket.dial(f"tcp://{hellos}", block=False)
             link.dialer = self._sub.socket.dial(f"tcp://{address}", block=False)
         except (nng.NNGException, TooManyFilesError) as error:
-            self._unlink(publisher)
+            self._remove_link(publisher)
             return str(error)
         return ""
 
-    def _connected(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         # Called in a thread of pynng. Sends the hello with the local address of the connection.
         greeter = self._greeters.get(str(pipe.remote_address))
         if greeter is not None:
@@ -185,12 +191,12 @@ class NanomsgSubSocket(UnbatchedReader):
     def reconnect(self, publisher: int) -> None:
         """Do nothing, because nanomsg reconnects automatically."""
 
-    def leave(self, publisher: int) -> None:
+    def disconnect(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
         self.sources.pop(publisher)
-        self._unlink(publisher)
+        self._remove_link(publisher)
 
-    def _unlink(self, publisher: int) -> None:
+    def _remove_link(self, publisher: int) -> None:
         link = self._links.pop(publisher, None)
         if link is not None:
             self._greeters.pop(link.address, None)
@@ -202,7 +208,7 @@ class NanomsgSubSocket(UnbatchedReader):
             is_alone = frame.startswith(self._own)
             first = self._own if is_alone else self._topic
             try:
-                message = self._parser.parse(first, split_one(frame, first, is_alone=is_alone))
+                message = self._parser.parse(first, split_message(frame, first, is_alone=is_alone))
             except WireError as error:
                 if self.refusals.add(error.reason):
                     _logger.warning("malformed message on '%s': %s", self._name, error)
@@ -211,12 +217,12 @@ class NanomsgSubSocket(UnbatchedReader):
                 return message
         return None
 
-    def dropped(self, count: int) -> None:
+    def count_dropped(self, count: int) -> None:
         """Count received messages that were dropped from the full queue."""
         self.sources.count_dropped(count)
 
     def close(self) -> None:
         """Close all sockets."""
         for publisher in list(self._links):
-            self._unlink(publisher)
+            self._remove_link(publisher)
         self._sub.close()

@@ -15,18 +15,18 @@ from typing import Any
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.answering import close_context, receive
 from nep.backends.nanomsg.direct import attach
-from nep.backends.nanomsg.library import keep_forever, library, new_socket
+from nep.backends.nanomsg.library import load_pynng, new_socket, prevent_finalization
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.backends.zeromq.sockets import wait_until
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.service_wire import ORIGINAL
 
-_JSON = 1
+_JSON_CODEC = 1
 _MAX_SURVEY_MS = 2**31 - 1
-_JOIN_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 
-Then = Callable[[Outcome], None]
+OutcomeCallback = Callable[[Outcome], None]
 
 
 @dataclass(eq=False)
@@ -35,7 +35,7 @@ class _Survey:
     number: int
     context: Any
     left: int
-    then: Then
+    callback: OutcomeCallback
     is_over: bool = False
     thread: threading.Thread | None = field(default=None)
 
@@ -46,7 +46,7 @@ class NanomsgSurveyor:
     def __init__(
         self, spec: ClientSpec, direct: Direct, on_close: Callable[[NanomsgSurveyor], object]
     ) -> None:
-        if spec.codec.number != _JSON:
+        if spec.codec.number != _JSON_CODEC:
             raise NepError(_("surveys without a master use JSON; omit msg_type"))
         self.spec = spec
         self.is_closed = False
@@ -58,8 +58,8 @@ class NanomsgSurveyor:
         self._surveys: dict[int, _Survey] = {}
         self._survey_count = 0
         self._socket: Any = new_socket("Surveyor0")
-        self._socket.add_post_pipe_connect_cb(self._pipe_added)
-        self._socket.add_post_pipe_remove_cb(self._pipe_removed)
+        self._socket.add_post_pipe_connect_cb(self._handle_pipe_added)
+        self._socket.add_post_pipe_remove_cb(self._handle_pipe_removed)
         try:
             attach(self._socket, direct, is_publisher=True, what=f"a surveyor of '{spec.service}'")
         except BaseException:
@@ -71,12 +71,12 @@ class NanomsgSurveyor:
         """Number of connected respondents."""
         return len(self._pipes)
 
-    def _pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.add(pipe.id)
             self._changed.notify_all()
 
-    def _pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
+    def _handle_pipe_removed(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
         with self._changed:
             self._pipes.discard(pipe.id)
 
@@ -85,7 +85,9 @@ class NanomsgSurveyor:
         with self._changed:
             wait_until(self._changed, lambda: bool(self._pipes), timeout_s)
 
-    def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
+    def start_survey(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> list[OpenCall]:
         """Send a request and return one item per connected respondent; all items are the same survey."""
         with self._changed:
             if self.is_closed:
@@ -103,7 +105,7 @@ class NanomsgSurveyor:
             )
             self._surveys[survey.number] = survey
         # Without the lock: callbacks in pynng's threads acquire it, and sending may wait for them.
-        with contextlib.suppress(library().NNGException):  # already closed
+        with contextlib.suppress(load_pynng().NNGException):  # already closed
             survey.context.send(bytes(data))
             survey.thread.start()
         return [survey] * count
@@ -113,9 +115,9 @@ class NanomsgSurveyor:
             survey.left -= 1
             if survey.is_over:
                 return
-            survey.then(ORIGINAL.read_answer([b"", data]).reply)
+            survey.callback(ORIGINAL.read_reply([b"", data]).reply)
 
-    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel the survey."""
         for call in calls[:1]:
             with self._changed:
@@ -128,7 +130,7 @@ class NanomsgSurveyor:
         close_context(survey.context)
         thread = survey.thread
         if thread is not None and thread.ident is not None and thread is not threading.current_thread():
-            thread.join(_JOIN_S)
+            thread.join(_JOIN_TIMEOUT_S)
 
     def close(self) -> None:
         """Close the surveyor; surveys in progress fail with `ClosedError`. Idempotent."""
@@ -140,7 +142,7 @@ class NanomsgSurveyor:
         self._on_close(self)
         for survey in surveys:
             self._finish(survey)
-            survey.then(self._closed_error())
+            survey.callback(self._closed_error())
         self._socket.close()
 
     def forked(self) -> None:
@@ -148,7 +150,7 @@ class NanomsgSurveyor:
         self.is_closed = True
         self._changed = threading.Condition(threading.Lock())
         for survey in self._surveys.values():
-            keep_forever(survey.context)
+            prevent_finalization(survey.context)
 
     def _closed_error(self) -> ClosedError:
         return ClosedError(_("surveyor of '{survey}'").format(survey=self.spec.service))

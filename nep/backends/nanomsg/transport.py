@@ -12,7 +12,7 @@ from nep.backends.base import PublisherSpec, PublisherTransport, SubscriberSpec,
 from nep.backends.connection import Direct
 from nep.backends.nanomsg.direct import DirectPublisher, DirectSubSocket, check_direct
 from nep.backends.nanomsg.direct_services import DirectServices
-from nep.backends.nanomsg.library import library
+from nep.backends.nanomsg.library import load_pynng
 from nep.backends.nanomsg.publisher import NanomsgPublisher
 from nep.backends.nanomsg.sub_socket import NanomsgSubSocket
 from nep.backends.services import (
@@ -26,15 +26,15 @@ from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.subscriber import NativeReadable, Readable, SocketSubscriber
 from nep.backends.zeromq.transport import (
     DIRECT_WAIT_S,
-    MasteredPublisher,
     OwnedPublisher,
+    RegisteredPublisher,
     ZeromqTransport,
-    closed_on_error,
+    close_on_error,
 )
 from nep.errors import NepError
 from nep.i18n import _
 from nep.protocol.requests import NodeRecord
-from nep.protocol.service_wire import SURVEY
+from nep.protocol.service_wire import SURVEY_PREFIX
 from nep.system.addresses import is_loopback
 
 
@@ -42,33 +42,33 @@ class NanomsgTransport(ZeromqTransport):
     """Connection of one node to a network over pynng. Raises `BackendUnavailableError` without pynng."""
 
     def __init__(self, node: NodeRecord) -> None:
-        library()
+        load_pynng()
         self._direct_services = DirectServices(node.name)
         super().__init__(node)
 
-    def server(self, spec: ServerSpec) -> ServerTransport:
+    def create_server(self, spec: ServerSpec) -> ServerTransport:
         """Create a server: REP or RESPONDENT for a direct connection, otherwise the one of `zeromq`."""
         direct = spec.configuration
-        if isinstance(direct, Direct) and spec.service.startswith(SURVEY):
+        if isinstance(direct, Direct) and spec.service.startswith(SURVEY_PREFIX):
             check_direct(direct)
-            return self._direct_services.respondent(spec, direct)
+            return self._direct_services.create_respondent(spec, direct)
         if isinstance(direct, Direct) and direct.wire != "tcp":
-            return self._direct_services.server(spec, direct)
-        return super().server(spec)
+            return self._direct_services.create_server(spec, direct)
+        return super().create_server(spec)
 
-    def client(self, spec: ClientSpec) -> ClientTransport:
+    def create_client(self, spec: ClientSpec) -> ClientTransport:
         """Create a client: REQ for a direct connection, otherwise the one of `zeromq`."""
         direct = spec.configuration
         if isinstance(direct, Direct) and direct.wire != "tcp":
-            return self._direct_services.client(spec, direct)
-        return super().client(spec)
+            return self._direct_services.create_client(spec, direct)
+        return super().create_client(spec)
 
-    def survey(self, spec: ClientSpec) -> SurveyTransport:
+    def create_surveyor(self, spec: ClientSpec) -> SurveyTransport:
         """Create a surveyor: SURVEYOR for a direct connection, otherwise the one of `zeromq`."""
         if isinstance(spec.configuration, Direct):
             check_direct(spec.configuration)
-            return self._direct_services.surveyor(spec, spec.configuration, DIRECT_WAIT_S)
-        return super().survey(spec)
+            return self._direct_services.create_surveyor(spec, spec.configuration, DIRECT_WAIT_S)
+        return super().create_surveyor(spec)
 
     def begin_close(self) -> None:
         """Notify all peers that the node is closing. Doesn't wait. See `Transport.begin_close`."""
@@ -96,17 +96,17 @@ class NanomsgTransport(ZeromqTransport):
             )
         return super()._session(address)
 
-    def _mastered_publisher(
+    def _new_publisher(
         self, spec: PublisherSpec, closer: Callable[[OwnedPublisher, float], None]
-    ) -> MasteredPublisher:
+    ) -> RegisteredPublisher:
         return NanomsgPublisher(spec, closer, self._io.serve_soon)
 
-    def _mastered_readable(self, spec: SubscriberSpec) -> NativeReadable:
+    def _new_readable(self, spec: SubscriberSpec) -> NativeReadable:
         return NanomsgSubSocket(spec)
 
-    def _direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
+    def _create_direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
         publisher = DirectPublisher(spec, direct, self._publisher_closer(lambda: None))
-        with closed_on_error(publisher.release):
+        with close_on_error(publisher.release):
             self._attached[spec.id] = publisher.endpoint
             self._add_publisher(publisher)
         try:
@@ -116,11 +116,13 @@ class NanomsgTransport(ZeromqTransport):
             raise
         return publisher
 
-    def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
+    def _create_direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
         io = self._io_for(spec)
         readable = DirectSubSocket(spec, direct)
-        subscriber: SocketSubscriber[Readable] = SocketSubscriber(readable, io, spec, self._forget_subscriber)
-        with closed_on_error(readable.close):
+        subscriber: SocketSubscriber[Readable] = SocketSubscriber(
+            readable, io, spec, self._discard_subscriber
+        )
+        with close_on_error(readable.close):
             self._attached[spec.id] = readable.endpoint
             self._add_subscriber(subscriber)
         try:

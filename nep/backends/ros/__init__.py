@@ -8,7 +8,7 @@ docs/ros.md.
 from __future__ import annotations
 
 from nep.backends.base import Backend, Transport
-from nep.backends.ros.address import address_of
+from nep.backends.ros.address import ros_master_address
 from nep.backends.ros.carried import codec_of
 from nep.protocol.requests import NodeRecord
 
@@ -25,6 +25,6 @@ BACKEND = Backend(
     needs="python3-rospy",
     aliases=("ros1",),
     codec_for=codec_of,
-    master=address_of,
+    master=ros_master_address,
     has_extensions=False,
 )

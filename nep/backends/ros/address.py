@@ -7,38 +7,38 @@ from urllib.parse import urlsplit
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.system.addresses import checked_host, host_of
+from nep.system.addresses import check_host, host_of
 from nep.text import quotable
 
-_PORT = 11311
+_DEFAULT_PORT = 11311
 
 
-def address_of(given: str | None) -> str:
+def ros_master_address(given: str | None) -> str:
     """Return the ROS master's address as HOST:PORT: `given`, else $ROS_MASTER_URI, else 127.0.0.1:11311.
 
     "http://HOST:PORT" is also accepted; the port defaults to 11311. Raises `NepError` if the address is
     invalid.
     """
-    text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_PORT}"
+    text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_DEFAULT_PORT}"
     if not isinstance(text, str):
         raise NepError(
-            _("an address must be a 'str' such as '{example}'").format(example=f"127.0.0.1:{_PORT}")
+            _("an address must be a 'str' such as '{example}'").format(example=f"127.0.0.1:{_DEFAULT_PORT}")
         )
     try:
         parts = urlsplit(text if "://" in text else f"http://{text}")
-        host, port = parts.hostname, _PORT if parts.port is None else parts.port
+        host, port = parts.hostname, _DEFAULT_PORT if parts.port is None else parts.port
     except ValueError:
         host, port = None, 0
     if not host or not port:
         raise NepError(
             _("'{chosen}' is not a valid address of a ROS master; use an address such as '{example}'").format(
-                chosen=quotable(text), example=f"127.0.0.1:{_PORT}"
+                chosen=quotable(text), example=f"127.0.0.1:{_DEFAULT_PORT}"
             )
         )
-    return f"{checked_host(host)}:{port}"
+    return f"{check_host(host)}:{port}"
 
 
-def is_own_computer(address: str) -> bool:
+def is_loopback_address(address: str) -> bool:
     """Return True if the host of an address is this computer's loopback."""
     host = host_of(address)
     return host == "localhost" or host.startswith("127.")

@@ -35,21 +35,27 @@ STAMP = struct.Struct("<III")
 """Start of a message that has a header: seq, secs, nsecs."""
 _LENGTH = struct.Struct("<I")
 _ROS_TYPE = re.compile(r"[A-Za-z]\w*/[A-Z]\w*", re.ASCII)
-_STRING = "std_msgs/String"
-_ARRAY = "std_msgs/UInt8MultiArray"
-_COMPRESSED = "sensor_msgs/CompressedImage"
-_RAW = "sensor_msgs/Image"
-_PICTURES = (_RAW, _COMPRESSED)
+_STRING_TYPE = "std_msgs/String"
+_BYTES_TYPE = "std_msgs/UInt8MultiArray"
+_COMPRESSED_IMAGE_TYPE = "sensor_msgs/CompressedImage"
+_RAW_IMAGE_TYPE = "sensor_msgs/Image"
+_IMAGE_TYPES = (_RAW_IMAGE_TYPE, _COMPRESSED_IMAGE_TYPE)
 _MD5SUMS = {
-    _STRING: "992ce8a1687cec8c8bd883ec73ca41d1",
-    _ARRAY: "82373f1612381bb6ee473b5cd6f5d89c",
-    _COMPRESSED: "8f7a12909da2c9d3332d540a0977563f",
-    _RAW: "060021388200f6f0f447d0fcd9c64743",
+    _STRING_TYPE: "992ce8a1687cec8c8bd883ec73ca41d1",
+    _BYTES_TYPE: "82373f1612381bb6ee473b5cd6f5d89c",
+    _COMPRESSED_IMAGE_TYPE: "8f7a12909da2c9d3332d540a0977563f",
+    _RAW_IMAGE_TYPE: "060021388200f6f0f447d0fcd9c64743",
 }
 """Checksums of the built-in definitions."""
-_CARRIERS = {"string": _STRING, "json": _STRING, "bytes": _ARRAY, "msgpack": _ARRAY, "image": _COMPRESSED}
+_CARRIER_TYPES = {
+    "string": _STRING_TYPE,
+    "json": _STRING_TYPE,
+    "bytes": _BYTES_TYPE,
+    "msgpack": _BYTES_TYPE,
+    "image": _COMPRESSED_IMAGE_TYPE,
+}
 _EMPTY_LAYOUT = bytes(8)
-_DEPTH_HEADER = 12
+_DEPTH_HEADER_BYTES = 12
 """Size in bytes of the header of compressed_depth_image_transport. 16-bit images ignore it; a PNG follows."""
 _CODEC_NUMBER = 6
 """Codec number of ROS messages; unused on the native wire, on which such messages aren't sent."""
@@ -66,10 +72,10 @@ def is_ros_type(msg_type: str) -> bool:
 
 def ros_type_of(msg_type: str) -> str:
     """Return the ROS message type that carries a message type."""
-    return msg_type if is_ros_type(msg_type) else _CARRIERS[codec_for(msg_type).name]
+    return msg_type if is_ros_type(msg_type) else _CARRIER_TYPES[codec_for(msg_type).name]
 
 
-def installed(name: str) -> Definition:
+def installed_definition(name: str) -> Definition:
     """Return the definition of an installed ROS message.
 
     Raises `NepError`, which names the package to install.
@@ -77,12 +83,12 @@ def installed(name: str) -> Definition:
     if name not in _definitions:
         found = message_text(name)
         if found is None:
-            raise not_installed(name, _("ROS message"))
+            raise not_installed_error(name, _("ROS message"))
         _definitions[name] = parse(name, found[0])
     return _definitions[name]
 
 
-def not_installed(name: str, what: str) -> NepError:
+def not_installed_error(name: str, what: str) -> NepError:
     """Return the error for a type that isn't installed; `what` names its kind in the message."""
     known = escaped(shortened(name, 100))
     return NepError(
@@ -98,10 +104,10 @@ def not_installed(name: str, what: str) -> NepError:
 
 def codec_of(msg_type: str) -> Codec:
     """Return the codec of a message type. Raises `NepError` for a ROS type that isn't installed."""
-    if msg_type in _PICTURES:
-        return _picture_codec(installed(msg_type))
+    if msg_type in _IMAGE_TYPES:
+        return _image_codec(installed_definition(msg_type))
     if is_ros_type(msg_type):
-        return ros_codec(installed(msg_type))
+        return ros_codec(installed_definition(msg_type))
     codec = codec_for(msg_type)
     return replace(codec, encode=_encode_file) if codec is IMAGE else codec
 
@@ -110,7 +116,7 @@ def ros_codec(definition: Definition) -> Codec:
     """Return a codec that converts maps to and from a ROS message."""
 
     def encode(payload: object) -> Encoded:
-        return Encoded(definition.encode(_stamped(payload) if definition.has_header else payload))
+        return Encoded(definition.encode(_with_stamp(payload) if definition.has_header else payload))
 
     def decode(data: bytes | memoryview, _extension: Mapping[str, object]) -> object:
         return definition.decode(data)
@@ -118,7 +124,7 @@ def ros_codec(definition: Definition) -> Codec:
     return Codec("ros", _CODEC_NUMBER, encode, decode, dict, definition.check)
 
 
-def _stamped(payload: object) -> object:
+def _with_stamp(payload: object) -> object:
     # Fills in the current time if the header has none, and accepts ROS 2's field names of a time.
     if not isinstance(payload, Mapping):
         return payload
@@ -135,17 +141,17 @@ def _stamped(payload: object) -> object:
     return {**payload, "header": {**header, "stamp": {"secs": secs, "nsecs": nsecs}}}
 
 
-def _picture_codec(definition: Definition) -> Codec:
+def _image_codec(definition: Definition) -> Codec:
     maps = ros_codec(definition)
 
     def encode(payload: object) -> Encoded:
         if isinstance(payload, Mapping):
             return maps.encode(payload)
-        return raw_image(payload) if definition.name == _RAW else _encode_file(payload)
+        return raw_image(payload) if definition.name == _RAW_IMAGE_TYPE else _encode_file(payload)
 
     def check(payload: object) -> None:
         if not isinstance(payload, Mapping):
-            image_codec.check(payload)
+            image_codec.check_image(payload)
 
     return replace(IMAGE, encode=encode, check=check)
 
@@ -161,7 +167,7 @@ def _check_file(encoded: Encoded, kind: str) -> str:
     if encoding not in {"jpeg", "png"}:
         raise EncodeError(
             "image", kind, _("'{name}' supports only JPEG and PNG; use the type '{raw}'").format(
-                name=_COMPRESSED, raw=_RAW
+                name=_COMPRESSED_IMAGE_TYPE, raw=_RAW_IMAGE_TYPE
             )
         )  # fmt: skip
     return str(encoding)
@@ -171,14 +177,14 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     """Convert encoded data to the body of a ROS message. Raises `EncodeError`, `WireError`."""
     data, extension = encoded.data, encoded.extension
     if codec == "image" and extension:
-        head = bytes(4) + _now() + bytes(4)
-        if ros_type == _RAW:
+        head = bytes(4) + _current_stamp() + bytes(4)
+        if ros_type == _RAW_IMAGE_TYPE:
             return head + _raw_body(data, extension)
         kind = _check_file(encoded, type(data).__name__).encode()
         return b"".join((head, _LENGTH.pack(len(kind)), kind, _LENGTH.pack(len(data)), data))
     if extension:
         raise WireError(_("a '{name}' can't carry an extension").format(name=ros_type), len(data))
-    if codec == "image" and ros_type == _COMPRESSED and _magic(data):
+    if codec == "image" and ros_type == _COMPRESSED_IMAGE_TYPE and _has_image_magic(data):
         known = picture_info(data)
         if known is None:
             raise EncodeError("image", type(data).__name__, _("not a readable image"))
@@ -186,14 +192,14 @@ def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
     if codec in {"ros", "image"}:
         return bytes(data)
     size = _LENGTH.pack(len(data))
-    return b"".join((size, data)) if ros_type == _STRING else b"".join((_EMPTY_LAYOUT, size, data))
+    return b"".join((size, data)) if ros_type == _STRING_TYPE else b"".join((_EMPTY_LAYOUT, size, data))
 
 
-def _magic(data: bytes | memoryview) -> bool:
+def _has_image_magic(data: bytes | memoryview) -> bool:
     return bytes(data[:3]) == b"\xff\xd8\xff" or bytes(data[:4]) == b"\x89PNG"
 
 
-def _now() -> bytes:
+def _current_stamp() -> bytes:
     return struct.pack("<II", *divmod(time.time_ns(), 1_000_000_000))
 
 
@@ -202,7 +208,7 @@ def _raw_body(data: bytes | memoryview, extension: Mapping[str, object]) -> byte
     if layout is None or not isinstance(shape, list | tuple):
         raise WireError(
             _("'{name}' supports only raw pixels; publish an array, or use the type 'image'").format(
-                name=_RAW
+                name=_RAW_IMAGE_TYPE
             )
         )
     frame = raw_array(memoryview(data), layout, shape)
@@ -236,7 +242,7 @@ class Unpacker:
     has_header: bool
 
 
-def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpacker:
+def unpacker_for(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpacker:
     """Return the decoder for a subscriber.
 
     Args:
@@ -252,21 +258,23 @@ def unpacker(msg_type: str, ros_type: str, text: str, md5sum: str = "*") -> Unpa
     if md5sum not in {"*", _MD5SUMS.get(ros_type, md5sum)}:
         raise version_error(ros_type)
     if is_ros_type(msg_type) and msg_type != ros_type:
-        raise _mismatch(msg_type, ros_type)
-    if ros_type in _PICTURES and (msg_type in _PICTURES or wanted is IMAGE):
-        return Unpacker(IMAGE, IMAGE.name, _from_raw if ros_type == _RAW else _from_compressed, True)
-    if not is_ros_type(msg_type) and ros_type == _CARRIERS[wanted.name]:
-        read = _from_string if ros_type == _STRING else _from_array
+        raise _type_mismatch_error(msg_type, ros_type)
+    if ros_type in _IMAGE_TYPES and (msg_type in _IMAGE_TYPES or wanted is IMAGE):
+        return Unpacker(
+            IMAGE, IMAGE.name, _from_raw if ros_type == _RAW_IMAGE_TYPE else _from_compressed, True
+        )
+    if not is_ros_type(msg_type) and ros_type == _CARRIER_TYPES[wanted.name]:
+        read = _from_string if ros_type == _STRING_TYPE else _from_array
         return Unpacker(wanted, msg_type, read, has_header=False)
     if not is_ros_type(msg_type) and wanted is not CODECS["json"]:
-        raise _mismatch(msg_type, ros_type)
-    definition = parse(ros_type, text) if text else _installed_like(ros_type, md5sum)
+        raise _type_mismatch_error(msg_type, ros_type)
+    definition = parse(ros_type, text) if text else _matching_definition(ros_type, md5sum)
     return Unpacker(ros_codec(definition), ros_type, lambda body: (body, None), definition.has_header)
 
 
-def _installed_like(ros_type: str, md5sum: str) -> Definition:
+def _matching_definition(ros_type: str, md5sum: str) -> Definition:
     # For a publisher that doesn't announce its definition.
-    definition, found = installed(ros_type), message_text(ros_type)
+    definition, found = installed_definition(ros_type), message_text(ros_type)
     if found is None or md5sum not in {"*", found[1]}:
         raise version_error(ros_type)
     return definition
@@ -282,7 +290,7 @@ def version_error(ros_type: str) -> NepError:
     )
 
 
-def _mismatch(msg_type: str, ros_type: str) -> NepError:
+def _type_mismatch_error(msg_type: str, ros_type: str) -> NepError:
     return NepError(
         _(
             "it publishes '{ros_type}', which a subscriber of '{msg_type}' can't read; subscribe with "
@@ -329,7 +337,7 @@ def _from_compressed(body: memoryview) -> Unpacked:
     kind, at = _read_sized(body, at)
     data = _read_all(body, at)
     if b"compressedDepth" in bytes(kind) and bytes(kind[:4]) == b"16UC":
-        data = data[_DEPTH_HEADER:]
+        data = data[_DEPTH_HEADER_BYTES:]
     return data, picture_info(data)
 
 
@@ -349,7 +357,7 @@ def _from_raw(body: memoryview) -> Unpacked:
                 "its encoding '{name}' is not supported; use an encoding such as 'bgr8', 'mono8' or '16UC1'"
             ).format(name=encoding)
         )
-    size = int(layout.numbers[-1])
+    size = int(layout.dtype[-1])
     row = width * layout.channels * size
     if step < row or step * height != len(pixels):
         raise WireError(
@@ -360,11 +368,11 @@ def _from_raw(body: memoryview) -> Unpacked:
     if step != row:
         pixels = memoryview(b"".join(pixels[at : at + row] for at in range(0, len(pixels), step)))
     if is_big and size > 1:
-        pixels = _swapped(pixels, size)
+        pixels = _swap_bytes(pixels, size)
     return pixels, {"shape": [height, width, layout.channels], "encoding": encoding}
 
 
-def _swapped(pixels: memoryview, size: int) -> memoryview:
+def _swap_bytes(pixels: memoryview, size: int) -> memoryview:
     swapped = bytearray(len(pixels))
     for number in range(size):
         swapped[number::size] = pixels[size - 1 - number :: size]

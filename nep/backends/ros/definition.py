@@ -19,7 +19,7 @@ from nep.i18n import _
 from nep.text import escaped, shortened
 
 _SEPARATOR = re.compile(r"^={10,}\s*$", re.MULTILINE)
-_HEAD = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
+_SECTION_HEADER = re.compile(r"\s*MSG:\s*([\w/]+)[^\n]*\n?")
 _CONSTANT = re.compile(r"[\w/]+\s+\w+\s*=")
 _FIELD = re.compile(r"([A-Za-z][\w/]*)(\[(\d{0,10})\])?\s+([A-Za-z]\w*)")
 _INTEGERS = {
@@ -28,14 +28,14 @@ _INTEGERS = {
 }  # fmt: skip
 _FLOATS = {"float32": "f", "float64": "d"}
 _FORMATS = {**_INTEGERS, **_FLOATS, "bool": "?"}
-_TIMES = {"time": struct.Struct("<II"), "duration": struct.Struct("<ii")}
-_BYTES = ("uint8", "char")
+_TIME_FORMATS = {"time": struct.Struct("<II"), "duration": struct.Struct("<ii")}
+_BYTE_TYPES = ("uint8", "char")
 _LENGTH = struct.Struct("<I")
-_HEADERS = ("Header", "std_msgs/Header", "roslib/Header")
+_HEADER_TYPES = ("Header", "std_msgs/Header", "roslib/Header")
 _MAX_DEPTH = 30
 _MAX_FIELDS = 2_000
 """Maximum number of fields including nested ones, because a publisher's definition is untrusted."""
-_MAX_EMPTY = 10_000
+_MAX_EMPTY_MESSAGES = 10_000
 """Maximum number of nested messages without content."""
 
 
@@ -50,7 +50,7 @@ class _Reader:
     def __init__(self, data: bytes | memoryview) -> None:
         self.data = memoryview(data)
         self.at = 0
-        self.messages_left = _MAX_EMPTY + _MAX_DEPTH * len(self.data)
+        self.messages_left = _MAX_EMPTY_MESSAGES + _MAX_DEPTH * len(self.data)
         """Remaining number of nested messages. Empty ones aren't limited by the size of the data."""
 
     @property
@@ -149,7 +149,7 @@ class Definition:
     def check(self, payload: object) -> None:
         """Raise `EncodeError` if the payload isn't a map."""
         if not isinstance(payload, Mapping):
-            raise EncodeError(self.name, type(payload).__name__, _not_a_map(self.fields))
+            raise EncodeError(self.name, type(payload).__name__, _not_a_map_reason(self.fields))
 
 
 # ---- parsing definitions
@@ -160,7 +160,7 @@ def parse(name: str, text: str) -> Definition:
     sections = _SEPARATOR.split(text)
     texts = {name: sections[0]}
     for section in sections[1:]:
-        head = _HEAD.match(section)
+        head = _SECTION_HEADER.match(section)
         if head is not None:
             texts[head[1]] = section[head.end() :]
     parser = _Parser(name, texts)
@@ -189,27 +189,27 @@ class _Parser:
                 raise self._definition_error(stripped)
             names.add(found[4])
             if depth == 0 and not fields:
-                self.has_header = found[1] in _HEADERS and not found[2] and found[4] == "header"
+                self.has_header = found[1] in _HEADER_TYPES and not found[2] and found[4] == "header"
             kind = self._kind(name, found[1], depth)
             if found[2]:
-                kind = _array(kind, int(found[3]) if found[3] else None)
+                kind = _array_kind(kind, int(found[3]) if found[3] else None)
             fields.append(DefinitionField(found[4], kind))
         return tuple(fields)
 
     def _kind(self, inside: str, written: str, depth: int) -> FieldKind:
-        basic = _basic(written)
+        basic = _basic_kind(written)
         if basic is not None:
             return basic
-        name = self._resolved(inside, written)
+        name = self._resolve_name(inside, written)
         known = self._known.get(name)
         if known is None:
             if depth >= _MAX_DEPTH:
                 raise self._definition_error(written)
-            known = self._known[name] = _nested(name, self.fields_of(name, depth + 1))
+            known = self._known[name] = _nested_kind(name, self.fields_of(name, depth + 1))
         return known
 
-    def _resolved(self, inside: str, written: str) -> str:
-        if written in _HEADERS:
+    def _resolve_name(self, inside: str, written: str) -> str:
+        if written in _HEADER_TYPES:
             candidates = ["std_msgs/Header", written]
         elif "/" in written:
             candidates = [written]
@@ -231,13 +231,13 @@ class _Parser:
 # ---- kinds of values
 
 
-def _basic(name: str) -> FieldKind | None:
+def _basic_kind(name: str) -> FieldKind | None:
     if name in _INTEGERS:
-        return _integer(name)
+        return _integer_kind(name)
     if name in _FLOATS:
-        return _float(name)
-    if name in _TIMES:
-        return _time(name)
+        return _float_kind(name)
+    if name in _TIME_FORMATS:
+        return _time_kind(name)
     if name == "bool":
         return FieldKind(name, _write_bool, lambda reader, _path: reader.read(1)[0] != 0, 1)
     if name == "string":
@@ -245,7 +245,7 @@ def _basic(name: str) -> FieldKind | None:
     return None
 
 
-def _integer(name: str) -> FieldKind:
+def _integer_kind(name: str) -> FieldKind:
     packing = struct.Struct(f"<{_INTEGERS[name]}")
     bits = 8 * packing.size
     is_signed = _INTEGERS[name].islower()
@@ -269,7 +269,7 @@ def _integer(name: str) -> FieldKind:
     )
 
 
-def _float(name: str) -> FieldKind:
+def _float_kind(name: str) -> FieldKind:
     packing = struct.Struct(f"<{_FLOATS[name]}")
 
     def write(value: object, path: str, out: bytearray) -> None:
@@ -288,8 +288,8 @@ def _float(name: str) -> FieldKind:
     )
 
 
-def _time(name: str) -> FieldKind:
-    packing = _TIMES[name]
+def _time_kind(name: str) -> FieldKind:
+    packing = _TIME_FORMATS[name]
 
     def write(value: object, path: str, out: bytearray) -> None:
         try:
@@ -344,13 +344,13 @@ def _read_string(reader: _Reader, _path: str) -> object:
     return str(reader.read(reader.length()), "utf-8", "replace")
 
 
-def _array(kind: FieldKind, length: int | None) -> FieldKind:
+def _array_kind(kind: FieldKind, length: int | None) -> FieldKind:
     name = f"{kind.name}[{'' if length is None else length}]"
-    if kind.name in _BYTES:
-        write = _writes_bytes(name, length)
-        read: Callable[[_Reader, str, int], object] = _reads_bytes
+    if kind.name in _BYTE_TYPES:
+        write = _bytes_writer(name, length)
+        read: Callable[[_Reader, str, int], object] = _read_bytes
     else:
-        write, read = _writes_list(name, kind, length), _reads_list(kind)
+        write, read = _list_writer(name, kind, length), _list_reader(kind)
     if length is None:
 
         def read_all(reader: _Reader, path: str) -> object:
@@ -364,7 +364,7 @@ def _array(kind: FieldKind, length: int | None) -> FieldKind:
     return FieldKind(name, write, read_fixed, length * kind.min_bytes, element=kind, length=length)
 
 
-def _writes_bytes(name: str, length: int | None) -> Callable[[object, str, bytearray], None]:
+def _bytes_writer(name: str, length: int | None) -> Callable[[object, str, bytearray], None]:
     def write(value: object, path: str, out: bytearray) -> None:
         data = _bytes_of(value, path, name)
         _write_length(len(data), length, path, out)
@@ -392,11 +392,11 @@ def _bytes_of(value: object, path: str, name: str) -> bytes | bytearray | memory
         raise _FieldError(path, _("contains a value that is not an integer from 0 to 255")) from None
 
 
-def _reads_bytes(reader: _Reader, _path: str, count: int) -> object:
+def _read_bytes(reader: _Reader, _path: str, count: int) -> object:
     return bytes(reader.read(count))
 
 
-def _writes_list(name: str, kind: FieldKind, length: int | None) -> Callable[[object, str, bytearray], None]:
+def _list_writer(name: str, kind: FieldKind, length: int | None) -> Callable[[object, str, bytearray], None]:
     format_char = _FORMATS.get(kind.name, "") if kind.name != "bool" else ""
 
     def write(value: object, path: str, out: bytearray) -> None:
@@ -417,7 +417,7 @@ def _writes_list(name: str, kind: FieldKind, length: int | None) -> Callable[[ob
     return write
 
 
-def _reads_list(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
+def _list_reader(kind: FieldKind) -> Callable[[_Reader, str, int], object]:
     format_char = _FORMATS.get(kind.name, "")
     size = struct.calcsize(f"<{format_char}")
 
@@ -444,7 +444,7 @@ def _write_length(count: int, length: int | None, path: str, out: bytearray) -> 
         )
 
 
-def _nested(name: str, fields: tuple[DefinitionField, ...]) -> FieldKind:
+def _nested_kind(name: str, fields: tuple[DefinitionField, ...]) -> FieldKind:
     def write(value: object, path: str, out: bytearray) -> None:
         _write_fields(name, fields, value, path, out)
 
@@ -459,7 +459,7 @@ def _write_fields(
 ) -> None:
     if not isinstance(payload, Mapping):
         if not path:
-            raise _FieldError("", _not_a_map(fields))
+            raise _FieldError("", _not_a_map_reason(fields))
         raise _type_error(path, payload, name)
     for each in fields:
         if each.name in payload:
@@ -498,7 +498,7 @@ def _to_integer(value: object) -> int | None:
     return None if index is None else int(index(value))
 
 
-def _not_a_map(fields: tuple[DefinitionField, ...]) -> str:
+def _not_a_map_reason(fields: tuple[DefinitionField, ...]) -> str:
     names = ", ".join(f"'{each.name}'" for each in fields[:6])
     return _("publish a 'dict' with the fields {names}").format(names=names or "{}")
 

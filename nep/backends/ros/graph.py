@@ -54,31 +54,31 @@ class OwnNode:
     clients: tuple[tuple[str, SubscriberCount], ...] = ()
 
 
-def view_of(known: RosNodes, own: list[OwnNode]) -> GraphView:
+def graph_view(known: RosNodes, own: list[OwnNode]) -> GraphView:
     """Return the graph, in which this process's nep nodes replace its ROS node.
 
     The rates of other nodes are unknown, because ROS doesn't report them.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-    for topic, name in _foreign(known.publishers, own, lambda each: each.publishers):
+    for topic, name in _foreign_entries(known.publishers, own, lambda each: each.publishers):
         kind = known.types.get(topic, "*")
         uri = known.uris.get(name, "")
         codec = _CODECS.get(kind, "ros")
         record = PublisherRecord(publisher_id(name, topic), topic, kind, codec, (uri,) if uri else ())
-        _apply(graph, AddPublisher(_node(name, uri), record))
-    for topic, name in _foreign(known.subscribers, own, lambda each: each.subscribers):
-        subscriber_count = SubscriberRecord(_id(name, topic, "i"), topic, known.types.get(topic, "*"))
-        _apply(graph, AddSubscriber(_node(name, known.uris.get(name, "")), subscriber_count))
-    for service, name in _foreign(known.services, own, lambda each: each.servers):
-        node = _node(name, known.uris.get(name, ""))
-        _apply(graph, _server_request(node, _id(name, service, "s"), service))
+        _apply(graph, AddPublisher(_node_record(name, uri), record))
+    for topic, name in _foreign_entries(known.subscribers, own, lambda each: each.subscribers):
+        subscriber_count = SubscriberRecord(_stable_id(name, topic, "i"), topic, known.types.get(topic, "*"))
+        _apply(graph, AddSubscriber(_node_record(name, known.uris.get(name, "")), subscriber_count))
+    for service, name in _foreign_entries(known.services, own, lambda each: each.servers):
+        node = _node_record(name, known.uris.get(name, ""))
+        _apply(graph, _server_request(node, _stable_id(name, service, "s"), service))
     for each in own:
         if each.ros_name:
             _add_own(graph, each, known.uris.get(each.ros_name, ""))
     return graph.view()
 
 
-def _foreign(
+def _foreign_entries(
     known: Mapping[str, Sequence[str]],
     own: list[OwnNode],
     rows_of: Callable[[OwnNode], Sequence[tuple[object, ...]]],
@@ -121,7 +121,7 @@ def _apply(graph: Graph, request: Request) -> None:
     graph.apply(request, 0, time.monotonic(), "")
 
 
-def _node(name: str, uri: str) -> NodeRecord:
+def _node_record(name: str, uri: str) -> NodeRecord:
     # The name is the id: a ROS master has only one node per name.
     host = urlsplit(uri).hostname or "" if uri else ""
     return NodeRecord(name, name.lstrip("/"), host, None, language="", generation=_GENERATION)
@@ -129,10 +129,10 @@ def _node(name: str, uri: str) -> NodeRecord:
 
 def publisher_id(node: str, topic: str) -> int:
     """Return the id of a ROS node's publisher on a topic. Both names are full names."""
-    return _id(node, topic, "o")
+    return _stable_id(node, topic, "o")
 
 
-def _id(*words: str) -> int:
+def _stable_id(*words: str) -> int:
     # The id must be the same in every process.
     digest = hashlib.sha256("\0".join(words).encode()).digest()
     return int.from_bytes(digest[:8], "little") >> 1 or 1

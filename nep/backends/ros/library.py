@@ -22,16 +22,16 @@ from typing import Any, NamedTuple
 
 from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
-from nep.system.forks import in_child
+from nep.system.forks import call_in_child
 
-PLACES = ("/opt/ros/noetic/lib/python3/dist-packages", "/usr/lib/python3/dist-packages")
-_NAMES = frozenset({
+SEARCH_FOLDERS = ("/opt/ros/noetic/lib/python3/dist-packages", "/usr/lib/python3/dist-packages")
+_MODULE_NAMES = frozenset({
     "rospy", "rosgraph", "roslib", "rospkg", "roscpp", "genpy", "genmsg", "catkin", "catkin_pkg",
     "yaml", "_yaml", "defusedxml", "netifaces", "distro", "dateutil", "docutils", "pyparsing", "six",
 })  # fmt: skip
 _PACKAGE_SUFFIXES = ("_msgs", "_srvs")
 _DEPRECATED_MODULES = r"(rospy|rosgraph|roslib|rospkg|genpy|genmsg|catkin_pkg)(\..*)?"
-_inherited: set[str] = set()
+_inherited_libraries: set[str] = set()
 
 
 class RosFinder(MetaPathFinder):
@@ -48,12 +48,14 @@ class RosFinder(MetaPathFinder):
         target: ModuleType | None = None,  # noqa: ARG002 - signature of the base class
     ) -> importlib.machinery.ModuleSpec | None:
         """Find a top-level package of ROS. Its submodules are found through the package."""
-        if path is not None or not (name in _NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)):
+        if path is not None or not (
+            name in _MODULE_NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)
+        ):
             return None
         return importlib.machinery.PathFinder.find_spec(name, self._places)
 
 
-_finder = RosFinder([place for place in PLACES if Path(place).is_dir()])
+_finder = RosFinder([place for place in SEARCH_FOLDERS if Path(place).is_dir()])
 
 
 def _forked() -> None:
@@ -61,7 +63,7 @@ def _forked() -> None:
     core = sys.modules.get("rospy.core")
     if core is None or not core.is_initialized():
         return
-    _inherited.add("rospy")
+    _inherited_libraries.add("rospy")
     at_exit = getattr(core, "_ros_atexit", None)
     if at_exit is not None:
         atexit.unregister(at_exit)  # it would unregister the parent's publishers and subscribers
@@ -72,17 +74,17 @@ def _forked() -> None:
                 connection.socket.close()
 
 
-in_child(_forked)
+call_in_child(_forked)
 
 
-def library() -> Any:  # noqa: ANN401 - not typed
+def get_rospy() -> Any:  # noqa: ANN401 - not typed
     """Load and return rospy.
 
     Raises:
         BackendUnavailableError: rospy is not installed.
         NepError: The process was forked from one that uses rospy.
     """
-    if _inherited:
+    if _inherited_libraries:
         raise NepError(
             _(
                 "'ros' does not work in a forked process of a program that uses it; start the process with "
@@ -113,11 +115,11 @@ def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> M
     return module
 
 
-class ServiceTexts(NamedTuple):
+class ServiceDefinition(NamedTuple):
     """Definitions of a service's request and response, and their common MD5 sum."""
 
     request: str
-    answer: str
+    response: str
     md5sum: str
 
 
@@ -128,7 +130,7 @@ def message_text(name: str) -> tuple[str, str] | None:
     return (text, checksum) if isinstance(text, str) and isinstance(checksum, str) else None
 
 
-def service_texts(name: str) -> ServiceTexts | None:
+def service_definition(name: str) -> ServiceDefinition | None:
     """Return the definition of a service type such as "std_srvs/SetBool", or None if it is not installed."""
     found = _installed_class(name, "srv")
     request, answer = (
@@ -137,7 +139,7 @@ def service_texts(name: str) -> ServiceTexts | None:
     )
     md5sum = getattr(found, "_md5sum", None)
     if isinstance(request, str) and isinstance(answer, str) and isinstance(md5sum, str):
-        return ServiceTexts(request, answer, md5sum)
+        return ServiceDefinition(request, answer, md5sum)
     return None
 
 
@@ -145,7 +147,7 @@ def _installed_class(name: str, folder: str) -> object:
     package, _slash, kind = name.partition("/")
     if not package.isidentifier() or not kind.isidentifier():
         return None
-    library()
+    get_rospy()
     if not _has_folder(package, folder):
         return None  # importing runs code, and the name may be untrusted
     try:
@@ -156,7 +158,7 @@ def _installed_class(name: str, folder: str) -> object:
 
 def _has_folder(package: str, folder: str) -> bool:
     # Checks for files, without importing the package.
-    if any(Path(place, package, folder, "__init__.py").is_file() for place in PLACES):
+    if any(Path(place, package, folder, "__init__.py").is_file() for place in SEARCH_FOLDERS):
         _finder.extra.add(package)
         return True
     try:

@@ -20,7 +20,7 @@ _REQUEST_TIMEOUT_S = 1.0
 _RETRY_S = 0.1
 _ROSPY_SERVICES = ("/get_loggers", "/set_logger_level")
 """Services that every ROS node provides."""
-_FAILURES = (
+_REQUEST_ERRORS = (
     OSError, xmlrpc.client.Error, http.client.HTTPException, ExpatError, ValueError, TypeError, LookupError
 )  # fmt: skip
 """Exceptions of a failed request, also if the server at the address isn't a ROS master."""
@@ -65,7 +65,7 @@ def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noq
     return value
 
 
-def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
+def connections_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
     """Return (peer, direction, topic) of a node's connections; direction is "i" or "o".
 
     Returns an empty list if the node doesn't reply.
@@ -73,7 +73,7 @@ def buses_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
     try:
         buses = _call(uri, timeout_s, "getBusInfo", _CALLER)
         return [(str(each[1]), str(each[2]), str(each[4])) for each in buses]
-    except _FAILURES:
+    except _REQUEST_ERRORS:
         return []
 
 
@@ -97,7 +97,7 @@ class RosNodes:
 
 
 @dataclass(frozen=True)
-class Registered:
+class NodeRegistrations:
     """Registrations of a node.
 
     Attributes:
@@ -128,7 +128,7 @@ class RosMaster:
             try:
                 _call(self.uri, left, "getPid", _CALLER)
                 return
-            except _FAILURES as error:
+            except _REQUEST_ERRORS as error:
                 waited = time.monotonic() - started
                 if timeout_s is not None and waited + _RETRY_S >= timeout_s:
                     raise RosMasterUnreachable(self.address, timeout_s) from error
@@ -140,17 +140,17 @@ class RosMaster:
         found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
         return found[0], found[1]
 
-    def has_forgotten(self, name: str, timeout_s: float) -> bool:
+    def is_node_unknown(self, name: str, timeout_s: float) -> bool:
         """Return True if the master replies but doesn't know the node, for example after a restart."""
         try:
             _call(self.uri, timeout_s, "lookupNode", _CALLER, name)
         except _RefusedError:
             return True
-        except _FAILURES:
+        except _REQUEST_ERRORS:
             pass
         return False
 
-    def register(self, name: str, uri: str, node: Registered, timeout_s: float) -> bool:
+    def register(self, name: str, uri: str, node: NodeRegistrations, timeout_s: float) -> bool:
         """Repeat a node's registrations after a restart of the master; return False on failure."""
         try:
             for topic, kind in node.publications:
@@ -160,7 +160,7 @@ class RosMaster:
             for topic, kind in node.subscriptions:
                 found = _call(self.uri, timeout_s, "registerSubscriber", name, topic, kind, uri)
                 _call(uri, timeout_s, "publisherUpdate", "/master", topic, found)
-        except _FAILURES:
+        except _REQUEST_ERRORS:
             return False
         return True
 
@@ -168,7 +168,7 @@ class RosMaster:
         """Return the address of a node, or "" if it is unknown."""
         try:
             return str(_call(self.uri, timeout_s, "lookupNode", _CALLER, name))
-        except _FAILURES:
+        except _REQUEST_ERRORS:
             return ""
 
     def nodes(self, timeout_s: float) -> RosNodes:
@@ -193,7 +193,7 @@ class RosMaster:
         """Return the address of a service, or "" if it is unknown."""
         try:
             return str(_call(self.uri, timeout_s, "lookupService", _CALLER, name))
-        except _FAILURES:
+        except _REQUEST_ERRORS:
             return ""
 
     def _uris(self, names: Sequence[str], timeout_s: float) -> dict[str, str]:
@@ -204,12 +204,12 @@ class RosMaster:
                     calls.lookupNode(_CALLER, name)
                 given: Any = calls() if names else []
                 answers: list[Any] = [given[number] for number in range(len(names))]
-        except _FAILURES:
+        except _REQUEST_ERRORS:
             return {}
         return {name: str(each[2]) for name, each in zip(names, answers, strict=False) if each[0] == 1}
 
     def _request(self, method: str, timeout_s: float) -> Any:  # noqa: ANN401 - any value
         try:
             return _call(self.uri, timeout_s, method, _CALLER)
-        except _FAILURES as error:
+        except _REQUEST_ERRORS as error:
             raise RosMasterUnreachable(self.address, timeout_s) from error

@@ -17,21 +17,21 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
-from nep.backends.ros.address import address_of, is_own_computer
+from nep.backends.ros.address import is_loopback_address, ros_master_address
 from nep.backends.ros.definition import Definition
-from nep.backends.ros.library import library
-from nep.backends.ros.master import Registered, RosMaster, RosMasterUnreachable, buses_of
-from nep.backends.ros.queue_room import QueueRoom
-from nep.backends.ros.service_connection import Handshakes
+from nep.backends.ros.library import get_rospy
+from nep.backends.ros.master import NodeRegistrations, RosMaster, RosMasterUnreachable, connections_of
+from nep.backends.ros.queue_room import QueueLimit
+from nep.backends.ros.service_connection import HandshakeLimiter
 from nep.errors import BadTopicError, ClosedError, NepError
 from nep.i18n import _
-from nep.system.exits import after_nodes
-from nep.system.forks import give_up, in_child
+from nep.system.exits import call_after_nodes
+from nep.system.forks import call_in_child, close_in_child
 from nep.text import escaped, shortened
 
 _logger = logging.getLogger("nep")
 
-_NAME = re.compile(r"\W+", re.ASCII)
+_INVALID_CHARACTERS = re.compile(r"\W+", re.ASCII)
 _TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
 _POLL_S = 0.01
 _REQUEST_TIMEOUT_S = 0.5
@@ -84,19 +84,19 @@ class RosProcess:
         self.subscribed: Counter[str] = Counter()
         """Number of nep subscribers in this process, by topic."""
         self._published: dict[str, dict[int, Any]] = {}
-        self.handshakes = Handshakes()
+        self.handshakes = HandshakeLimiter()
         self.at_shutdown: set[Callable[[], None]] = set()
         """Functions called when rospy is shut down before the program ends."""
         self._ended = threading.Event()
-        rospy.on_shutdown(self._shut_down)
-        threading.Thread(target=self._watch, name="nep-ros-master", daemon=True).start()
+        rospy.on_shutdown(self._on_rospy_shutdown)
+        threading.Thread(target=self._monitor_master, name="nep-ros-master", daemon=True).start()
 
     @property
-    def is_over(self) -> bool:
+    def is_shut_down(self) -> bool:
         """True after rospy was shut down; messages are no longer sent or received."""
         return bool(self.rospy.core.is_shutdown_requested())
 
-    def end(self) -> None:
+    def shut_down(self) -> None:
         """Shut rospy down at the end of the program, which unregisters the node from the master."""
         self._ended.set()
         try:
@@ -105,26 +105,26 @@ class RosProcess:
             return
         self.rospy.signal_shutdown("the program exits")
 
-    def _shut_down(self) -> None:
+    def _on_rospy_shutdown(self) -> None:
         if not self._ended.is_set():
             self._ended.set()
             _logger.warning("%s", RosShutdownError())
             for callback in list(self.at_shutdown):
                 callback()
 
-    def _watch(self) -> None:
+    def _monitor_master(self) -> None:
         # Thread that detects restarts of the master; runs until rospy is shut down.
         while not self._ended.wait(_MASTER_CHECK_S):
-            if self.master.has_forgotten(self.name, _REQUEST_TIMEOUT_S) and self._register_again():
+            if self.master.is_node_unknown(self.name, _REQUEST_TIMEOUT_S) and self._repeat_registrations():
                 _logger.warning("the ROS master at '%s' was restarted; registered again", self.master.address)
 
-    def _register_again(self) -> bool:
+    def _repeat_registrations(self) -> bool:
         # Repeats rospy's registrations, which rospy doesn't do after a restart of the master. Returns False
         # on failure.
         registration = self.rospy.impl.registration
         topics, services = registration.get_topic_manager(), registration.get_service_manager().get_services()
         with topics.lock:  # a registration removed meanwhile must not be restored
-            known = Registered(topics.get_publications(), topics.get_subscriptions(), services)
+            known = NodeRegistrations(topics.get_publications(), topics.get_subscriptions(), services)
             return bool(known.publications or known.subscriptions or services) and self.master.register(
                 self.name, self.uri, known, _REQUEST_TIMEOUT_S
             )
@@ -154,7 +154,7 @@ class RosProcess:
                     ).format(known=known, topic=topic, name=definition.name)
                 )
             made = self.rospy.Publisher(
-                topic, self._class_of(definition), subscriber_listener=self, tcp_nodelay=True,
+                topic, self._message_class(definition), subscriber_listener=self, tcp_nodelay=True,
                 latch=is_latched, queue_size=queue,
             )  # fmt: skip
             self._types[topic] = definition.name, users + 1
@@ -170,7 +170,7 @@ class RosProcess:
         with self._lock:
             self._published.get(topic, {}).pop(id_, None)
 
-    def publisher_on(self, topic: str) -> int | None:
+    def own_publisher_id(self, topic: str) -> int | None:
         """Return the id of this process's publisher on a topic, or None if it is ambiguous.
 
         ROS reports only the process that a message came from. The publisher is ambiguous if there are
@@ -184,9 +184,9 @@ class RosProcess:
             impl = publisher.impl
             return id_ if impl is not None and impl.ref_count == 1 else None
 
-    def withdraw(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
+    def unadvertise(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
         """Unregister a publisher."""
-        if self.is_over or not run_with_timeout(publisher.unregister, timeout_s):
+        if self.is_shut_down or not run_with_timeout(publisher.unregister, timeout_s):
             return  # rospy still has the topic
         with self._lock:
             known, users = self._types[topic]
@@ -196,10 +196,10 @@ class RosProcess:
 
     def unsubscribe(self, subscriber: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
         """Unregister a subscriber."""
-        if not self.is_over:
+        if not self.is_shut_down:
             run_with_timeout(subscriber.unregister, timeout_s)
 
-    def unsent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy is not typed
+    def wait_until_sent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy is not typed
         """Wait until rospy has sent its queues; return the number of connections with unsent messages."""
         impl = publisher.impl
         pause = threading.Event()
@@ -209,15 +209,15 @@ class RosProcess:
                 return left
             pause.wait(_POLL_S)
 
-    def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueRoom) -> int:  # noqa: ANN401
+    def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueLimit) -> int:  # noqa: ANN401
         """Publish a message body and return the number of older messages that were dropped from full queues.
 
         The header gets the next sequence number of its topic, as rospy would assign it.
         """
-        message = self._class_of(definition)()
+        message = self._message_class(definition)()
         impl = publisher.impl
         with self._seq_lock:
-            dropped = room.make([] if impl is None else impl.connections, len(body))
+            dropped = room.make_room([] if impl is None else impl.connections, len(body))
             if definition.has_header:
                 self._seqs[topic] += 1
                 body = (self._seqs[topic] & 0xFFFFFFFF).to_bytes(4, "little") + body[4:]
@@ -228,7 +228,7 @@ class RosProcess:
                 raise RosShutdownError from None
         return dropped
 
-    def _class_of(self, definition: Definition) -> type:
+    def _message_class(self, definition: Definition) -> type:
         # Creates a message class whose instances hold encoded bodies.
         made = self._classes.get(definition.name)
         if made is None:
@@ -251,7 +251,7 @@ class RosProcess:
 
     # ---- services
 
-    def serve(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy is not typed
+    def create_server(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy is not typed
         """Create rospy's server for a service (full name). Raises `NepError` if the process has one."""
         with self._lock:
             if self.rospy.impl.registration.get_service_manager().get_service(service) is not None:
@@ -302,7 +302,7 @@ class RosProcess:
 
     def _is_connected_to(self, uri: str, topic: str, timeout_s: float) -> bool:
         if uri != self.uri:
-            buses = buses_of(uri, timeout_s)
+            buses = connections_of(uri, timeout_s)
             return not buses or (self.name, "o", topic) in buses
         own = self.rospy.topics.get_topic_manager().get_publisher_impl(topic)
         return own is None or self.name in {each.endpoint_id for each in own.connections}
@@ -341,10 +341,10 @@ def _forked() -> None:
     _process, _lock = None, threading.Lock()
 
 
-in_child(_forked)
+call_in_child(_forked)
 
 
-def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
+def get_process(address: str, name: str, wait_s: float | None) -> RosProcess:
     """Return the process's ROS node. If there is none, start it under the name `name`.
 
     Raises:
@@ -352,14 +352,14 @@ def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
         NepError: The ROS node uses another master or was shut down.
     """
     global _process  # noqa: PLW0603 - one per process
-    rospy = library()
+    rospy = get_rospy()
     RosMaster(address).wait(wait_s)  # rospy itself would wait forever
     with _lock:
         if rospy.core.is_shutdown_requested():
             raise RosShutdownError
         if _process is None:
-            _process = _started(rospy, address, name)
-        if not _is_same(_process.master.address, address):
+            _process = _start_process(rospy, address, name)
+        if not _is_same_address(_process.master.address, address):
             raise NepError(
                 _(
                     "this program is connected to the ROS master at '{known}', and ROS allows only one per "
@@ -369,8 +369,8 @@ def process_with(address: str, name: str, wait_s: float | None) -> RosProcess:
         return _process
 
 
-def _is_same(one: str, other: str) -> bool:
-    is_local = is_own_computer(one) and is_own_computer(other)
+def _is_same_address(one: str, other: str) -> bool:
+    is_local = is_loopback_address(one) and is_loopback_address(other)
     return one == other or (is_local and one.rpartition(":")[2] == other.rpartition(":")[2])
 
 
@@ -389,18 +389,18 @@ def _set_own_address(master: str) -> None:
                     value=escaped(shortened(own, 100))
                 )
             ) from None
-    elif is_own_computer(master) and "ROS_HOSTNAME" not in os.environ:
+    elif is_loopback_address(master) and "ROS_HOSTNAME" not in os.environ:
         os.environ["ROS_IP"] = "127.0.0.1"
 
 
-def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy is not typed
+def _start_process(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401 - rospy is not typed
     if rospy.core.is_initialized():  # the program has started rospy itself
-        found = RosProcess(rospy, address_of(rospy.core.rosgraph.get_master_uri()))
-        _end_after_nodes(found)
+        found = RosProcess(rospy, ros_master_address(rospy.core.rosgraph.get_master_uri()))
+        _defer_shutdown(found)
         return found
     os.environ["ROS_MASTER_URI"] = f"http://{address}"
     _set_own_address(address)
-    word = _NAME.sub("_", name).strip("_")
+    word = _INVALID_CHARACTERS.sub("_", name).strip("_")
     word = word if word[:1].isalpha() else f"nep_{word}"
     configure = rospy.core.configure_logging
     # it would replace the program's log configuration
@@ -410,21 +410,21 @@ def _started(rospy: Any, address: str, name: str) -> RosProcess:  # noqa: ANN401
     finally:
         rospy.core.configure_logging = configure
     made = RosProcess(rospy, address)
-    _end_after_nodes(made)
-    for uri in (made.uri, f"http://{address_of(made.uri).rpartition(':')[0]}:{_tcp_port(rospy)}"):
+    _defer_shutdown(made)
+    for uri in (made.uri, f"http://{ros_master_address(made.uri).rpartition(':')[0]}:{_tcp_port(rospy)}"):
         port = uri.rstrip("/").rpartition(":")[2]
-        give_up(f"tcp://127.0.0.1:{port}", f"tcp://0.0.0.0:{port}")
+        close_in_child(f"tcp://127.0.0.1:{port}", f"tcp://0.0.0.0:{port}")
     return made
 
 
-def _end_after_nodes(process: RosProcess) -> None:
+def _defer_shutdown(process: RosProcess) -> None:
     # rospy's own hook would run before nodes have flushed, and would wait for a hung master.
     at_exit = getattr(process.rospy.core, "_ros_atexit", None)
     if at_exit is not None:
         atexit.unregister(at_exit)
 
     pid = os.getpid()
-    after_nodes(lambda: process.end() if os.getpid() == pid else None)
+    call_after_nodes(lambda: process.shut_down() if os.getpid() == pid else None)
 
 
 def _tcp_port(rospy: Any) -> int:  # noqa: ANN401 - rospy is not typed

@@ -6,21 +6,21 @@ from typing import Any
 
 from nep.messages.queue import MAX_BYTES
 
-_STEP_BYTES = 8 * 2**20
+_MEASURE_INTERVAL_BYTES = 8 * 2**20
 """Published bytes after which the queues are measured; measuring them for each message would be slow."""
 
 
-class QueueRoom:
+class QueueLimit:
     """Limit in bytes for the queues of one publisher's connections."""
 
     def __init__(self, max_bytes: int = MAX_BYTES) -> None:
         self._max_bytes = max_bytes
         self._unmeasured = 0
 
-    def make(self, connections: list[Any], size: int) -> int:
+    def make_room(self, connections: list[Any], size: int) -> int:
         """Drop the oldest messages until `size` bytes fit; return the number of dropped messages."""
         self._unmeasured += size
-        is_measured = self._unmeasured >= min(_STEP_BYTES, self._max_bytes)
+        is_measured = self._unmeasured >= min(_MEASURE_INTERVAL_BYTES, self._max_bytes)
         if is_measured:
             self._unmeasured = 0
         max_left = self._max_bytes - size if is_measured else None

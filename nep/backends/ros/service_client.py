@@ -18,14 +18,14 @@ from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, ch
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
 from nep.protocol.requests import SubscriberCount
-from nep.protocol.service_wire import CallKind, failure
+from nep.protocol.service_wire import CallKind, error_reply
 
 _logger = logging.getLogger("nep")
 _REQUEST_TIMEOUT_S = 0.5
 _RETRY_S = 0.1
 _CONNECTED_TIMEOUT_S = 0.2
 
-Then = Callable[[Outcome], None]
+OutcomeCallback = Callable[[Outcome], None]
 
 
 @dataclass(eq=False)
@@ -34,7 +34,7 @@ class _Call:
     data: bytes
     timeout_s: float | None
     deadline: float
-    then: Then
+    callback: OutcomeCallback
     connection: ServiceConnection | None = None
 
     @property
@@ -62,7 +62,9 @@ class RosClient(ClientCalls[_Call]):
             self.process.master.service_uri(self.service, _CONNECTED_TIMEOUT_S)
         )
 
-    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+    def start_call(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> OpenCall:
         """Send a call. See `ClientTransport.begin`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
@@ -72,12 +74,12 @@ class RosClient(ClientCalls[_Call]):
             call = _Call(next(self._numbers), bytes(data), timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(call.data)
-            self._seek_locked(call)
+            self._queue_for_discovery_locked(call)
         return call
 
     # ---- server discovery, in one thread for all waiting calls
 
-    def _seek_locked(self, call: _Call) -> None:
+    def _queue_for_discovery_locked(self, call: _Call) -> None:
         # Call with the lock held.
         self._waiting.append(call)
         if not self._is_discovering:
@@ -119,13 +121,13 @@ class RosClient(ClientCalls[_Call]):
 
     def _run(self, call: _Call, uri: str) -> None:
         try:
-            with self.process.handshakes.turn(uri, lambda: call.number not in self._calls, call.deadline):
+            with self.process.handshakes.acquire(uri, lambda: call.number not in self._calls, call.deadline):
                 connection = ServiceConnection(uri, self.service, self.process.name, call.deadline)
         except OSError:  # no longer registered, or just closed
             self._retry_discovery(call)
             return
         try:
-            outcome = self._outcome(call, connection)
+            outcome = self._call_server(call, connection)
         except NepError as error:
             outcome = error
         except Exception as error:
@@ -144,7 +146,7 @@ class RosClient(ClientCalls[_Call]):
             return
         with self._lock:
             if call.number in self._calls:
-                self._seek_locked(call)
+                self._queue_for_discovery_locked(call)
 
     def _finish(self, call: _Call, outcome: Outcome) -> None:
         is_answered = not isinstance(outcome, NepError)
@@ -155,7 +157,7 @@ class RosClient(ClientCalls[_Call]):
         if is_waited_for:
             self._run_callback(call, outcome)
 
-    def _outcome(self, call: _Call, connection: ServiceConnection) -> Outcome:
+    def _call_server(self, call: _Call, connection: ServiceConnection) -> Outcome:
         kind = self._type_of(connection)
         with self._lock:
             if call.number not in self._calls:
@@ -163,17 +165,17 @@ class RosClient(ClientCalls[_Call]):
             call.connection = connection
         try:
             is_carried_out, answer = connection.call(
-                kind.body_of_call(self.spec.codec, call.data, call.timeout_s)
+                kind.encode_call(self.spec.codec, call.data, call.timeout_s)
             )
         except TimeoutError:
             return ServiceTimeoutError(self.spec.service, call.timeout_s or 0.0)
         except OSError:
             return ServerGoneError(self.spec.service)
         if is_carried_out:
-            return kind.reply_in(answer, self.spec.codec)
+            return kind.decode_reply(answer, self.spec.codec)
         if kind is NEP_CALL:  # servers of this type report errors differently
             return ServerGoneError(self.spec.service)
-        return failure(CallKind.ERROR, "ServiceException", answer.decode("utf-8", "replace"))
+        return error_reply(CallKind.ERROR, "ServiceException", answer.decode("utf-8", "replace"))
 
     def _type_of(self, connection: ServiceConnection) -> ServiceType:
         kind = installed_service(connection.header["type"])
@@ -181,7 +183,7 @@ class RosClient(ClientCalls[_Call]):
             raise version_error(kind.name)
         return kind
 
-    def forget(self, call: OpenCall) -> None:
+    def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
             known = self._calls.get(call.number)
@@ -192,7 +194,7 @@ class RosClient(ClientCalls[_Call]):
     def _interrupt_locked(self, call: _Call) -> None:
         # Ends the call's thread. Call with the lock held.
         if call.connection is not None:
-            call.connection.end()
+            call.connection.interrupt()
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
         """Return the names of services that have a server."""

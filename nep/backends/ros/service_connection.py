@@ -17,17 +17,17 @@ from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
 
 _LENGTH = struct.Struct("<I")
 _HEADER_MAX_BYTES = 2**20
-_HANDSHAKE_S = 5.0
+_HANDSHAKE_TIMEOUT_S = 5.0
 _HANDSHAKES_MAX = 3
 """Limit of concurrent handshakes with one server: rospy's backlog is five; others are delayed for seconds."""
-_SLICE_S = 0.1
+_CHECK_INTERVAL_S = 0.1
 
 
 class ServiceConnectionError(OSError):
     """The server has disconnected or doesn't offer this service."""
 
 
-class Handshakes:
+class HandshakeLimiter:
     """Limits the concurrent handshakes with each server. Thread-safe."""
 
     def __init__(self) -> None:
@@ -35,7 +35,7 @@ class Handshakes:
         self._counts: Counter[str] = Counter()
 
     @contextlib.contextmanager
-    def turn(self, uri: str, is_over: Callable[[], bool], deadline: float) -> Iterator[None]:
+    def acquire(self, uri: str, is_over: Callable[[], bool], deadline: float) -> Iterator[None]:
         """Hold a handshake; wait for a free one. Raises `TimeoutError`, `ServiceConnectionError`."""
         with self._changed:
             while self._counts[uri] >= _HANDSHAKES_MAX:
@@ -44,7 +44,7 @@ class Handshakes:
                     raise TimeoutError
                 if is_over():
                     raise ServiceConnectionError(_("the call was cancelled or timed out"))
-                self._changed.wait(min(_SLICE_S, left))
+                self._changed.wait(min(_CHECK_INTERVAL_S, left))
             self._counts[uri] += 1
         try:
             yield
@@ -70,8 +70,8 @@ class ServiceConnection:
             host = port = None
         if parts.scheme != "rosrpc" or not host or not port:
             raise ServiceConnectionError(_("it has no valid address"))
-        self._deadline = min(deadline, time.monotonic() + _HANDSHAKE_S)
-        self._socket = socket.create_connection((host, port), max(0.001, self._left()))
+        self._deadline = min(deadline, time.monotonic() + _HANDSHAKE_TIMEOUT_S)
+        self._socket = socket.create_connection((host, port), max(0.001, self._remaining_s()))
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self.header = self._handshake({"callerid": caller, "service": service, "md5sum": "*"})
@@ -80,7 +80,7 @@ class ServiceConnection:
             self._socket.close()
             raise
 
-    def _left(self) -> float:
+    def _remaining_s(self) -> float:
         return self._deadline - time.monotonic()
 
     def _handshake(self, fields: dict[str, str]) -> dict[str, str]:
@@ -129,12 +129,12 @@ class ServiceConnection:
         if self._deadline == math.inf:
             self._socket.settimeout(None)
             return
-        left = self._left()
+        left = self._remaining_s()
         if left <= 0.0:
             raise TimeoutError
         self._socket.settimeout(left)
 
-    def end(self) -> None:
+    def interrupt(self) -> None:
         """Interrupt the thread that uses the connection. Thread-safe."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)

@@ -9,12 +9,19 @@ from collections.abc import Callable
 from typing import Any
 
 from nep.backends.ros.process import RosProcess
-from nep.backends.ros.service_types import NEP_CALL, ServiceType, served_type
-from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.ros.service_types import NEP_CALL, ServiceType, service_type_for
+from nep.backends.services import (
+    CallQueue,
+    IncomingCall,
+    ServerSpec,
+    Tally,
+    limit_reply_size,
+    rejection_reply,
+)
 from nep.errors import NepError
 from nep.i18n import _
 from nep.protocol.requests import PublisherCount
-from nep.protocol.service_wire import CallKind, Reply, failure, read_failure
+from nep.protocol.service_wire import CallKind, Reply, error_reply, read_error_reply
 
 
 class _PendingReply:
@@ -25,7 +32,7 @@ class _PendingReply:
         self._body: bytes | None = None
         self._reason = ""
 
-    def end(self, body: bytes | None, reason: str = "") -> bool:
+    def set_result(self, body: bytes | None, reason: str = "") -> bool:
         # Sets the response, or None and the error. Returns False if it was already set.
         with self._lock:
             if self._ended.is_set():
@@ -50,13 +57,14 @@ class RosServer:
         self.tally = Tally()
         self.is_closed = False
         self._forget = forget
-        self._type = served_type(spec.msg_type)
+        self._type = service_type_for(spec.msg_type)
         self._changed = threading.Condition(threading.Lock())
         self._pending_replies: set[_PendingReply] = set()
         self._unregistering: threading.Thread | None = None
         process.at_shutdown.add(self._on_rospy_shutdown)
         self._response = _message_class(process.rospy, f"{self._type.name}Response", self._type)
-        self._rospy_service: Any = process.serve(self.service, _service_class(process.rospy, self._type,
+        self._rospy_service: Any = process.create_server(self.service, _service_class(process.rospy,
+        self._type,
             self._response), self._handle)  # fmt: skip
 
     @property
@@ -86,28 +94,28 @@ class RosServer:
     def _queue_call(self, body: bytes, pending_reply: _PendingReply) -> None:
         # Queues the call or rejects it.
         try:
-            call = self._type.call_in(body)
+            call = self._type.decode_call(body)
         except NepError as error:
-            self._answer(pending_reply, failure(CallKind.REFUSED, "", str(error)))
+            self._reply(pending_reply, error_reply(CallKind.REFUSED, "", str(error)))
             return
         deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
         incoming = IncomingCall(
-            call.data, call.codec, deadline, lambda reply: self._answer(pending_reply, fitting(reply))
+            call.data, call.codec, deadline, lambda reply: self._reply(pending_reply, limit_reply_size(reply))
         )
         if self.is_closed or not self.calls.put(incoming):
-            self._answer(pending_reply, refusal(self.spec.service, is_closed=self.calls.is_closed))
+            self._reply(pending_reply, rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _answer(self, pending_reply: _PendingReply, reply: Reply) -> bool:
+    def _reply(self, pending_reply: _PendingReply, reply: Reply) -> bool:
         body: bytes | None = None
         if self._type is NEP_CALL or reply.kind == CallKind.ANSWER:
             try:
-                body = self._type.body_of_reply(reply)
+                body = self._type.encode_reply(reply)
             except NepError as error:  # the callback's result doesn't fit the type
-                reply = failure(CallKind.ERROR, type(error).__name__, str(error))
+                reply = error_reply(CallKind.ERROR, type(error).__name__, str(error))
         self.tally.add(reply)
         if body is not None:
-            return pending_reply.end(body)
-        return pending_reply.end(None, ": ".join(filter(None, read_failure(reply.data))))
+            return pending_reply.set_result(body)
+        return pending_reply.set_result(None, ": ".join(filter(None, read_error_reply(reply.data))))
 
     # ---- closing
 
@@ -126,15 +134,15 @@ class RosServer:
                 thread.start()
                 self._unregistering = thread
         for call in self.calls.close():
-            call.answer(refusal(self.spec.service, is_closed=True))
+            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def _on_rospy_shutdown(self) -> None:
         self.is_closed = True
         for call in self.calls.close():
-            call.answer(refusal(self.spec.service, is_closed=True))
+            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def _unregister(self) -> None:
-        if not self.process.is_over:
+        if not self.process.is_shut_down:
             with contextlib.suppress(Exception):  # rospy has logged it
                 self._rospy_service.shutdown()
 
@@ -148,7 +156,7 @@ class RosServer:
             self._changed.wait_for(lambda: not self._pending_replies, max(0.0, deadline - time.monotonic()))
             self.is_closed = True
             for pending_reply in self._pending_replies:
-                pending_reply.end(None, _("the server is closing"))
+                pending_reply.set_result(None, _("the server is closing"))
         self.process.at_shutdown.discard(self._on_rospy_shutdown)
         self._forget(self)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
-from nep.backends.ros.carried import is_ros_type, not_installed
+from nep.backends.ros.carried import is_ros_type, not_installed_error
 from nep.backends.ros.definition import parse
-from nep.backends.ros.library import service_texts
-from nep.backends.typed_services import CALL_ANSWER, CALL_REQUEST, TypedService
+from nep.backends.ros.library import service_definition
+from nep.backends.typed_services import CALL_REQUEST, CALL_RESPONSE, TypedService
 from nep.errors import NepError
 from nep.i18n import _
 
@@ -25,9 +25,11 @@ class ServiceType(TypedService):
 NEP_CALL = ServiceType(
     "nep_msgs/Call",
     parse("nep_msgs/CallRequest", CALL_REQUEST),
-    parse("nep_msgs/CallResponse", CALL_ANSWER),
+    parse("nep_msgs/CallResponse", CALL_RESPONSE),
     is_nep=True,
-    md5sum=hashlib.md5((CALL_REQUEST + CALL_ANSWER).encode(), usedforsecurity=False).hexdigest(),  # as in ROS
+    md5sum=hashlib.md5(
+        (CALL_REQUEST + CALL_RESPONSE).encode(), usedforsecurity=False
+    ).hexdigest(),  # as in ROS
 )
 
 
@@ -36,15 +38,17 @@ def installed_service(name: str) -> ServiceType:
     if name == NEP_CALL.name:
         return NEP_CALL
     if name not in _types:
-        found = service_texts(name)
+        found = service_definition(name)
         if found is None:
-            raise not_installed(name, _("ROS service"))
+            raise not_installed_error(name, _("ROS service"))
         request = parse(f"{name}Request", found.request)
-        _types[name] = ServiceType(name, request, parse(f"{name}Response", found.answer), md5sum=found.md5sum)
+        _types[name] = ServiceType(
+            name, request, parse(f"{name}Response", found.response), md5sum=found.md5sum
+        )
     return _types[name]
 
 
-def served_type(msg_type: str) -> ServiceType:
+def service_type_for(msg_type: str) -> ServiceType:
     """Return the service type that serves a server's `msg_type`. Raises `NepError`."""
     if is_ros_type(msg_type):
         return installed_service(msg_type)

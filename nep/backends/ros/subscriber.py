@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from nep.backends.base import SubscriberSpec
-from nep.backends.ros.carried import STAMP, Unpacker, installed, is_ros_type, unpacker
+from nep.backends.ros.carried import STAMP, Unpacker, installed_definition, is_ros_type, unpacker_for
 from nep.backends.ros.graph import publisher_id
 from nep.backends.ros.process import RosProcess, RosShutdownError
 from nep.backends.waking import WakingSubscriber
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import DecodeError, NepError, WireError
 from nep.i18n import _
-from nep.messages.message import NOTHING, Message, MessageKind, arrived
+from nep.messages.message import NO_EXTENSION, Message, MessageKind, received_message
 from nep.messages.queue import Inbox
 from nep.text import escaped, shortened
 
@@ -40,7 +40,7 @@ class RospyOwner(Protocol):
     def wake(self) -> None:
         """End all waits in progress."""
 
-    def forget(self, closed: Any) -> None:  # noqa: ANN401 - publishers, too
+    def discard(self, closed: Any) -> None:  # noqa: ANN401 - publishers, too
         """Remove a closed publisher or subscriber."""
 
 
@@ -73,7 +73,7 @@ class RospySubscriber(WakingSubscriber):
 
     def __init__(self, owner: RospyOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int) -> None:
         if is_ros_type(spec.msg_type):
-            installed(spec.msg_type)
+            installed_definition(spec.msg_type)
         super().__init__(owner.changed)
         self.spec = spec
         self.process = process
@@ -89,7 +89,7 @@ class RospySubscriber(WakingSubscriber):
         self._sources: dict[tuple[str, ...], _Source] = {}
         self._subscriber: Any = None
 
-    def begin(self) -> None:
+    def subscribe(self) -> None:
         """Subscribe at the ROS master."""
         with self._owner.changed:
             self.process.subscribed[self.topic] += 1
@@ -150,7 +150,7 @@ class RospySubscriber(WakingSubscriber):
         ros_type = header.get("type", "")
         text, md5sum = header.get("message_definition", ""), header.get("md5sum", "*")
         try:
-            found = unpacker(self.spec.msg_type, ros_type, text, md5sum)
+            found = unpacker_for(self.spec.msg_type, ros_type, text, md5sum)
         except NepError as error:
             who = escaped(shortened(header.get("callerid", "").lstrip("/"), 100))
             problem = _("messages from '{name}' can't be read: {why}").format(name=who, why=str(error))
@@ -170,11 +170,11 @@ class RospySubscriber(WakingSubscriber):
             data, extension = source.unpacker.unpack(body)
         except DecodeError as error:
             raise WireError(error.reason, len(body)) from error
-        message = arrived(source.kind, data, None, 0, 0, extension or NOTHING)
+        message = received_message(source.kind, data, None, 0, 0, extension or NO_EXTENSION)
         message.seq = None
         message.publisher = source.publisher
         if source.is_own:
-            message.publisher = self.process.publisher_on(self.topic)
+            message.publisher = self.process.own_publisher_id(self.topic)
         if source.unpacker.has_header:
             seq, secs, nsecs = STAMP.unpack_from(body, 0)
             message.stamp_ns = secs * 1_000_000_000 + nsecs
@@ -200,13 +200,13 @@ class RospySubscriber(WakingSubscriber):
     @property
     def has_input(self) -> bool:
         """True if input is available or the subscriber is closed."""
-        return self.is_closed or self.process.is_over or len(self.inbox) > 0
+        return self.is_closed or self.process.is_shut_down or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
         """Return the next message, or None. Raises `RosShutdownError` after rospy was shut down."""
         with self._owner.changed:
             message = None if self.is_closed else self.inbox.pop()
-        if message is None and self.process.is_over and not self.is_closed:
+        if message is None and self.process.is_shut_down and not self.is_closed:
             raise RosShutdownError
         return message
 
@@ -218,7 +218,7 @@ class RospySubscriber(WakingSubscriber):
     def take_batch(self, most_bytes: int) -> list[Message]:
         """Remove and return the messages for one call of the sink."""
         with self._owner.changed:
-            return self.inbox.take_all(most_bytes)
+            return self.inbox.pop_all(most_bytes)
 
     def report(self, problem: str) -> None:
         """Set the reason why messages can't be decoded, shown in the graph of this process."""
@@ -234,11 +234,11 @@ class RospySubscriber(WakingSubscriber):
             if self.is_closed:
                 return
             self.is_closed = True
-            self.inbox.take_all()
+            self.inbox.pop_all()
             self.notify_waiting()
             self.process.subscribed[self.topic] -= 1
         self.process.at_shutdown.discard(self._on_rospy_shutdown)
-        self._owner.forget(self)
+        self._owner.discard(self)
         if self._subscriber is not None:
             self.process.unsubscribe(self._subscriber, timeout_s)
         self._owner.wake()

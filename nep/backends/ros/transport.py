@@ -8,18 +8,18 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
-from nep.backends.ros.carried import installed, ros_type_of, to_ros
-from nep.backends.ros.graph import OwnNode, view_of
-from nep.backends.ros.library import library
+from nep.backends.ros.carried import installed_definition, ros_type_of, to_ros
+from nep.backends.ros.graph import OwnNode, graph_view
+from nep.backends.ros.library import get_rospy
 from nep.backends.ros.master import RosMaster, RosMasterUnreachable
-from nep.backends.ros.process import RosProcess, RosShutdownError, process_with
-from nep.backends.ros.queue_room import QueueRoom
+from nep.backends.ros.process import RosProcess, RosShutdownError, get_process
+from nep.backends.ros.queue_room import QueueLimit
 from nep.backends.ros.service_client import RosClient
 from nep.backends.ros.service_server import RosServer
 from nep.backends.ros.subscriber import RospySubscriber
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
@@ -33,10 +33,10 @@ _DEFAULT_QUEUE_LENGTH = 10_000
 """Queue length per connection in messages; rospy silently drops the oldest message of a full queue."""
 _BATCH_BYTES = 64 * 2**20
 """Maximum size of a sink's batch. The inbox is smaller by this size, so that both stay within the bound."""
-_BATCH_S = 0.005  # at most 200 calls of a sink per second
+_BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
-def _address(configuration: Configuration) -> str:
+def _master_address(configuration: Configuration) -> str:
     if not isinstance(configuration, Hybrid):
         raise NepError(_("the back end 'ros' does not support direct connections; use 'zeromq'"))
     return configuration.master
@@ -56,11 +56,11 @@ class RospyPublisher:
         self.problem = ""
         self.process = process
         self._transport = transport
-        self._definition = installed(ros_type_of(spec.msg_type))
+        self._definition = installed_definition(ros_type_of(spec.msg_type))
         self.topic = process.resolved(spec.topic)
         self._lock = threading.RLock()
         self._is_closed = False
-        self._room = QueueRoom()
+        self._room = QueueLimit()
         self._drops = RejectionLog()
         queue = _QUEUE_LENGTHS.get(spec.codec.name, _DEFAULT_QUEUE_LENGTH)
         self._publisher: Any = process.advertise(
@@ -81,22 +81,22 @@ class RospyPublisher:
         return sum(each != self.process.name for each in connected_nodes) + own
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if any node is connected, and after rospy was shut down, so that `send` raises the error."""
         impl = self._publisher.impl
-        return (impl is not None and bool(impl.connections)) or self.process.is_over
+        return (impl is not None and bool(impl.connections)) or self.process.is_shut_down
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of registered subscribers that aren't connected."""
         try:
-            registered = self.process.master.names(self.topic, HANDSHAKE_S)[1]
+            registered = self.process.master.names(self.topic, HANDSHAKE_TIMEOUT_S)[1]
         except RosMasterUnreachable:
             return ()
         connected_nodes = self.process.connected_nodes(self._publisher)
         return tuple(each.lstrip("/") for each in registered if each not in connected_nodes)
 
-    def lend(self, _size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
         """Return None, because rospy has no shared memory."""
         return None
 
@@ -119,7 +119,7 @@ class RospyPublisher:
         with self._lock:
             if self._is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
-            if self.process.is_over:
+            if self.process.is_shut_down:
                 raise RosShutdownError
             self.count += 1
             self.bytes += len(body)
@@ -147,21 +147,21 @@ class RospyPublisher:
             if self._is_closed:
                 return
             self._is_closed = True
-        self._transport.forget(self)
+        self._transport.discard(self)
         self.process.remove_publisher(self.topic, self.spec.id)
-        left = self.process.unsent(self._publisher, deadline)
+        left = self.process.wait_until_sent(self._publisher, deadline)
         if left:
             _logger.warning(
                 "'%s' was closed before %d subscriber(s) received everything", self.spec.topic, left
             )
-        self.process.withdraw(self.topic, self._publisher, deadline - time.monotonic())
+        self.process.unadvertise(self.topic, self._publisher, deadline - time.monotonic())
 
 
 class RospyTransport:
     """Connection of one node to a ROS network. Raises `BackendUnavailableError` if rospy is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
-        library()
+        get_rospy()
         self.node = node
         self.changed = threading.Condition()
         self._wakes = 0
@@ -175,33 +175,33 @@ class RospyTransport:
         self._closing = threading.Event()
         _transports.add(self)
 
-    def publisher(self, spec: PublisherSpec) -> RospyPublisher:
+    def create_publisher(self, spec: PublisherSpec) -> RospyPublisher:
         """Create a publisher and wait up to `HANDSHAKE_S` for the registered subscribers to connect."""
-        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
+        process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
         publisher = RospyPublisher(self, process, spec)
         with self._lock:
             self._publishers = (*self._publishers, publisher)
         try:
             self._check_open()
-            process.wait_for_subscribers(publisher._publisher, publisher.topic, HANDSHAKE_S)  # noqa: SLF001
+            process.wait_for_subscribers(publisher._publisher, publisher.topic, HANDSHAKE_TIMEOUT_S)  # noqa: SLF001
         except BaseException:
             publisher.close(0.0)
             raise
         return publisher
 
-    def subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
+    def create_subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
         """Create a subscriber and wait up to `HANDSHAKE_S` for the registered publishers to connect."""
-        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
+        process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
         batch = 0 if spec.sink is None else _BATCH_BYTES
         subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
         try:
-            subscriber.begin()
+            subscriber.subscribe()
             self._check_open()
-            process.wait_for_publishers(subscriber.topic, HANDSHAKE_S)
+            process.wait_for_publishers(subscriber.topic, HANDSHAKE_TIMEOUT_S)
             if spec.sink is not None:
-                self._start_sinks()
+                self._start_sink_thread()
         except BaseException:
             subscriber.close()
             raise
@@ -211,7 +211,7 @@ class RospyTransport:
         if self._is_closed:
             raise ClosedError(f"node '{self.node.name}'")
 
-    def forget(self, closed: RospyPublisher | RospySubscriber | RosServer | RosClient) -> None:
+    def discard(self, closed: RospyPublisher | RospySubscriber | RosServer | RosClient) -> None:
         """Remove a closed publisher, subscriber, server or client."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
@@ -221,19 +221,19 @@ class RospyTransport:
 
     # ---- services
 
-    def server(self, spec: ServerSpec) -> RosServer:
+    def create_server(self, spec: ServerSpec) -> RosServer:
         """Create a server. Raises as `publisher` does, and `NepError` for a type that isn't installed."""
-        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
-        server = RosServer(process, spec, self.forget)
+        process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
+        server = RosServer(process, spec, self.discard)
         with self._lock:
             self._servers = (*self._servers, server)
         self._close_if_closed(server)
         return server
 
-    def client(self, spec: ClientSpec) -> RosClient:
+    def create_client(self, spec: ClientSpec) -> RosClient:
         """Create a client."""
-        process = process_with(_address(spec.configuration), self.node.name, spec.wait_s)
-        client = RosClient(process, spec, self.forget)
+        process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
+        client = RosClient(process, spec, self.discard)
         with self._lock:
             self._clients = (*self._clients, client)
         self._close_if_closed(client)
@@ -256,7 +256,7 @@ class RospyTransport:
         """
         own_subscribers = [each for each in subscribers if isinstance(each, RospySubscriber)]
         before = self._wakes
-        with woken_by(calls, self.wake) as is_empty:
+        with wake_on_call(calls, self.wake) as is_empty:
             if not is_empty:
                 return
             with self.changed:
@@ -264,7 +264,7 @@ class RospyTransport:
                     lambda: self._wakes != before or any(len(each.inbox) for each in own_subscribers),
                     timeout_s,
                 )
-        if any(each.process.is_over for each in self._servers):
+        if any(each.process.is_shut_down for each in self._servers):
             raise RosShutdownError
 
     def wake(self) -> None:
@@ -275,13 +275,13 @@ class RospyTransport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Return the graph known to the ROS master. Raises `MasterUnreachable`."""
-        address = _address(configuration)
+        address = _master_address(configuration)
         known = RosMaster(address).nodes(timeout_s)
         # of the same class
-        own = [each.own(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
-        return view_of(known, own)
+        own = [each.own_node(address) for each in list(_transports) if not each._is_closed]  # noqa: SLF001
+        return graph_view(known, own)
 
-    def own(self, address: str) -> OwnNode:
+    def own_node(self, address: str) -> OwnNode:
         """Return this node's entry for the graph, with its statistics."""
         outs: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
@@ -334,7 +334,7 @@ class RospyTransport:
 
     # ---- sinks
 
-    def _start_sinks(self) -> None:
+    def _start_sink_thread(self) -> None:
         with self._lock:
             if self._thread is None:
                 name = f"nep-sinks-{self.node.name}"
@@ -352,7 +352,7 @@ class RospyTransport:
                         subscriber.spec.sink(messages)
                     except BaseException:  # also SystemExit: the sink thread continues
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
-            self._closing.wait(_BATCH_S)
+            self._closing.wait(_BATCH_INTERVAL_S)
 
 
 _transports: set[RospyTransport] = set()

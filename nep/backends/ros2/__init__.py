@@ -5,9 +5,9 @@ process in DDS; `publisher`, `subscriber`, `graph` and `transport` implement `ne
 """
 
 from nep.backends.base import Backend
-from nep.backends.ros2.environment import domain
+from nep.backends.ros2.environment import resolve_domain
 from nep.backends.ros2.message_types import MessageTypes, message_types
-from nep.backends.ros2.quality import QUALITIES
+from nep.backends.ros2.quality import QOS_PROFILES
 from nep.backends.ros2.services.definitions import codec_of_calls
 from nep.backends.ros2.transport import Ros2Transport
 from nep.backends.ros2.type_mapping import codec_for
@@ -18,10 +18,10 @@ BACKEND = Backend(
     "ros2",
     Ros2Transport,
     needs="cyclonedds, rosbags",
-    master=domain,
+    master=resolve_domain,
     codec_for=codec_for,
     codec_of_calls=codec_of_calls,
-    qos=QUALITIES,
+    qos=QOS_PROFILES,
     has_history=True,
     has_extensions=False,
 )

@@ -11,23 +11,23 @@ from typing import Literal
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
 
-_DOMAINS = 233
+_DOMAIN_COUNT = 233
 """Number of domains; higher domain ids have no valid ports."""
 _SUBNET_RANGES = frozenset({"SUBNET", "SYSTEM_DEFAULT"})
 _VALID_RANGES = frozenset({"", "OFF", "LOCALHOST", *_SUBNET_RANGES})
 PARTICIPANTS_MAX = 100
 """Maximum number of participants per computer in a domain, and of ports probed without multicast."""
-_PARTICIPANTS = PARTICIPANTS_MAX - 1
+_MAX_PARTICIPANT_INDEX = PARTICIPANTS_MAX - 1
 _PACKET_SIZES = "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"
 """Packet sizes for Cyclone DDS. Large packets send 8 MB in a seventh of the time."""
-_INTERNALS = (
+_INTERNAL_SETTINGS = (
     "<Internal><Watermarks><WhcHigh>64MB</WhcHigh></Watermarks>"
     "<WriterLingerDuration>0s</WriterLingerDuration></Internal>"
 )
 """Amount of data in flight at which publishing blocks. No lingering: nep itself waits before closing."""
 
 
-def domain(master: str | None, environment: Mapping[str, str] = os.environ) -> str:
+def resolve_domain(master: str | None, environment: Mapping[str, str] = os.environ) -> str:
     """Return the DDS domain of a node: `master`, else $ROS_DOMAIN_ID, else "0". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
@@ -37,21 +37,21 @@ def domain(master: str | None, environment: Mapping[str, str] = os.environ) -> s
     if said and not _is_domain(said):
         raise NepError(
             _("'{said}' is not a ROS 2 domain; use a number from 0 to {most}").format(
-                said=said[:40], most=_DOMAINS - 1
+                said=said[:40], most=_DOMAIN_COUNT - 1
             )
         )
     said = said or environment.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not _is_domain(said):
         raise NepError(
             _("ROS_DOMAIN_ID is '{said}'; set it to a number from 0 to {most}").format(
-                said=said[:40], most=_DOMAINS - 1
+                said=said[:40], most=_DOMAIN_COUNT - 1
             )
         )
     return str(int(said))
 
 
 def _is_domain(said: str) -> bool:
-    return said.isascii() and said.isdigit() and len(said) <= 3 and int(said) < _DOMAINS
+    return said.isascii() and said.isdigit() and len(said) <= 3 and int(said) < _DOMAIN_COUNT
 
 
 def distribution(environment: Mapping[str, str]) -> str:
@@ -70,7 +70,7 @@ def _configured_range(environment: Mapping[str, str]) -> str:
     return said
 
 
-def _discovery_reach(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
+def _discovery_range(environment: Mapping[str, str]) -> Literal["nobody", "computer", "peers", "subnet"]:
     # Returns the discovery range. Raises `NepError`.
     local, said = environment.get("ROS_LOCALHOST_ONLY", "").strip(), _configured_range(environment)
     if said == "OFF":
@@ -88,14 +88,14 @@ def _peers(environment: Mapping[str, str]) -> list[str]:
 
 def is_loopback_only(environment: Mapping[str, str]) -> bool:
     """Return True, the default, if programs of other computers are not discovered."""
-    return _discovery_reach(environment) in {"nobody", "computer"}
+    return _discovery_range(environment) in {"nobody", "computer"}
 
 
-def configuration(environment: Mapping[str, str]) -> str | None:
+def cyclonedds_config(environment: Mapping[str, str]) -> str | None:
     """Return the XML configuration for Cyclone DDS, or None if $CYCLONEDDS_URI sets it."""
     if environment.get("CYCLONEDDS_URI"):
         return None
-    reach = _discovery_reach(environment)
+    reach = _discovery_range(environment)
     peers = {
         "nobody": [],
         "computer": ["127.0.0.1"],
@@ -110,6 +110,7 @@ def configuration(environment: Mapping[str, str]) -> str | None:
         f"<AllowMulticast>{'default' if is_cast else 'false'}</AllowMulticast>{_PACKET_SIZES}</General>"
         f"<Discovery>{f'<Tag>nobody-{secrets.token_hex(8)}</Tag>' if reach == 'nobody' else ''}"
         f"<ParticipantIndex>auto</ParticipantIndex>"
-        f"<MaxAutoParticipantIndex>{_PARTICIPANTS}</MaxAutoParticipantIndex>"
-        f"{f'<Peers>{listed}</Peers>' if listed else ''}</Discovery>{_INTERNALS}</Domain></CycloneDDS>"
+        f"<MaxAutoParticipantIndex>{_MAX_PARTICIPANT_INDEX}</MaxAutoParticipantIndex>"
+        f"{f'<Peers>{listed}</Peers>' if listed else ''}"
+        f"</Discovery>{_INTERNAL_SETTINGS}</Domain></CycloneDDS>"
     )

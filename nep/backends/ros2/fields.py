@@ -11,17 +11,17 @@ from nep.i18n import _
 from nep.text import escaped
 
 _BASE, _NAME, _ARRAY = 1, 2, 3
-PLACEHOLDER = "structure_needs_at_least_one_member"
+PLACEHOLDER_FIELD = "structure_needs_at_least_one_member"
 """Name of the member that DDS requires in an otherwise empty message."""
-_BITS = {"int8": 8, "int16": 16, "int32": 32, "int64": 64}
-_RANGES = {
-    **{name: (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for name, bits in _BITS.items()},
-    **{f"u{name}": (0, 2**bits - 1) for name, bits in _BITS.items()},
+_INTEGER_BITS = {"int8": 8, "int16": 16, "int32": 32, "int64": 64}
+_INTEGER_RANGES = {
+    **{name: (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for name, bits in _INTEGER_BITS.items()},
+    **{f"u{name}": (0, 2**bits - 1) for name, bits in _INTEGER_BITS.items()},
     "byte": (0, 255),
 }
-_NUMBERS = {
+_NUMPY_DTYPES = {
     "byte": "uint8",
-    **{name: name for name in ("bool", "float32", "float64", *_RANGES) if name != "byte"},
+    **{name: name for name in ("bool", "float32", "float64", *_INTEGER_RANGES) if name != "byte"},
 }
 _FLOATS = frozenset({"float32", "float64"})
 _FLOAT32_OVERFLOW = 3.4028235677973366e38
@@ -59,7 +59,7 @@ class RosFieldError(Exception):
         super().__init__(self.reason)
 
 
-class Types(Protocol):
+class TypeRegistry(Protocol):
     """Registry of message types."""
 
     def fields(self, name: str) -> tuple[RosField, ...]:
@@ -75,15 +75,15 @@ def read_definition(entries: Sequence[tuple[str, Any]]) -> tuple[list[tuple[str,
     Returns:
         The converted description, and the fields.
     """
-    plain = [(name, _without_char(each)) for name, each in entries]
+    plain = [(name, _replace_char(each)) for name, each in entries]
     return plain, tuple(_field(name, each) for name, each in plain)
 
 
-def _without_char(described: Any) -> Any:  # noqa: ANN401 - nested pairs
+def _replace_char(described: Any) -> Any:  # noqa: ANN401 - nested pairs
     kind, rest = described
     if kind == _BASE:
         return (kind, ("uint8", 0)) if rest[0] == "char" else described
-    return described if kind == _NAME else (kind, (_without_char(rest[0]), rest[1]))
+    return described if kind == _NAME else (kind, (_replace_char(rest[0]), rest[1]))
 
 
 def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pairs
@@ -100,7 +100,7 @@ def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pair
 # ---- maps to messages
 
 
-def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - not typed
+def to_message(types: TypeRegistry, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - not typed
     """Convert a map to a message object; missing fields are zero. Raises `RosFieldError`."""
     if not isinstance(payload, Mapping):
         raise (
@@ -110,7 +110,7 @@ def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:
             if path
             else RosFieldError("", _("publish a map of the fields of '{name}'").format(name=name))
         )
-    fields = {each.name: each for each in types.fields(name) if each.name != PLACEHOLDER}
+    fields = {each.name: each for each in types.fields(name) if each.name != PLACEHOLDER_FIELD}
     for key in payload:
         if key not in fields:
             raise RosFieldError(
@@ -124,7 +124,9 @@ def to_message(types: Types, name: str, payload: object, path: str = "") -> Any:
         where = _join_path(path, each.name)
         is_given = each.name in payload
         values[each.name] = (
-            _value(types, each, payload[each.name], where) if is_given else _default_value(types, each)
+            _convert_value(types, each, payload[each.name], where)
+            if is_given
+            else _default_value(types, each)
         )
     return types.message_class(name)(**values)
 
@@ -133,7 +135,7 @@ def _join_path(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name
 
 
-def _default_value(types: Types, field: RosField) -> Any:  # noqa: ANN401 - depends on the field
+def _default_value(types: TypeRegistry, field: RosField) -> Any:  # noqa: ANN401 - depends on the field
     if field.length is None:
         if field.is_message:
             return to_message(types, field.kind, {})
@@ -141,33 +143,35 @@ def _default_value(types: Types, field: RosField) -> Any:  # noqa: ANN401 - depe
     count = max(field.length, 0)
     if field.is_message:
         return [to_message(types, field.kind, {}) for _ in range(count)]
-    return [""] * count if field.kind == "string" else _numpy().zeros(count, _NUMBERS[field.kind])
+    return [""] * count if field.kind == "string" else _import_numpy().zeros(count, _NUMPY_DTYPES[field.kind])
 
 
 _NUMERIC_DEFAULTS: Mapping[str, bool | float] = {"bool": False, "float32": 0.0, "float64": 0.0}
 
 
-def _value(types: Types, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - depends on the field
+def _convert_value(types: TypeRegistry, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - depends on the field
     if field.length is not None:
-        return _items(types, field, value, path)
+        return _convert_items(types, field, value, path)
     if field.is_message:
         return to_message(types, field.kind, value, path)
-    return _scalar(field, value, path)
+    return _convert_scalar(field, value, path)
 
 
-def _scalar(field: RosField, value: object, path: str) -> str | bool | int | float:
+def _convert_scalar(field: RosField, value: object, path: str) -> str | bool | int | float:
     if field.kind == "string":
-        return _text(field, value, path)
+        return _convert_text(field, value, path)
     value = _unwrap_scalar(value)
     if field.kind == "bool":
         if not isinstance(value, bool):
-            raise RosFieldError(path, _("is a '{kind}'; expected True or False").format(kind=_kind(value)))
+            raise RosFieldError(
+                path, _("is a '{kind}'; expected True or False").format(kind=_type_name(value))
+            )
         return value
     if field.kind in _FLOATS:
-        return _float(field, value, path)
-    low, high = _RANGES[field.kind]
+        return _convert_float(field, value, path)
+    low, high = _INTEGER_RANGES[field.kind]
     if not isinstance(value, int) or isinstance(value, bool):
-        raise RosFieldError(path, _("is a '{kind}'; expected a whole number").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a whole number").format(kind=_type_name(value)))
     if not low <= value <= high:
         raise RosFieldError(
             path,
@@ -178,9 +182,9 @@ def _scalar(field: RosField, value: object, path: str) -> str | bool | int | flo
     return value - 256 if field.kind == "byte" and value > 127 else value  # rosbags stores bytes as signed
 
 
-def _float(field: RosField, value: object, path: str) -> float:
+def _convert_float(field: RosField, value: object, path: str) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool):
-        raise RosFieldError(path, _("is a '{kind}'; expected a number").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a number").format(kind=_type_name(value)))
     try:
         number = float(value)
     except OverflowError:
@@ -193,9 +197,9 @@ def _float(field: RosField, value: object, path: str) -> float:
     return number
 
 
-def _text(field: RosField, value: object, path: str) -> str:
+def _convert_text(field: RosField, value: object, path: str) -> str:
     if not isinstance(value, str):
-        raise RosFieldError(path, _("is a '{kind}'; expected a 'str'").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a 'str'").format(kind=_type_name(value)))
     if "\0" in value:
         raise RosFieldError(path, _("contains a null character, which is not allowed in ROS strings"))
     try:
@@ -210,11 +214,11 @@ def _text(field: RosField, value: object, path: str) -> str:
     return value
 
 
-def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - a list or an array
+def _convert_items(types: TypeRegistry, field: RosField, value: object, path: str) -> Any:  # noqa: ANN401 - a list or an array
     if isinstance(value, str) or not (
         isinstance(value, Sequence | bytes | bytearray | memoryview) or hasattr(value, "__array__")
     ):
-        raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_kind(value)))
+        raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_type_name(value)))
     dimensions = getattr(value, "ndim", 1)
     if dimensions != 1:
         raise RosFieldError(
@@ -226,11 +230,11 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
     if field.is_message or field.kind == "string":
         single = RosField(field.name, field.kind, field.is_message, max_text_bytes=field.max_text_bytes)
         items: Any = [
-            _value(types, single, each, f"{path}[{number}]")
+            _convert_value(types, single, each, f"{path}[{number}]")
             for number, each in enumerate(list(value))  # type: ignore[call-overload]
         ]
     else:
-        items = _array(field, value, path)
+        items = _convert_array(field, value, path)
     if field.length is not None and field.length >= 0 and len(items) != field.length:
         raise RosFieldError(
             path, _("has {count} items; expected {length}").format(count=len(items), length=field.length)
@@ -242,26 +246,26 @@ def _items(types: Types, field: RosField, value: object, path: str) -> Any:  # n
     return items
 
 
-def _array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an array of numpy
+def _convert_array(field: RosField, value: Any, path: str) -> Any:  # noqa: ANN401 - an array of numpy
     # Validates the whole array at once; item by item only to find the path of an invalid one.
-    np = _numpy()
-    wanted = np.dtype(_NUMBERS[field.kind])
+    np = _import_numpy()
+    wanted = np.dtype(_NUMPY_DTYPES[field.kind])
     if isinstance(value, bytes | bytearray | memoryview):
         if field.kind not in _OCTETS:
-            raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_kind(value)))
+            raise RosFieldError(path, _("is a '{kind}'; expected a list").format(kind=_type_name(value)))
         return np.frombuffer(bytes(value), np.uint8)
     try:
         found = np.asarray(value)
     except (ValueError, OverflowError, TypeError):
         found = np.empty((), object)
-    if found.ndim == 1 and (not found.size or _fits(found, field, wanted)):
+    if found.ndim == 1 and (not found.size or _is_convertible(found, field, wanted)):
         return np.ascontiguousarray(found.astype(wanted))
     single = RosField(field.name, "uint8" if field.kind in _OCTETS else field.kind, is_message=False)
-    items = [_scalar(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
+    items = [_convert_scalar(single, each, f"{path}[{number}]") for number, each in enumerate(list(value))]
     return np.array(items, wanted)
 
 
-def _fits(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - an array, a type of numbers
+def _is_convertible(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - an array, a type of numbers
     # False means that the items must be checked one by one.
     if found.dtype == wanted:
         return True
@@ -270,11 +274,11 @@ def _fits(found: Any, field: RosField, wanted: Any) -> bool:  # noqa: ANN401 - a
             return False
         if field.kind == "float64" or found.dtype.kind != "f":
             return True
-        finite = found[_numpy().isfinite(found)]
+        finite = found[_import_numpy().isfinite(found)]
         return not finite.size or bool(abs(finite).max() < _FLOAT32_OVERFLOW)
     if field.kind == "bool" or found.dtype.kind not in "iu":
         return False
-    low, high = _RANGES[field.kind]
+    low, high = _INTEGER_RANGES[field.kind]
     return bool(low <= int(found.min()) and int(found.max()) <= high)
 
 
@@ -284,23 +288,23 @@ def _unwrap_scalar(value: object) -> object:
     return value.item() if hasattr(value, "item") else value
 
 
-def _kind(value: object) -> str:
+def _type_name(value: object) -> str:
     return type(value).__name__
 
 
 # ---- messages to maps
 
 
-def from_message(types: Types, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - not typed
+def from_message(types: TypeRegistry, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - not typed
     """Convert a message object to maps, lists, `bytes`, numbers and strings."""
     return {
         each.name: _to_plain(types, each, getattr(message, each.name))
         for each in types.fields(name)
-        if each.name != PLACEHOLDER
+        if each.name != PLACEHOLDER_FIELD
     }
 
 
-def _to_plain(types: Types, field: RosField, value: Any) -> object:  # noqa: ANN401 - depends on the field
+def _to_plain(types: TypeRegistry, field: RosField, value: Any) -> object:  # noqa: ANN401 - depends on the field
     if field.length is None:
         if field.is_message:
             return from_message(types, field.kind, value)
@@ -312,7 +316,7 @@ def _to_plain(types: Types, field: RosField, value: Any) -> object:  # noqa: ANN
     return value.tobytes() if field.kind in _OCTETS else value.tolist()
 
 
-def _numpy() -> Any:  # noqa: ANN401 - the module numpy
+def _import_numpy() -> Any:  # noqa: ANN401 - the module numpy
     import numpy as np  # noqa: PLC0415 - optional and slow to import
 
     return np

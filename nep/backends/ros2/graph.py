@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
-from nep.backends.ros2.mismatches import Party, mismatches
+from nep.backends.ros2.mismatches import NodeEndpoint, mismatches
 from nep.backends.ros2.names import (
     dds_service,
     dds_topic,
@@ -23,8 +23,8 @@ from nep.backends.ros2.names import (
     ros_type,
     service_type_of,
 )
-from nep.backends.ros2.participant import DdsEndpoint, Local, Participant
-from nep.backends.ros2.subscriber import id_of
+from nep.backends.ros2.participant import DdsEndpoint, LocalNode, Participant
+from nep.backends.ros2.subscriber import endpoint_id
 from nep.backends.ros2.type_mapping import CDR, mapping_for
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import NepError
@@ -43,7 +43,7 @@ from nep.protocol.requests import (
 )
 from nep.protocol.service_wire import SERVICE_TYPE, topic_of
 
-_MAX_FOREIGN = 10_000
+_MAX_FOREIGN_ENDPOINTS = 10_000
 """Maximum number of other programs' writers and readers in the graph."""
 
 
@@ -65,16 +65,16 @@ class _Names:
 
     def id(self, endpoint: DdsEndpoint) -> int:
         # Returns the announced id, unless another endpoint announces the same one.
-        announced_ids = id_of(endpoint.gid, endpoint.announced.get("nepid"))
-        found = id_of(endpoint.gid, None) if announced_ids in self.ids else announced_ids
+        announced_ids = endpoint_id(endpoint.gid, endpoint.announced.get("nepid"))
+        found = endpoint_id(endpoint.gid, None) if announced_ids in self.ids else announced_ids
         self.ids.add(found)
         return found
 
 
-def graph_of(participant: Participant) -> GraphView:
+def current_graph(participant: Participant) -> GraphView:
     """Return the current graph."""
     graph, names = Graph(epoch=1, now=0.0, learn_s=0.0), _Names()
-    for local in participant.locals:
+    for local in participant.local_nodes:
         _add_local(graph, local, names)
     found = [
         (kind, each)
@@ -82,15 +82,15 @@ def graph_of(participant: Participant) -> GraphView:
         for each in participant.endpoints(kind)
         if ros_topic(each.topic) is not None or ros_service(each.topic) is not None
     ]
-    parties: dict[str, dict[str, list[Party]]] = {}
+    parties: dict[str, dict[str, list[NodeEndpoint]]] = {}
     own = participant.own_gids()
     for kind, each in found:
         if each.gid in own and ros_service(each.topic) is None:
-            _add_party(parties, names, Party(own[each.gid], each), kind)
-    for node, kind, endpoint in islice(_foreign(participant, found, names), _MAX_FOREIGN):
+            _add_endpoint(parties, names, NodeEndpoint(own[each.gid], each), kind)
+    for node, kind, endpoint in islice(_foreign_endpoints(participant, found, names), _MAX_FOREIGN_ENDPOINTS):
         _add_foreign(graph, node, kind, endpoint, names)
         if endpoint is not None and ros_service(endpoint.topic) is None:
-            _add_party(parties, names, Party(node.name, endpoint), kind)
+            _add_endpoint(parties, names, NodeEndpoint(node.name, endpoint), kind)
     alerts = (
         alert
         for topic, each in sorted(parties.items())
@@ -100,12 +100,14 @@ def graph_of(participant: Participant) -> GraphView:
     return graph.view()
 
 
-def _add_party(parties: dict[str, dict[str, list[Party]]], names: _Names, party: Party, kind: str) -> None:
+def _add_endpoint(
+    parties: dict[str, dict[str, list[NodeEndpoint]]], names: _Names, party: NodeEndpoint, kind: str
+) -> None:
     topic = names.topic(party.endpoint)
     parties.setdefault(topic, {"writer": [], "reader": []})[kind].append(party)
 
 
-def _add_local(graph: Graph, local: Local, names: _Names) -> None:
+def _add_local(graph: Graph, local: LocalNode, names: _Names) -> None:
     publishers, subscribers = local.publishers, local.subscribers
     servers, clients = local.servers, local.clients
     specs: list[PublisherSpec | SubscriberSpec] = [each.spec for each in publishers]
@@ -133,7 +135,7 @@ def _add_local(graph: Graph, local: Local, names: _Names) -> None:
     graph.apply(Renew(node.id, graph.epoch, graph.revision, *counts, local.load()), 0, 0.0, node.id)
 
 
-def _foreign(
+def _foreign_endpoints(
     participant: Participant, all_found: Sequence[tuple[str, DdsEndpoint]], names: _Names
 ) -> Iterator[tuple[NodeRecord, str, DdsEndpoint | None]]:
     # Yields foreign writers and readers with their node, and None for nodes without any.
@@ -147,10 +149,10 @@ def _foreign(
         each.gid: each.announced["nepnode"] for _kind, each in found if each.announced.get("nepnode")
     }
     owners: dict[bytes, NodeRecord] = {}
-    for gid, nodes in sorted(participant.others(alive).items()):
+    for gid, nodes in sorted(participant.remote_nodes(alive).items()):
         for number, node in enumerate(nodes):
             node_id = next((announced_ids[one] for one in sorted(node.gids) if one in announced_ids), "")
-            record = _record(node_id or _id_from(gid + number.to_bytes(4, "little")), node.name)
+            record = _node_record(node_id or _hashed_id(gid + number.to_bytes(4, "little")), node.name)
             owners.update(dict.fromkeys(node.gids, record))
             yield record, "", None
     unknown_nodes = {each.participant: _unknown_node(each.participant) for _kind, each in found}
@@ -158,16 +160,16 @@ def _foreign(
         yield owners.get(each.gid) or unknown_nodes[each.participant], kind, each
 
 
-def _id_from(data: bytes) -> str:
+def _hashed_id(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:16]
 
 
-def _record(node_id: str, name: str) -> NodeRecord:
+def _node_record(node_id: str, name: str) -> NodeRecord:
     return NodeRecord(node_id, name, "", None, language="", generation="ros2")
 
 
 def _unknown_node(gid: bytes) -> NodeRecord:
-    return _record(_id_from(gid), f"dds/{gid.hex()[:24]}")
+    return _node_record(_hashed_id(gid), f"dds/{gid.hex()[:24]}")
 
 
 def _add_foreign(

@@ -14,14 +14,14 @@ from typing import Any, NamedTuple
 
 from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
-from nep.system.forks import in_child
+from nep.system.forks import call_in_child
 
-_PARTS = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
+_MODULE_NAMES = ("core", "domain", "idl", "pub", "sub", "topic", "qos", "builtin")
 _MACHINES_WITH_WHEELS = frozenset({"x86_64", "amd64"})
-_DESCRIPTORS = "/proc/self/fd"
+_FD_FOLDER = "/proc/self/fd"
 _PORTS, _PORTS_OF_A_DOMAIN = 7400, 250
 """Base port of domain 0, and number of ports per domain, as the DDS wire protocol (RTPS) specifies."""
-_inherited: set[str] = set()
+_inherited_libraries: set[str] = set()
 """Names of libraries that were in use before a fork. In the child process their threads don't exist."""
 
 
@@ -38,14 +38,14 @@ class Dds(NamedTuple):
     builtin: Any
 
 
-def dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
+def load_dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
     """Load and return the modules of Cyclone DDS.
 
     Raises:
         BackendUnavailableError: cyclonedds is not installed or can't be loaded.
         NepError: The process was forked from one that uses cyclonedds.
     """
-    if _inherited:
+    if _inherited_libraries:
         raise NepError(
             _(
                 "'ros2' does not work in a forked process of a program that uses it; start the process "
@@ -53,20 +53,20 @@ def dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds:
             )
         )
     try:
-        return Dds(*(load(f"cyclonedds.{part}") for part in _PARTS))
+        return Dds(*(load(f"cyclonedds.{part}") for part in _MODULE_NAMES))
     except Exception as error:  # its loader raises its own exception class
-        raise _unavailable() from error
+        raise _unavailable_error() from error
 
 
-def typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - see `Dds`
+def load_typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - see `Dds`
     """Return `rosbags.typesys`. Raises `BackendUnavailableError` if it is not installed."""
     try:
         return load("rosbags.typesys")
     except (ImportError, OSError) as error:
-        raise _unavailable() from error
+        raise _unavailable_error() from error
 
 
-def _unavailable() -> BackendUnavailableError:
+def _unavailable_error() -> BackendUnavailableError:
     if sys.platform != "darwin" and platform.machine().lower() not in _MACHINES_WITH_WHEELS:
         needs = _(
             "Cyclone DDS has no wheel for '{machine}'; build 'cyclonedds' 11 on this computer and "
@@ -76,7 +76,7 @@ def _unavailable() -> BackendUnavailableError:
     return BackendUnavailableError("ros2", _("install it with 'pip install nep-studio[ros2]'"))
 
 
-def keep_to_loopback(domain: int) -> None:
+def restrict_to_loopback(domain: int) -> None:
     """Restrict the receiving sockets of a domain to the loopback interface. Linux only.
 
     Needed because Cyclone DDS always binds them to all addresses.
@@ -84,7 +84,7 @@ def keep_to_loopback(domain: int) -> None:
     if not sys.platform.startswith("linux"):
         return
     first = _PORTS + _PORTS_OF_A_DOMAIN * domain
-    for each in Path(_DESCRIPTORS).iterdir():
+    for each in Path(_FD_FOLDER).iterdir():
         try:
             if not each.is_socket():
                 continue
@@ -102,7 +102,7 @@ def keep_to_loopback(domain: int) -> None:
 
 def has_forked() -> bool:
     """Return True in a forked child process, where DDS must not be used."""
-    return bool(_inherited)
+    return bool(_inherited_libraries)
 
 
 def _forked() -> None:
@@ -110,7 +110,7 @@ def _forked() -> None:
     core = sys.modules.get("cyclonedds.core")
     if core is None:
         return
-    _inherited.add("cyclonedds")
+    _inherited_libraries.add("cyclonedds")
     # keeps the finalizers from deleting anything
     for entity in list(core.Entity._entities.values()):  # noqa: SLF001
         if isinstance(entity, core.WaitSet):
@@ -118,4 +118,4 @@ def _forked() -> None:
     core.Entity._entities.clear()  # noqa: SLF001
 
 
-in_child(_forked)
+call_in_child(_forked)

@@ -12,7 +12,7 @@ from typing import Any
 
 from nep.backends.ros2.library import Dds
 from nep.backends.ros2.message_types import MessageTypes
-from nep.backends.ros2.topics import DdsTopics, sample_of
+from nep.backends.ros2.topics import DdsTopics, create_sample
 from nep.errors import DecodeError
 
 GID_BYTES, PREFIX_BYTES = 16, 12
@@ -47,8 +47,8 @@ class Matches:
         self._has_changes = False
         self._confirmed: dict[bytes, frozenset[tuple[bytes, bytes]]] = {}
         self._sample_class = topics.sample_class(_TYPE)
-        self._writer = topics.state_writer(_TOPIC, _TYPE)
-        self.reader = topics.state_reader(_TOPIC, _TYPE)
+        self._writer = topics.create_state_writer(_TOPIC, _TYPE)
+        self.reader = topics.create_state_reader(_TOPIC, _TYPE)
 
     def add(self, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """Add a writer or reader of this program."""
@@ -75,7 +75,7 @@ class Matches:
         pairs = sorted(own + other for own, found in self._found.items() for other in found)
         data = b"".join((self._gid, *pairs[:_MAX_PAIRS]))
         if data != self._published:
-            self._writer.write(sample_of(self._sample_class, self._types.encode(_TYPE, {"data": data})))
+            self._writer.write(create_sample(self._sample_class, self._types.encode(_TYPE, {"data": data})))
             self._published = data
 
     def _is_own(self, gid: bytes) -> bool:
@@ -111,7 +111,9 @@ class Matches:
         """
         return self._is_own(other) or (other, own) in self._confirmed.get(participant, ())
 
-    def unready(self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]) -> set[bytes]:
+    def unmatched_gids(
+        self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]
+    ) -> set[bytes]:
         """Return the GUIDs in `known` that aren't matched on both sides.
 
         Args:

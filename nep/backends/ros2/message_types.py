@@ -14,31 +14,31 @@ from typing import Any
 
 from nep.backends.ros2.environment import distribution
 from nep.backends.ros2.fields import (
-    PLACEHOLDER,
+    PLACEHOLDER_FIELD,
     RosField,
     RosFieldError,
     from_message,
     read_definition,
     to_message,
 )
-from nep.backends.ros2.library import typesys
+from nep.backends.ros2.library import load_typesys
 from nep.backends.ros2.names import type_name
 from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
 
-FOLDERS = "NEP_ROS_MSG_PATH"
+FOLDERS_VARIABLE = "NEP_ROS_MSG_PATH"
 """Environment variable that lists folders of .msg files."""
 _MAX_FILE_BYTES = 2**20
 _MAX_FILES = 10_000
-_WIDE = "wstring"
-_GID = "rmw_dds_common/msg/Gid"
+_WIDE_STRING = "wstring"
+_GID_TYPE = "rmw_dds_common/msg/Gid"
 
 
 class MessageTypes:
     """Message types of one ROS 2 release. Thread-safe."""
 
     def __init__(self, release: str) -> None:
-        rosbags = typesys()
+        rosbags = load_typesys()
         try:
             store = rosbags.Stores[f"ROS2_{release.upper()}"]
         except KeyError:
@@ -71,7 +71,7 @@ class MessageTypes:
     @property
     def gid_bytes(self) -> int:
         """Length in bytes of a GUID in this release's `ros_discovery_info`."""
-        return self._fields[_GID][0].size if _GID in self._fields else 24
+        return self._fields[_GID_TYPE][0].size if _GID_TYPE in self._fields else 24
 
     def checked(self, msg_type: str) -> str:
         """Return the full name of a type. Raises `NepError` if the type is unknown."""
@@ -83,7 +83,7 @@ class MessageTypes:
                 _(
                     "unknown message type '{name}'; {did_you_mean} (or set {variable} to a folder of "
                     ".msg files)"
-                ).format(name=name, did_you_mean=_near(name, self.names), variable=FOLDERS)
+                ).format(name=name, did_you_mean=_suggestion(name, self.names), variable=FOLDERS_VARIABLE)
             )
         return name
 
@@ -145,10 +145,10 @@ class MessageTypes:
             ) from error
         with self._lock:
             fields = read_definition(found[1])[1]
-            for wrong in self._missing({name: fields}).values():
+            for wrong in self._missing_type_errors({name: fields}).values():
                 raise wrong
-            known = [each for each in self._fields.get(name, fields) if each.name != PLACEHOLDER]
-            if known != [each for each in fields if each.name != PLACEHOLDER]:
+            known = [each for each in self._fields.get(name, fields) if each.name != PLACEHOLDER_FIELD]
+            if known != [each for each in fields if each.name != PLACEHOLDER_FIELD]:
                 raise NepError(
                     _(
                         "'{name}' is already defined with other fields; choose another name, or restart "
@@ -196,7 +196,7 @@ class MessageTypes:
                 )
         with self._lock:
             fields = {name: read_definition(entries)[1] for name, (_constants, entries) in found.items()}
-            while missing := self._missing(fields):
+            while missing := self._missing_type_errors(fields):
                 wrong.update(missing)
                 fields = {name: each for name, each in fields.items() if name not in missing}
             same = {name for name in fields if name in self._fields and self._fields[name] == fields[name]}
@@ -212,7 +212,7 @@ class MessageTypes:
             self._read_definitions()
         return wrong
 
-    def _missing(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
+    def _missing_type_errors(self, fields: Mapping[str, Sequence[RosField]]) -> dict[str, NepError]:
         # Types that use unknown types.
         wide = _(
             "'{name}' has the field '{field}' of type wstring, which 'ros2' does not support; use a string"
@@ -224,7 +224,7 @@ class MessageTypes:
         )
         return {
             name: NepError(
-                (wide if field.kind.endswith(f"/{_WIDE}") else unknown).format(
+                (wide if field.kind.endswith(f"/{_WIDE_STRING}") else unknown).format(
                     name=name, field=field.name, kind=field.kind
                 )
             )
@@ -234,13 +234,17 @@ class MessageTypes:
         }
 
 
-def _near(name: str, known: tuple[str, ...]) -> str:
+def _suggestion(name: str, known: tuple[str, ...]) -> str:
     ending = name.rpartition("/")[2].lower()
     alike = [each for each in known if each.rpartition("/")[2].lower() == ending]
-    return did_you_mean(name, tuple(alike) or known) if alike or len(known) < 10 else _near_any(name, known)
+    return (
+        did_you_mean(name, tuple(alike) or known)
+        if alike or len(known) < 10
+        else _short_suggestion(name, known)
+    )
 
 
-def _near_any(name: str, known: tuple[str, ...]) -> str:
+def _short_suggestion(name: str, known: tuple[str, ...]) -> str:
     said = did_you_mean(name, known)
     return said if len(said) < 200 else _("see 'nep.backends.ros2.message_types().names'")
 
@@ -258,7 +262,7 @@ def message_types() -> MessageTypes:
     with _types_lock:
         if release not in _types:
             types = MessageTypes(release)
-            for folder in os.environ.get(FOLDERS, "").split(os.pathsep):
+            for folder in os.environ.get(FOLDERS_VARIABLE, "").split(os.pathsep):
                 if folder:
                     types.add_folder(Path(folder))
             _types[release] = types

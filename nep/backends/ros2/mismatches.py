@@ -20,21 +20,23 @@ _MAX_ENDPOINTS = 100
 
 
 @dataclass(frozen=True)
-class Party:
+class NodeEndpoint:
     """Writer or reader with the name of its node."""
 
     node: str
     endpoint: DdsEndpoint
 
 
-def mismatches(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Iterator[Alert]:
+def mismatches(
+    topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[NodeEndpoint]
+) -> Iterator[Alert]:
     """Yield alerts for readers that can't receive from a writer of the topic."""
-    readers, writers = tuple(_unique(readers[:_MAX_ENDPOINTS])), writers[:_MAX_ENDPOINTS]
+    readers, writers = tuple(_merge_readers(readers[:_MAX_ENDPOINTS])), writers[:_MAX_ENDPOINTS]
     kinds: tuple[tuple[Callable[[DdsEndpoint, DdsEndpoint], bool], Callable[..., Alert]], ...] = (
-        (lambda writer, reader: writer.type != reader.type, _other_type),
-        (_have_different_definitions, _other_definition),
-        (lambda writer, reader: reader.is_reliable and not writer.is_reliable, _unreliable),
-        (lambda writer, reader: reader.is_latched and not writer.is_latched, _not_latched),
+        (lambda writer, reader: writer.type != reader.type, _type_alert),
+        (_have_different_definitions, _definition_alert),
+        (lambda writer, reader: reader.is_reliable and not writer.is_reliable, _reliability_alert),
+        (lambda writer, reader: reader.is_latched and not writer.is_latched, _durability_alert),
     )
     for is_wrong, alert in kinds:
         pairs = [
@@ -44,9 +46,9 @@ def mismatches(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -
             yield alert(topic, [one for one, _other in pairs], [other for _one, other in pairs])
 
 
-def _unique(readers: Iterable[Party]) -> Iterator[Party]:
+def _merge_readers(readers: Iterable[NodeEndpoint]) -> Iterator[NodeEndpoint]:
     # A subscriber of nep may have two readers; keep the one with the weaker requirements.
-    known: dict[str, Party] = {}
+    known: dict[str, NodeEndpoint] = {}
     for each in readers:
         key = each.endpoint.announced.get("nepid") or each.endpoint.gid.hex()
         other = known.get(key)
@@ -60,7 +62,7 @@ def _have_different_definitions(writer: DdsEndpoint, reader: DdsEndpoint) -> boo
     return writer.type == reader.type and all(hashes) and hashes[0] != hashes[1]
 
 
-def _named(parties: Iterable[Party]) -> str:
+def _node_names(parties: Iterable[NodeEndpoint]) -> str:
     unique_names = sorted({each.node for each in parties})
     names = ", ".join(f"“{name}”" for name in unique_names[:_MAX_NAMES])
     if len(unique_names) <= _MAX_NAMES:
@@ -68,19 +70,19 @@ def _named(parties: Iterable[Party]) -> str:
     return _("{names} and {count} more").format(names=names, count=len(unique_names) - _MAX_NAMES)
 
 
-def _type_of(parties: Sequence[Party]) -> str:
+def _type_of(parties: Sequence[NodeEndpoint]) -> str:
     return ros_type(parties[0].endpoint.type)
 
 
-def _other_type(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+def _type_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[NodeEndpoint]) -> Alert:
     return Alert(
         f"ros2-type:{topic}",
         _(
             "{readers} does not receive “{topic}” from {writers}: it requests “{wanted}”, but the "
             "publisher offers “{sent}”"
         ).format(
-            readers=_named(readers),
-            writers=_named(writers),
+            readers=_node_names(readers),
+            writers=_node_names(writers),
             topic=topic,
             wanted=_type_of(readers),
             sent=_type_of(writers),
@@ -89,11 +91,11 @@ def _other_type(topic: str, writers: Sequence[Party], readers: Sequence[Party]) 
     )
 
 
-def _other_definition(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+def _definition_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[NodeEndpoint]) -> Alert:
     return Alert(
         f"ros2-definition:{topic}",
         _("{readers} and {writers} have different definitions of “{kind}” on “{topic}”").format(
-            readers=_named(readers), writers=_named(writers), kind=_type_of(readers), topic=topic
+            readers=_node_names(readers), writers=_node_names(writers), kind=_type_of(readers), topic=topic
         ),
         _(
             "Use the same .msg file and the same ROS_DISTRO for both programs; until then, received "
@@ -102,23 +104,23 @@ def _other_definition(topic: str, writers: Sequence[Party], readers: Sequence[Pa
     )
 
 
-def _unreliable(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+def _reliability_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[NodeEndpoint]) -> Alert:
     return Alert(
         f"ros2-reliability:{topic}",
         _(
             "{readers} does not receive “{topic}” from {writers}: it requests “reliable”, but the "
             "publisher offers “best effort”"
-        ).format(readers=_named(readers), writers=_named(writers), topic=topic),
+        ).format(readers=_node_names(readers), writers=_node_names(writers), topic=topic),
         _("Subscribe with qos='sensor' or qos='best_effort', or publish with qos='reliable'."),
     )
 
 
-def _not_latched(topic: str, writers: Sequence[Party], readers: Sequence[Party]) -> Alert:
+def _durability_alert(topic: str, writers: Sequence[NodeEndpoint], readers: Sequence[NodeEndpoint]) -> Alert:
     return Alert(
         f"ros2-durability:{topic}",
         _(
             "{readers} does not receive “{topic}” from {writers}: it requests earlier messages "
             "(“transient local”), but the publisher does not keep them (“volatile”)"
-        ).format(readers=_named(readers), writers=_named(writers), topic=topic),
+        ).format(readers=_node_names(readers), writers=_node_names(writers), topic=topic),
         _("Publish with latched=True, or subscribe with the durability “volatile”."),
     )

@@ -12,18 +12,18 @@ from nep.text import quotable
 _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)
-_PARAMETERS = re.compile(r"(/?nep/parameters/)(\d[0-9a-f]{15})", re.ASCII)
+_PARAMETER_TOPIC = re.compile(r"(/?nep/parameters/)(\d[0-9a-f]{15})", re.ASCII)
 """Parameter topics of nodes whose id starts with a digit. ROS 2 doesn't allow a digit after "/"."""
-_ROS_PARAMETERS = re.compile(r"(/nep/parameters/)_(\d[0-9a-f]{15})", re.ASCII)
+_ROS_PARAMETER_TOPIC = re.compile(r"(/nep/parameters/)_(\d[0-9a-f]{15})", re.ASCII)
 _SERVICE_TYPE = re.compile(r"([A-Za-z]\w*)(/srv)?/([A-Z]\w*)", re.ASCII)
 _DDS_REQUEST = re.compile(r"(\w+)::srv::dds_::(\w+)_Request_", re.ASCII)
-_REQUESTS = re.compile(r"rq(/.+)Request", re.ASCII)
-_NO_NAME = re.compile(r"\W", re.ASCII)
+_REQUEST_TOPIC = re.compile(r"rq(/.+)Request", re.ASCII)
+_INVALID_CHARACTERS = re.compile(r"\W", re.ASCII)
 
 
 def dds_topic(topic: str) -> str:
     """Return the DDS topic of a topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
-    found = _PARAMETERS.fullmatch(topic)
+    found = _PARAMETER_TOPIC.fullmatch(topic)
     if found is not None:
         topic = f"{found[1]}_{found[2]}"
     if _TOPIC.fullmatch(topic) is None or "__" in topic:
@@ -39,12 +39,12 @@ def dds_topic(topic: str) -> str:
 
 def ros_topic(topic: str) -> str | None:
     """Return the topic of a DDS topic: `/chatter` for "rt/chatter"; None for DDS topics outside ROS 2."""
-    return _as_nep_has_it(topic[2:]) if topic.startswith("rt/") else None
+    return _restore_parameter_topic(topic[2:]) if topic.startswith("rt/") else None
 
 
-def _as_nep_has_it(name: str) -> str:
+def _restore_parameter_topic(name: str) -> str:
     # Removes the "_" that `dds_topic` inserts into parameter topics.
-    found = _ROS_PARAMETERS.fullmatch(name)
+    found = _ROS_PARAMETER_TOPIC.fullmatch(name)
     return name if found is None else f"{found[1]}{found[2]}"
 
 
@@ -82,8 +82,8 @@ def dds_service(service: str) -> tuple[str, str]:
 
 def ros_service(topic: str) -> str | None:
     """Return the service of a request topic: `/add` for "rq/addRequest"; None for other DDS topics."""
-    found = _REQUESTS.fullmatch(topic)
-    return None if found is None else _as_nep_has_it(found[1])
+    found = _REQUEST_TOPIC.fullmatch(topic)
+    return None if found is None else _restore_parameter_topic(found[1])
 
 
 def service_type_of(dds_type: str) -> str | None:
@@ -106,17 +106,17 @@ def ros_type(dds_type: str) -> str:
 
 def split_node_name(name: str) -> tuple[str, str]:
     """Return a node's namespace and name as ROS 2 allows them; invalid characters become "_"."""
-    *spaces, last = [_NO_NAME.sub("_", part) for part in name.split("/") if part] or ["_"]
+    *spaces, last = [_INVALID_CHARACTERS.sub("_", part) for part in name.split("/") if part] or ["_"]
     parts = [f"_{part}" if part[:1].isdigit() else part for part in (*spaces, last)]
     return "/" + "/".join(parts[:-1]), parts[-1]
 
 
-def user_data(entries: Mapping[str, str]) -> bytes:
+def encode_user_data(entries: Mapping[str, str]) -> bytes:
     """Encode entries of USER_DATA as `key=value;`."""
     return "".join(f"{key}={value};" for key, value in entries.items()).encode("ascii")
 
 
-def user_data_of(data: bytes) -> dict[str, str]:
+def decode_user_data(data: bytes) -> dict[str, str]:
     """Decode the entries of USER_DATA. Malformed entries are skipped."""
     entries = (entry.partition("=") for entry in data.decode("ascii", "replace").split(";"))
     return {key: value for key, _equals, value in entries if key and value}

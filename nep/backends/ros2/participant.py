@@ -16,13 +16,13 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, Protocol
 
-from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec
-from nep.backends.ros2.environment import PARTICIPANTS_MAX, configuration, is_loopback_only
-from nep.backends.ros2.library import Dds, dds, keep_to_loopback
+from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec
+from nep.backends.ros2.environment import PARTICIPANTS_MAX, cyclonedds_config, is_loopback_only
+from nep.backends.ros2.library import Dds, load_dds, restrict_to_loopback
 from nep.backends.ros2.matches import Matches
 from nep.backends.ros2.message_types import MessageTypes, message_types
-from nep.backends.ros2.names import split_node_name, user_data, user_data_of
-from nep.backends.ros2.topics import DdsTopics, sample_of
+from nep.backends.ros2.names import decode_user_data, encode_user_data, split_node_name
+from nep.backends.ros2.topics import DdsTopics, create_sample
 from nep.backends.services import ClientSpec, ServerSpec
 from nep.errors import DecodeError, NepError
 from nep.i18n import _
@@ -34,14 +34,14 @@ from nep.protocol.requests import (
     SubscriberRecord,
 )
 from nep.system import forks
-from nep.system.descriptors import check_room
+from nep.system.descriptors import check_free_descriptors
 
 _logger = logging.getLogger("nep")
-_INFO = "rmw_dds_common/msg/ParticipantEntitiesInfo"
+_INFO_TYPE = "rmw_dds_common/msg/ParticipantEntitiesInfo"
 _INFO_TOPIC = "ros_discovery_info"
 _MAX_PARTICIPANTS = 4096
 """Maximum number of other participants that are tracked."""
-_PARTICIPANT_FILES = 16
+_FDS_PER_PARTICIPANT = 16
 """Number of file descriptors per participant."""
 _SETTLE_S = 0.3
 """Time in seconds after which a new participant has discovered the others, which respond in milliseconds."""
@@ -69,12 +69,12 @@ class DdsEndpoint:
     is_reliable: bool
     announced: dict[str, str]
 
-    def is_of(self, kind: str, type_hash: str) -> bool:
+    def has_type(self, kind: str, type_hash: str) -> bool:
         """Return True if the endpoint has this type and doesn't announce another definition of the type."""
         return self.type == kind and self.announced.get("typehash", type_hash) == type_hash
 
 
-class Local(Protocol):
+class LocalNode(Protocol):
     """Node of this process, as its participant uses it."""
 
     node: NodeRecord
@@ -160,7 +160,7 @@ class LocalClient(Protocol):
 
 @dataclass
 class _Member:
-    local: Local
+    local: LocalNode
     gids: dict[str, set[bytes]] = field(default_factory=lambda: {"reader": set(), "writer": set()})
 
 
@@ -169,7 +169,7 @@ class Participant:
 
     def __init__(self, number: int) -> None:
         self.number = number
-        self.dds: Dds = dds()
+        self.dds: Dds = load_dds()
         self.types: MessageTypes = message_types()
         self.changed = threading.Condition(threading.RLock())
         """Guards all state; notified when endpoints change."""
@@ -177,7 +177,7 @@ class Participant:
         self._others: dict[bytes, tuple[RosNode, ...]] = {}
         self._reads: dict[int, tuple[Any, Any, Callable[[], None]]] = {}
         self._is_closing = self._has_changes = self._is_settled = False
-        check_room(_PARTICIPANT_FILES, "a participant of ROS 2")
+        check_free_descriptors(_FDS_PER_PARTICIPANT, "a participant of ROS 2")
         try:
             self._open()
         except self.dds.core.DDSException as error:
@@ -196,14 +196,14 @@ class Participant:
     def _open(self) -> None:
         core, builtin = self.dds.core, self.dds.builtin
         self._domain: Any = None
-        settings = configuration(os.environ)
+        settings = cyclonedds_config(os.environ)
         if settings is not None:
-            self._domain = self._own_domain(settings)
+            self._domain = self._create_domain(settings)
         self.entity = self.dds.domain.DomainParticipant(
-            self.number, self.qos(policy(self.dds).Userdata(user_data({"enclave": "/"})))
+            self.number, self.qos(policy_classes(self.dds).Userdata(encode_user_data({"enclave": "/"})))
         )
         if self._domain is not None and is_loopback_only(os.environ):
-            keep_to_loopback(self.number)
+            restrict_to_loopback(self.number)
         self.gid = self.entity.guid.bytes
         self.topics = DdsTopics(self.dds, self.types, self.entity)
         """DDS topics; guarded by `changed`."""
@@ -224,17 +224,17 @@ class Participant:
             news = core.ReadCondition(
                 reader, core.ViewState.Any | core.SampleState.NotRead | core.InstanceState.Any
             )
-            self.watch(reader, news, partial(self._note_changes, reader, news))
-        self._info_writer = self.topics.state_writer(_INFO_TOPIC, _INFO)
+            self.watch(reader, news, partial(self._mark_changed, reader, news))
+        self._info_writer = self.topics.create_state_writer(_INFO_TOPIC, _INFO_TYPE)
         self.matches = Matches(self.dds, self.types, self.topics, self.gid)
         for state, process in (
-            (self.topics.state_reader(_INFO_TOPIC, _INFO), self._process_info),
+            (self.topics.create_state_reader(_INFO_TOPIC, _INFO_TYPE), self._process_info),
             (self.matches.reader, self.matches.process),
         ):
             ready = core.ReadCondition(state, any_state | core.InstanceState.Any)
             self.watch(state, ready, partial(_read_states, state, ready, process))
 
-    def _own_domain(self, settings: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+    def _create_domain(self, settings: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         try:
             return self.dds.domain.Domain(self.number, settings)
         except self.dds.core.DDSException as error:
@@ -253,12 +253,12 @@ class Participant:
         with self.changed:
             while (left := self._began_at + _SETTLE_S - time.monotonic()) > 0.0 and not self._is_closing:
                 self.changed.wait(left)
-            deadline = time.monotonic() + HANDSHAKE_S
-            while not self._is_complete() and (left := deadline - time.monotonic()) > 0.0:
+            deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
+            while not self._is_discovery_complete() and (left := deadline - time.monotonic()) > 0.0:
                 self.changed.wait(min(left, _POLL_S))
             self._is_settled = True
 
-    def _is_complete(self) -> bool:
+    def _is_discovery_complete(self) -> bool:
         # True if all ROS 2 participants have announced their nodes and the endpoints of these are discovered.
         if self._is_closing:
             return True
@@ -270,7 +270,7 @@ class Participant:
 
     # ---- nodes
 
-    def add(self, local: Local) -> None:
+    def add(self, local: LocalNode) -> None:
         """Add a node of this process."""
         with self.changed:
             self._members[local.node.id] = _Member(local)
@@ -293,7 +293,7 @@ class Participant:
             self.matches.add(entity)
             self._waitset.attach(entity)
 
-    def withdraw(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+    def remove_endpoint(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         """Remove a writer or reader (`kind`) from a node and delete it."""
         with self.changed:
             if node_id in self._members:
@@ -317,19 +317,19 @@ class Participant:
                 }
             )
         info = {"gid": self._gid_field(self.gid), "node_entities_info_seq": entries}
-        cdr = self.types.encode(_INFO, info)
-        self._info_writer.write(sample_of(self.topics.sample_class(_INFO), cdr))
+        cdr = self.types.encode(_INFO_TYPE, info)
+        self._info_writer.write(create_sample(self.topics.sample_class(_INFO_TYPE), cdr))
 
     def _gid_field(self, gid: bytes) -> dict[str, bytes]:
         return {"data": gid.ljust(self.types.gid_bytes, b"\0")}
 
-    def _note_changes(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
+    def _mark_changed(self, reader: Any, news: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         reader.read(_READ_MAX, news)
         self._has_changes = True
 
     def _process_info(self, cdr: bytes) -> None:
         try:
-            info: Any = self.types.decode(_INFO, cdr)
+            info: Any = self.types.decode(_INFO_TYPE, cdr)
         except DecodeError as error:
             _logger.debug("malformed message on ros_discovery_info: %s", error)
             return
@@ -364,12 +364,12 @@ class Participant:
             }
 
     @property
-    def locals(self) -> tuple[Local, ...]:
+    def local_nodes(self) -> tuple[LocalNode, ...]:
         """Nodes of this process."""
         with self.changed:
             return tuple(each.local for each in self._members.values())
 
-    def others(self, alive: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
+    def remote_nodes(self, alive: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
         """Return the nodes of other participants. Participants that are not in `alive` are removed."""
         with self.changed:
             self._others = {gid: nodes for gid, nodes in self._others.items() if gid in alive}
@@ -386,12 +386,12 @@ class Participant:
                 reader, core.ViewState.Any | core.SampleState.Any | core.InstanceState.Alive
             )
             found = reader.read(_READ_MAX, alive)
-        announced = policy(self.dds).Userdata
+        announced = policy_classes(self.dds).Userdata
         return frozenset(
             each.key.bytes
             for each in found
             if not with_nodes
-            or (announced in each.qos and "enclave" in user_data_of(each.qos[announced].data))
+            or (announced in each.qos and "enclave" in decode_user_data(each.qos[announced].data))
         )
 
     def endpoints(self, kind: str, topic: str | None = None) -> list[DdsEndpoint]:
@@ -402,14 +402,14 @@ class Participant:
             reader, alive = self._alive[kind]
             found = reader.read(_READ_MAX, alive)
         return [
-            self.described(each)
+            self.to_endpoint(each)
             for each in found
             if each.topic_name is not None and (topic is None or each.topic_name == topic)
         ]
 
-    def described(self, found: Any) -> DdsEndpoint:  # noqa: ANN401 - cyclonedds is not typed
+    def to_endpoint(self, found: Any) -> DdsEndpoint:  # noqa: ANN401 - cyclonedds is not typed
         """Convert discovery data of a writer or reader."""
-        policies = policy(self.dds)
+        policies = policy_classes(self.dds)
         has_data = policies.Userdata in found.qos
         return DdsEndpoint(
             found.key.bytes,
@@ -418,7 +418,7 @@ class Participant:
             found.type_name,
             policies.Durability.Volatile not in found.qos and policies.Durability in found.qos,
             policies.Reliability.BestEffort not in found.qos,
-            user_data_of(found.qos[policies.Userdata].data) if has_data else {},
+            decode_user_data(found.qos[policies.Userdata].data) if has_data else {},
         )
 
     # ---- the thread
@@ -437,10 +437,10 @@ class Participant:
                 self._waitset.detach(found[1])
 
     def _run(self) -> None:
-        while not self._ends():
+        while not self._should_stop():
             self._waitset.wait(1_000_000_000)
             with self.changed:
-                if self._ends():
+                if self._should_stop():
                     return
                 for _reader, condition, read in list(self._reads.values()):
                     if condition.is_triggered():
@@ -452,10 +452,10 @@ class Participant:
                         _run_logged(member.local.endpoints_changed)
                 self.changed.notify_all()
 
-    def _ends(self) -> bool:
+    def _should_stop(self) -> bool:
         return self._is_closing
 
-    def is_in_its_thread(self) -> bool:
+    def is_own_thread(self) -> bool:
         """Return True if called in the participant's thread."""
         return threading.current_thread() is self._thread
 
@@ -504,7 +504,7 @@ def _delete(entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
     entity.__del__()
 
 
-def policy(library: Dds) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+def policy_classes(library: Dds) -> Any:  # noqa: ANN401 - cyclonedds is not typed
     """Return the policy classes of cyclonedds."""
     return library.qos.Policy
 
@@ -515,7 +515,7 @@ _participants: dict[int, Participant] = {}
 _lock = threading.Lock()
 
 
-def join(local: Local, number: int) -> Participant:
+def join_domain(local: LocalNode, number: int) -> Participant:
     """Add a node to the process's participant in a domain; return the participant. Raises `NepError`."""
     with _lock:
         if number not in _participants:
@@ -524,7 +524,7 @@ def join(local: Local, number: int) -> Participant:
         return _participants[number]
 
 
-def leave(participant: Participant, node_id: str) -> None:
+def leave_domain(participant: Participant, node_id: str) -> None:
     """Remove a closed node from a participant. The participant is closed with its last node."""
     with _lock:
         if participant.remove(node_id):
@@ -540,4 +540,4 @@ def _forked() -> None:
     _participants.clear()
 
 
-forks.in_child(_forked)
+forks.call_in_child(_forked)

@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec
+from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec
 from nep.backends.ros2.library import has_forked
-from nep.backends.ros2.names import dds_topic, dds_type, user_data
+from nep.backends.ros2.names import dds_topic, dds_type, encode_user_data
 from nep.backends.ros2.participant import DdsEndpoint, Participant
-from nep.backends.ros2.quality import depth_of, policies_of
-from nep.backends.ros2.topics import sample_of
+from nep.backends.ros2.quality import qos_policies, queue_depth
+from nep.backends.ros2.topics import create_sample
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.errors import ClosedError, WireError
 from nep.i18n import _
@@ -42,10 +42,10 @@ def wait_for_matches(
     Returns:
         The names of the nodes that are not matched.
     """
-    deadline = time.monotonic() + HANDSHAKE_S
+    deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
     expected = [(each.gid, each.participant, "nepid" in each.announced) for each in known]
     with participant.changed:
-        while (unready := participant.matches.unready(entities(), expected)) and (
+        while (unready := participant.matches.unmatched_gids(entities(), expected)) and (
             left := deadline - time.monotonic()
         ) > 0.0:
             participant.changed.wait(min(left, _POLL_S))
@@ -61,7 +61,7 @@ def announcement(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberS
     announced = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
     if _PLAIN_TYPE.fullmatch(spec.msg_type):
         announced["neptype"] = spec.msg_type
-    return user_data(announced)
+    return encode_user_data(announced)
 
 
 class Ros2Publisher:
@@ -89,14 +89,14 @@ class Ros2Publisher:
         name, ros_type = dds_topic(spec.topic), self._mapping.ros_type
         type_hash = participant.types.type_hash(ros_type)
         announced = announcement(type_hash, node_id, spec)
-        depth = depth_of(spec.qos, spec.codec.name)
+        depth = queue_depth(spec.qos, spec.codec.name)
         with participant.changed:
             self._kind = participant.topics.sample_class(ros_type)
             self._writer: Any = library.pub.DataWriter(
                 participant.entity,
                 participant.topics.topic(name, ros_type),
                 participant.qos(
-                    *policies_of(
+                    *qos_policies(
                         library,
                         spec.qos,
                         depth,
@@ -111,7 +111,7 @@ class Ros2Publisher:
         wanted = [
             each
             for each in participant.endpoints("reader", name)
-            if each.is_of(dds_type(ros_type), type_hash)
+            if each.has_type(dds_type(ros_type), type_hash)
             and (is_reliable or not each.is_reliable)
             and (spec.is_latched or not each.is_latched)
         ]
@@ -146,11 +146,11 @@ class Ros2Publisher:
 
     def _id_of(self, handle: int) -> str:
         data = self._writer.get_matched_subscription_data(handle)
-        announced = {} if data is None else self._participant.described(data).announced
+        announced = {} if data is None else self._participant.to_endpoint(data).announced
         return announced.get("nepid") or f"handle {handle}"
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if any reader is matched."""
         with self._participant.changed:
             return not self._is_closed and bool(self._writer.get_matched_subscriptions())
@@ -165,14 +165,14 @@ class Ros2Publisher:
         """Set the reason why payloads can't be encoded, shown in the graph of this program."""
         self.problem = problem
 
-    def lend(self, size_bytes: int) -> memoryview | None:  # noqa: ARG002 - no shared memory
+    def borrow_memory(self, size_bytes: int) -> memoryview | None:  # noqa: ARG002 - no shared memory
         """Return None, because payloads are copied."""
         return None
 
     def send(self, encoded: Encoded) -> None:
         """Publish a message. Blocks for up to 0.1 s if the queue of a slow reader is full."""
         cdr = self._mapping.pack(encoded)
-        sample = sample_of(self._kind, cdr)
+        sample = create_sample(self._kind, cdr)
         if self._is_closed:
             raise ClosedError(f"publisher '{self.spec.topic}'")
         self._stamp_ns = time.time_ns()
@@ -214,4 +214,4 @@ class Ros2Publisher:
                 self._is_closed = True
                 if self._participant.has_closed():
                     return
-                self._participant.withdraw(self._node_id, "writer", self._writer)
+                self._participant.remove_endpoint(self._node_id, "writer", self._writer)

@@ -15,12 +15,12 @@ from __future__ import annotations
 from typing import Any
 
 from nep.backends.ros2.library import Dds
-from nep.backends.ros2.participant import policy
+from nep.backends.ros2.participant import policy_classes
 from nep.backends.ros2.type_mapping import CDR
 
-QUALITIES = ("reliable", "best_effort", "sensor")
+QOS_PROFILES = ("reliable", "best_effort", "sensor")
 _SENSOR_DEPTH = 5
-_BLOCKING_NS = 100_000_000
+_MAX_BLOCKING_NS = 100_000_000
 """Maximum time in nanoseconds that a message waits for room in a queue before it is lost; DDS's default."""
 _DEPTH_BY_CODEC = {"image": 16, "bytes": 200, CDR: 200}
 _DEFAULT_DEPTH = 8192
@@ -28,19 +28,19 @@ _DEFAULT_DEPTH = 8192
 _UNLIMITED = -1
 
 
-def depth_of(quality: str, codec: str) -> int:
+def queue_depth(quality: str, codec: str) -> int:
     """Return the queue depth in messages."""
     return _SENSOR_DEPTH if quality == "sensor" else _DEPTH_BY_CODEC.get(codec, _DEFAULT_DEPTH)
 
 
-def policies_of(
+def qos_policies(
     library: Dds, quality: str, depth: int, *, is_latched: bool, announced: bytes, history: int = 1
 ) -> tuple[Any, ...]:
     """Return the QoS policies of a writer or reader. `history` messages are kept for late readers."""
-    policies = policy(library)
+    policies = policy_classes(library)
     is_reliable = quality in ("", "reliable")
     found = [
-        policies.Reliability.Reliable(_BLOCKING_NS) if is_reliable else policies.Reliability.BestEffort,
+        policies.Reliability.Reliable(_MAX_BLOCKING_NS) if is_reliable else policies.Reliability.BestEffort,
         policies.Durability.TransientLocal if is_latched else policies.Durability.Volatile,
         policies.History.KeepLast(max(depth, history)),
         policies.DataRepresentation(use_cdrv0_representation=True),

@@ -20,24 +20,24 @@ from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.names import dds_topic, dds_type
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import announcement, wait_for_matches
-from nep.backends.ros2.quality import depth_of, policies_of
+from nep.backends.ros2.quality import qos_policies, queue_depth
 from nep.backends.ros2.type_mapping import mapping_for
 from nep.backends.waking import WakingSubscriber
 from nep.errors import WireError
 from nep.messages.history import MAX_HISTORY
-from nep.messages.message import Message, MessageKind, arrived
+from nep.messages.message import Message, MessageKind, received_message
 from nep.messages.queue import Inbox
 from nep.protocol.requests import NodeRecord, SubscriberCount, SubscriberRecord
 from nep.system.log_rarely import is_logged
 
 _logger = logging.getLogger("nep")
-_BATCH = 256
+_BATCH_SIZE = 256
 _BATCH_BYTES = 64 * 2**20
 _MAX_SOURCES = 4096
 """Maximum number of publishers that are tracked."""
 
 
-def id_of(gid: bytes, announced: str | None) -> int:
+def endpoint_id(gid: bytes, announced: str | None) -> int:
     """Return the id of a publisher or subscriber: the announced one, else one derived from its GUID."""
     try:
         number = int(announced or "", 16)
@@ -60,7 +60,7 @@ class ReaderOwner(Protocol):
     def wake(self) -> None:
         """End all waits in progress."""
 
-    def forget(self, subscriber: Ros2Subscriber) -> None:
+    def discard(self, subscriber: Ros2Subscriber) -> None:
         """Remove a closed subscriber."""
 
 
@@ -71,7 +71,7 @@ class _Source:
     kind: MessageKind
     newest_ns: int = -1
     is_caught_up: bool = False
-    held: list[tuple[int, Message]] = field(default_factory=list)
+    held_messages: list[tuple[int, Message]] = field(default_factory=list)
     """Messages with their time stamps that arrived before the publisher's history and are held back."""
 
 
@@ -100,7 +100,7 @@ class Ros2Subscriber(WakingSubscriber):
         writers = [
             each
             for each in participant.endpoints("writer", self._name)
-            if each.is_of(dds_type(self._mapping.ros_type), self._type_hash)
+            if each.has_type(dds_type(self._mapping.ros_type), self._type_hash)
             and (each.is_reliable or spec.qos in ("best_effort", "sensor"))
         ]
         with participant.changed:
@@ -119,12 +119,12 @@ class Ros2Subscriber(WakingSubscriber):
         self._has_latched = self._has_latched or is_latched
         library, core = participant.dds, participant.dds.core
         announced = announcement(self._type_hash, self._transport.node.id, spec)
-        depth = max(depth_of(spec.qos, self._mapping.codec.name), MAX_HISTORY if is_latched else 0)
+        depth = max(queue_depth(spec.qos, self._mapping.codec.name), MAX_HISTORY if is_latched else 0)
         reader = library.sub.DataReader(
             participant.entity,
             participant.topics.topic(self._name, self._mapping.ros_type),
             participant.qos(
-                *policies_of(library, spec.qos, depth, is_latched=is_latched, announced=announced)
+                *qos_policies(library, spec.qos, depth, is_latched=is_latched, announced=announced)
             ),
         )
         self._readers.append(reader)
@@ -144,11 +144,11 @@ class Ros2Subscriber(WakingSubscriber):
 
     def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
         # Runs in the participant's thread, with its lock held.
-        while samples := reader.take(_BATCH, ready):
+        while samples := reader.take(_BATCH_SIZE, ready):
             messages = [each for sample in samples for each in self._messages(reader, sample)]
             if messages:
-                self._put(messages)
-            if len(samples) < _BATCH:
+                self._enqueue(messages)
+            if len(samples) < _BATCH_SIZE:
                 return
 
     def _messages(self, reader: Any, sample: Any) -> list[Message]:  # noqa: ANN401 - see above
@@ -167,7 +167,7 @@ class Ros2Subscriber(WakingSubscriber):
                     "malformed message on '%s' (%d so far): %s", self.spec.topic, self.refused, error
                 )
             return []
-        message = arrived(source.kind, data, info.source_timestamp, 0, source.id)
+        message = received_message(source.kind, data, info.source_timestamp, 0, source.id)
         message.seq = None  # DDS doesn't expose its sequence numbers
         if source.kind.is_latched:
             return self._merge_history(reader, source, message, info.source_timestamp)
@@ -180,16 +180,16 @@ class Ros2Subscriber(WakingSubscriber):
             messages: list[tuple[int, Message]] = []
             if self._has_latched:
                 source.is_caught_up = True
-                if source.held and stamp_ns >= source.held[0][0]:
-                    messages, source.held = source.held, []
+                if source.held_messages and stamp_ns >= source.held_messages[0][0]:
+                    messages, source.held_messages = source.held_messages, []
             messages.append((stamp_ns, message))
         elif source.is_caught_up:
             return []
         else:
-            source.held.append((stamp_ns, message))
-            if len(source.held) <= MAX_HISTORY:
+            source.held_messages.append((stamp_ns, message))
+            if len(source.held_messages) <= MAX_HISTORY:
                 return []
-            messages, source.held = source.held, []
+            messages, source.held_messages = source.held_messages, []
         return self._without_duplicates(source, messages)
 
     def _without_duplicates(self, source: _Source, messages: list[tuple[int, Message]]) -> list[Message]:
@@ -204,9 +204,9 @@ class Ros2Subscriber(WakingSubscriber):
     def _release_held(self, handle: int) -> list[Message]:
         # A publisher has disappeared: deliver its held messages.
         source = self._sources.get(handle)
-        if source is None or not source.held:
+        if source is None or not source.held_messages:
             return []
-        messages, source.held = source.held, []
+        messages, source.held_messages = source.held_messages, []
         return self._without_duplicates(source, messages)
 
     def _source(self, reader: Any, handle: int) -> _Source:  # noqa: ANN401 - see above
@@ -214,12 +214,12 @@ class Ros2Subscriber(WakingSubscriber):
         if known is not None:
             return known
         found = reader.get_matched_publication_data(handle)
-        described = None if found is None else self._participant.described(found)
+        described = None if found is None else self._participant.to_endpoint(found)
         is_latched = described is not None and described.is_latched
         source = _Source(
-            id_of(handle.to_bytes(8, "little", signed=handle < 0), None)
+            endpoint_id(handle.to_bytes(8, "little", signed=handle < 0), None)
             if described is None
-            else id_of(described.gid, described.announced.get("nepid")),
+            else endpoint_id(described.gid, described.announced.get("nepid")),
             self._mapping.kind(self.spec.topic, self.spec.msg_type, is_latched=is_latched),
         )
         if described is not None:
@@ -228,7 +228,7 @@ class Ros2Subscriber(WakingSubscriber):
             self._sources[handle] = source
         return source
 
-    def _put(self, messages: list[Message]) -> None:
+    def _enqueue(self, messages: list[Message]) -> None:
         with self._transport.changed:
             if self.is_closed:
                 return
@@ -258,15 +258,15 @@ class Ros2Subscriber(WakingSubscriber):
     def take_batch(self) -> list[Message]:
         """Remove and return the messages for one call of the sink."""
         with self._transport.changed:
-            return self.inbox.take_all(_BATCH_BYTES)
+            return self.inbox.pop_all(_BATCH_BYTES)
 
     @property
     def lost(self) -> int | None:
         """Number of messages that DDS reports as lost, plus those dropped from the full queue."""
         with self._participant.changed:
-            return self._lost_before + self._lost_now() + self._dropped
+            return self._lost_before + self._lost_in_transit() + self._dropped
 
-    def _lost_now(self) -> int:
+    def _lost_in_transit(self) -> int:
         if self.is_closed or has_forked() or self._participant.has_closed():
             return 0
         return sum(int(each.get_sample_lost_status().total_count) for each in self._readers)
@@ -302,16 +302,16 @@ class Ros2Subscriber(WakingSubscriber):
         with self._participant.changed:
             if self.is_closed:
                 return
-            self._lost_before = self._lost_now()
+            self._lost_before = self._lost_in_transit()
             self.is_closed = True
             if self._participant.has_closed():
                 self._readers.clear()
             for reader in self._readers:
                 self._participant.unwatch(reader)
-                self._participant.withdraw(self._transport.node.id, "reader", reader)
+                self._participant.remove_endpoint(self._transport.node.id, "reader", reader)
             self._readers.clear()
         with self._transport.changed:
-            self.inbox.take_all()
+            self.inbox.pop_all()
             self.notify_waiting()
-        self._transport.forget(self)
+        self._transport.discard(self)
         self._transport.wake()

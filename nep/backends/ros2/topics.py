@@ -11,9 +11,9 @@ from typing import Any
 from nep.backends.ros2.fields import RosField
 from nep.backends.ros2.library import Dds
 from nep.backends.ros2.message_types import MessageTypes
-from nep.backends.ros2.names import dds_type, user_data
+from nep.backends.ros2.names import dds_type, encode_user_data
 
-_BLOCKING_NS = 100_000_000
+_MAX_BLOCKING_NS = 100_000_000
 _IDL_NAMES = {"byte": "uint8"}
 
 
@@ -41,7 +41,7 @@ class DdsTopics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.service_class(ros_type))
         return self._topics[key]
 
-    def state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+    def create_state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         """Create a writer that keeps its last sample for late readers."""
         policies = self._dds.qos.Policy
         last = policies.History.KeepLast(1)
@@ -50,7 +50,7 @@ class DdsTopics:
             self._entity, self.topic(name, ros_type), self._state_qos(ros_type, *history)
         )
 
-    def state_reader(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
+    def create_state_reader(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         """Create a reader that also receives the last sample of each `state_writer`."""
         history = self._dds.qos.Policy.History.KeepLast(1000)
         return self._dds.sub.DataReader(
@@ -60,10 +60,10 @@ class DdsTopics:
     def _state_qos(self, ros_type: str, *history: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
         policies = self._dds.qos.Policy
         return self._dds.qos.Qos(
-            policies.Reliability.Reliable(_BLOCKING_NS),
+            policies.Reliability.Reliable(_MAX_BLOCKING_NS),
             policies.Durability.TransientLocal,
             policies.DataRepresentation(use_cdrv0_representation=True),
-            policies.Userdata(user_data({"typehash": self._types.type_hash(ros_type)})),
+            policies.Userdata(encode_user_data({"typehash": self._types.type_hash(ros_type)})),
             *history,
         )
 
@@ -73,22 +73,22 @@ class DdsTopics:
         The client's id and the number of the call precede the fields.
         """
         hints = self._dds.idl.types
-        return self._class(ros_type, {"guid": hints.uint64, "sequence_number": hints.int64})
+        return self._create_class(ros_type, {"guid": hints.uint64, "sequence_number": hints.int64})
 
     def sample_class(self, ros_type: str) -> Any:  # noqa: ANN401 - created dynamically
         """Return the sample class of a ROS type."""
-        return self._class(ros_type, {})
+        return self._create_class(ros_type, {})
 
-    def _class(self, ros_type: str, head: dict[str, Any]) -> Any:  # noqa: ANN401 - created dynamically
+    def _create_class(self, ros_type: str, head: dict[str, Any]) -> Any:  # noqa: ANN401 - created dynamically
         if ros_type not in self._classes:
-            members = head | {each.name: self._member(each) for each in self._types.fields(ros_type)}
+            members = head | {each.name: self._member_type(each) for each in self._types.fields(ros_type)}
             created = self._dds.idl.make_idl_struct(ros_type.rpartition("/")[2], dds_type(ros_type), members)
             created.serialize = _serialize
             created.deserialize = classmethod(_deserialize)
             self._classes[ros_type] = created
         return self._classes[ros_type]
 
-    def _member(self, field: RosField) -> Any:  # noqa: ANN401 - a type
+    def _member_type(self, field: RosField) -> Any:  # noqa: ANN401 - a type
         hints = self._dds.idl.types
         if field.is_message:
             item = self.sample_class(field.kind)
@@ -109,7 +109,7 @@ class DdsTopics:
         self._topics.clear()
 
 
-def sample_of(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
+def create_sample(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
     """Return a sample of class `kind` with this content."""
     created = kind.__new__(kind)
     created.cdr = cdr
@@ -121,4 +121,4 @@ def _serialize(sample: Any, *_arguments: object, **_options: object) -> bytes:  
 
 
 def _deserialize(kind: Any, /, cdr: bytes, *_arguments: object, **_options: object) -> Any:  # noqa: ANN401
-    return sample_of(kind, cdr)
+    return create_sample(kind, cdr)

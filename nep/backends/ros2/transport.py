@@ -11,14 +11,14 @@ from contextlib import contextmanager
 from nep.backends.base import PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Hybrid
 from nep.backends.deadlines import Deadlines
-from nep.backends.ros2.graph import graph_of
-from nep.backends.ros2.library import dds, has_forked, typesys
-from nep.backends.ros2.participant import Participant, join, leave
+from nep.backends.ros2.graph import current_graph
+from nep.backends.ros2.library import has_forked, load_dds, load_typesys
+from nep.backends.ros2.participant import Participant, join_domain, leave_domain
 from nep.backends.ros2.publisher import Ros2Publisher
 from nep.backends.ros2.services.client import Ros2Client
 from nep.backends.ros2.services.server import Ros2Server
 from nep.backends.ros2.subscriber import Ros2Subscriber
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
@@ -26,15 +26,15 @@ from nep.protocol.requests import NodeRecord
 from nep.system.cpu import CpuLoad
 
 _logger = logging.getLogger("nep")
-_BATCH_S = 0.005  # at most 200 calls of a sink per second
+_BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
 class Ros2Transport:
     """Connection of one node to a DDS domain. Raises `BackendUnavailableError` without its packages."""
 
     def __init__(self, node: NodeRecord) -> None:
-        dds()
-        typesys()
+        load_dds()
+        load_typesys()
         self.node = node
         self.changed = threading.Condition()
         """Guards inboxes. Lock order: the participant's lock before this one."""
@@ -62,7 +62,7 @@ class Ros2Transport:
         with self._lock:
             self._check_open()
             if self._participant is None:
-                self._participant = join(self, int(configuration.master))
+                self._participant = join_domain(self, int(configuration.master))
             participant = self._participant
         if participant.number != int(configuration.master):
             raise NepError(
@@ -79,11 +79,11 @@ class Ros2Transport:
             raise ClosedError(f"node '{self.node.name}'")
 
     @contextmanager
-    def _closed_errors(self) -> Iterator[None]:
+    def _translate_closed_errors(self) -> Iterator[None]:
         # Converts errors of Cyclone DDS to `ClosedError` if the node was closed meanwhile.
         try:
             yield
-        except dds().core.DDSException:
+        except load_dds().core.DDSException:
             self._check_open()
             raise
 
@@ -92,9 +92,9 @@ class Ros2Transport:
         for each in self._subscribers:
             each.update_latched_reader()
 
-    def publisher(self, spec: PublisherSpec) -> Ros2Publisher:
+    def create_publisher(self, spec: PublisherSpec) -> Ros2Publisher:
         """Create a writer and wait until it is matched with the known readers."""
-        with self._closed_errors():
+        with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
         with self._lock:
@@ -104,9 +104,9 @@ class Ros2Transport:
         publisher.close(0.0)
         raise ClosedError(f"node '{self.node.name}'")
 
-    def subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
+    def create_subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
         """Create a reader and wait until it is matched with the known writers."""
-        with self._closed_errors():
+        with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             subscriber = Ros2Subscriber(self, participant, spec)
         with self._lock:
@@ -121,11 +121,11 @@ class Ros2Transport:
         subscriber.close()
         raise ClosedError(f"node '{self.node.name}'")
 
-    def server(self, spec: ServerSpec) -> Ros2Server:
+    def create_server(self, spec: ServerSpec) -> Ros2Server:
         """Create a server and wait until it is matched with the known clients."""
-        with self._closed_errors():
+        with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
-            server = Ros2Server(participant, self.node.id, spec, self._forget_service)
+            server = Ros2Server(participant, self.node.id, spec, self._discard_service)
         with self._lock:
             if not self._closing.is_set() and not self._is_closing:
                 self._servers = (*self._servers, server)
@@ -133,20 +133,20 @@ class Ros2Transport:
         server.close(0.0)
         raise ClosedError(f"node '{self.node.name}'")
 
-    def client(self, spec: ClientSpec) -> Ros2Client:
+    def create_client(self, spec: ClientSpec) -> Ros2Client:
         """Create a client and wait until it is matched with the known servers."""
-        with self._closed_errors():
+        with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
-            client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._forget_service)
+            client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._discard_service)
         with self._lock:
             if not self._closing.is_set() and not self._is_closing:
                 self._clients = (*self._clients, client)
-                self._deadlines.watch(client)
+                self._deadlines.add_client(client)
                 return client
         client.close()
         raise ClosedError(f"node '{self.node.name}'")
 
-    def _forget_service(self, closed: Ros2Server | Ros2Client) -> None:
+    def _discard_service(self, closed: Ros2Server | Ros2Client) -> None:
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
@@ -156,7 +156,7 @@ class Ros2Transport:
         with self._lock:
             self._publishers = tuple(each for each in self._publishers if each is not publisher)
 
-    def forget(self, subscriber: Ros2Subscriber) -> None:
+    def discard(self, subscriber: Ros2Subscriber) -> None:
         """Remove a closed subscriber."""
         with self._lock:
             self._subscribers = tuple(each for each in self._subscribers if each is not subscriber)
@@ -170,7 +170,7 @@ class Ros2Transport:
         """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
         before = self._wakes
-        with woken_by(calls, self.wake) as is_empty:
+        with wake_on_call(calls, self.wake) as is_empty:
             if not is_empty:
                 return
             with self.changed:
@@ -190,8 +190,8 @@ class Ros2Transport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
         """Return the graph of discovered endpoints."""
-        with self._closed_errors():
-            return graph_of(self._join_domain(configuration))
+        with self._translate_closed_errors():
+            return current_graph(self._join_domain(configuration))
 
     @property
     def publishers(self) -> tuple[Ros2Publisher, ...]:
@@ -244,7 +244,7 @@ class Ros2Transport:
             with self._lock:
                 participant, self._participant = self._participant, None
             if participant is not None:
-                leave(participant, self.node.id)
+                leave_domain(participant, self.node.id)
         self._deadlines.close(timeout_s)
         self.wake()
         if self._thread is not None and self._thread is not threading.current_thread():
@@ -261,4 +261,4 @@ class Ros2Transport:
                         subscriber.spec.sink(messages)
                     except BaseException:  # also SystemExit: the sink thread continues
                         _logger.exception("the sink of '%s' failed", subscriber.spec.topic)
-            self._closing.wait(_BATCH_S)
+            self._closing.wait(_BATCH_INTERVAL_S)

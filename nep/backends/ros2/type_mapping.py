@@ -26,7 +26,7 @@ from nep.i18n import _
 from nep.messages import codecs, image_codec
 from nep.messages.codecs import Codec
 from nep.messages.encoded import Encoded
-from nep.messages.image_files import examine
+from nep.messages.image_files import parse_header
 from nep.messages.message import MessageKind
 from nep.protocol.wire import extension_part
 
@@ -127,18 +127,18 @@ def _encode_text(payload: object) -> Encoded:
     # Rejects zero bytes, which end a string in ROS. Raises `EncodeError`.
     encoded = codecs.STRING.encode(payload)
     if 0 in encoded.data:
-        raise EncodeError("string", "str", _zero_reason())
+        raise EncodeError("string", "str", _null_character_reason())
     return encoded
 
 
-def _zero_reason() -> str:
+def _null_character_reason() -> str:
     return _("it contains a null character, which is not allowed in ROS strings; use the type 'bytes'")
 
 
 def _pack_text(encoded: Encoded) -> bytes:
     data = _plain_data(encoded)
     if 0 in data:
-        raise WireError(_zero_reason(), len(data))
+        raise WireError(_null_character_reason(), len(data))
     return b"".join((_CDR_HEADER, struct.pack("<I", len(data) + 1), data, b"\0"))
 
 
@@ -157,7 +157,7 @@ def _pack_bytes(encoded: Encoded) -> bytes:
 def _unpack_bytes(cdr: bytes) -> bytes | memoryview:
     dimensions, _offset, size = _read_numbers(cdr, "III", 4)
     if dimensions:
-        return _data_field(_BYTES_TYPE, cdr)
+        return _read_data_field(_BYTES_TYPE, cdr)
     if size > len(cdr) - 16:
         raise WireError(_("it is not a ROS byte array"), len(cdr))
     return memoryview(cdr)[16 : 16 + size]
@@ -170,7 +170,7 @@ def _read_numbers(cdr: bytes, form: str, at: int) -> tuple[int, ...]:
     return struct.unpack_from(f"{'<' if cdr[1] else '>'}{form}", cdr, at)
 
 
-def _data_field(name: str, cdr: bytes) -> bytes:
+def _read_data_field(name: str, cdr: bytes) -> bytes:
     # Raises `WireError`.
     try:
         decoded = message_types().decode(name, cdr)
@@ -184,11 +184,11 @@ def _encode_image(payload: object) -> Encoded:
     # Rejects raw images. Raises `EncodeError`.
     encoded = image_codec.encode(payload)
     if (encoded.extension or {}).get("encoding") not in _FILE_ENCODINGS:
-        raise EncodeError("image", type(payload).__name__, _raw_reason())
+        raise EncodeError("image", type(payload).__name__, _raw_image_reason())
     return encoded
 
 
-def _raw_reason() -> str:
+def _raw_image_reason() -> str:
     return _(
         "a compressed ROS image is a JPEG or PNG; publish 'uint8' or 'uint16', or a map as "
         "'sensor_msgs/msg/Image'"
@@ -198,9 +198,9 @@ def _raw_reason() -> str:
 def _pack_image(encoded: Encoded) -> bytes:
     data = _plain_data(encoded)
     try:
-        kind = examine(data).kind
+        kind = parse_header(data).kind
     except DecodeError as error:
-        raise WireError(_raw_reason(), len(data)) from error
+        raise WireError(_raw_image_reason(), len(data)) from error
     seconds, nanoseconds = divmod(time.time_ns(), 10**9)
     # stamp, empty frame_id with padding, format, file
     head = struct.pack("<iI", seconds, nanoseconds) + struct.pack("<I4x", 1)
@@ -210,4 +210,4 @@ def _pack_image(encoded: Encoded) -> bytes:
 
 
 def _unpack_image(cdr: bytes) -> bytes:
-    return _data_field(_IMAGE_TYPE, cdr)
+    return _read_data_field(_IMAGE_TYPE, cdr)

@@ -6,9 +6,14 @@ defines the key expressions, `session` is the session of one node, `roster` list
 """
 
 from nep.backends.base import Backend
-from nep.backends.zenoh.places import place_name
+from nep.backends.zenoh.places import validate_address
 from nep.backends.zenoh.transport import ZenohTransport
 
 BACKEND = Backend(
-    "zenoh", ZenohTransport, needs="eclipse-zenoh", master=place_name, has_history=True, has_patterns=True
+    "zenoh",
+    ZenohTransport,
+    needs="eclipse-zenoh",
+    master=validate_address,
+    has_history=True,
+    has_patterns=True,
 )

@@ -12,7 +12,7 @@ from operator import itemgetter
 from typing import Generic, TypeVar
 
 from nep.backends.zeromq.loss import PublisherTracker
-from nep.messages.history import HISTORY_BYTES
+from nep.messages.history import MAX_HISTORY_BYTES
 from nep.protocol.wire import Header
 
 T = TypeVar("T")
@@ -39,7 +39,7 @@ class EarlyMessages(Generic[T]):
         self._until: dict[int, float] = {}
         self._bytes = 0
 
-    def keep(self, header: Header, message: T, size_bytes: int) -> bool:
+    def queue_if_early(self, header: Header, message: T, size_bytes: int) -> bool:
         """Queue a message that arrived too early; return False if the message can be delivered now."""
         source = self._sources.find(header.publisher)
         if source is None or source.remote is None or source.has_echoed:
@@ -53,7 +53,7 @@ class EarlyMessages(Generic[T]):
 
     def _has_room(self, header: Header) -> bool:
         count = len(self._queued.get(header.publisher, ()))
-        return count < self._max_messages and self._bytes < HISTORY_BYTES
+        return count < self._max_messages and self._bytes < MAX_HISTORY_BYTES
 
     def pop(self, publisher: int) -> list[T]:
         """Remove and return a publisher's queued messages in order, without those received since then."""

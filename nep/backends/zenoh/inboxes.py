@@ -11,7 +11,7 @@ from nep.backends.base import Sink
 from nep.messages.message import Message
 
 _logger = logging.getLogger("nep")
-_BATCH_S = 0.005  # at most 200 calls of a sink per second
+_BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 _WAIT_S = 0.1
 
 
@@ -44,7 +44,7 @@ class Inboxes:
         self._closing = threading.Event()
 
     @property
-    def wakes(self) -> int:
+    def wake_count(self) -> int:
         """Number of `wake` calls so far."""
         return self._wakes
 
@@ -101,4 +101,4 @@ class Inboxes:
                         subscriber.sink(messages)
                     except BaseException:  # also SystemExit: the sink thread continues with the next batch
                         _logger.exception("the sink of '%s' failed", messages[0].topic)
-            self._closing.wait(_BATCH_S)
+            self._closing.wait(_BATCH_INTERVAL_S)

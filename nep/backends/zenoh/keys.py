@@ -19,14 +19,14 @@ from typing import NamedTuple
 from urllib.parse import quote, unquote
 
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
-from nep.protocol.service_wire import PREFIX, SERVICE_TYPE, service_of
+from nep.protocol.service_wire import SERVICE_PREFIX, SERVICE_TYPE, service_of
 from nep.protocol.service_wire import topic_of as topic_of_service
 
 _ROOT = "nep/v1"
-_LIVE = f"{_ROOT}/live/"
-ALL_CALLS = f"{_ROOT}/call/*"
-ALL_LIVE = f"{_LIVE}**"
-_WILD = frozenset({"*", "**"})
+_LIVE_PREFIX = f"{_ROOT}/live/"
+ALL_CALLS_KEY = f"{_ROOT}/call/*"
+ALL_TOKENS_KEY = f"{_LIVE_PREFIX}**"
+_WILDCARDS = frozenset({"*", "**"})
 _TOPIC_AT, _SINCE_AT = 3, 4
 _MAX_ID = 2**64 - 1
 _NODE_CHUNKS, _PUBLISHER_CHUNKS, _SUBSCRIBER_CHUNKS = 7, 6, 4
@@ -52,7 +52,7 @@ def data_key(topic: str) -> str:
     return f"{_ROOT}/data/{_encode_chunk(topic)}"
 
 
-def data_keys(pattern: str) -> str:
+def pattern_data_key(pattern: str) -> str:
     """Return the key expression for messages of matching topics. It may also match other topics."""
     return f"{_ROOT}/data/{_pattern_chunk(pattern)}"
 
@@ -67,7 +67,7 @@ def hellos_key(topic: str) -> str:
     return f"{_ROOT}/hello/{_encode_chunk(topic)}/*"
 
 
-def hellos_keys(pattern: str) -> str:
+def pattern_hellos_key(pattern: str) -> str:
     """Return the key expression for hellos to all publishers of the topics that `data_keys` matches."""
     return f"{_ROOT}/hello/{_pattern_chunk(pattern)}/*"
 
@@ -75,7 +75,7 @@ def hellos_keys(pattern: str) -> str:
 def _pattern_chunk(pattern: str) -> str:
     # A topic is one chunk and zenoh's wildcards match whole chunks, so only the fixed begin and end are used.
     levels = pattern.split("/")
-    wild = [each for each, level in enumerate(levels) if level in _WILD]
+    wild = [each for each, level in enumerate(levels) if level in _WILDCARDS]
     first, last = wild[0], wild[-1]
     begin = "/".join(levels[:first]) + ("/" if first and levels[first] == "*" else "")
     end = ("/" if levels[last] == "*" and levels[last + 1 :] else "") + "/".join(levels[last + 1 :])
@@ -95,23 +95,23 @@ def call_key(node_id: str) -> str:
 def node_key(node: NodeRecord) -> str:
     """Return the liveliness token of a node."""
     words = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
-    return "/".join((f"{_LIVE}{_encode_chunk(node.id)}/node", *map(_encode_chunk, words)))
+    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node.id)}/node", *map(_encode_chunk, words)))
 
 
 def publisher_key(node_id: str, record: PublisherRecord) -> str:
     """Return the liveliness token of a publisher."""
     latched = "latched" if record.latched else "plain"
     words = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
-    return "/".join((f"{_LIVE}{_encode_chunk(node_id)}/pub", *map(_encode_chunk, words)))
+    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/pub", *map(_encode_chunk, words)))
 
 
 def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
     """Return the liveliness token of a subscriber."""
     words = (f"{record.id:016x}", record.topic, record.msg_type)
-    return "/".join((f"{_LIVE}{_encode_chunk(node_id)}/sub", *map(_encode_chunk, words)))
+    return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/sub", *map(_encode_chunk, words)))
 
 
-def serve_key(service: str, since_ns: int, server: int) -> str:
+def service_key(service: str, since_ns: int, server: int) -> str:
     """Return the key of a server.
 
     The keys sort by age, and all clients call the first server in this order: the oldest.
@@ -124,7 +124,7 @@ def server_key(node_id: str, record: PublisherRecord) -> str:
     since = record.endpoints[0].split("/")[_SINCE_AT]
     return "/".join(
         (
-            f"{_LIVE}{_encode_chunk(node_id)}/srv",
+            f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/srv",
             f"{record.id:016x}",
             _encode_chunk(service_of(record.topic) or ""),
             since,
@@ -136,18 +136,18 @@ def client_key(node_id: str, record: SubscriberRecord) -> str:
     """Return the liveliness token of a client."""
     return "/".join(
         (
-            f"{_LIVE}{_encode_chunk(node_id)}/cli",
+            f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/cli",
             f"{record.id:016x}",
             _encode_chunk(service_of(record.topic) or ""),
         )
     )
 
 
-def parse_live(key: str) -> LiveToken | None:
+def parse_token(key: str) -> LiveToken | None:
     """Parse a liveliness token; return None for other keys."""
-    if not key.startswith(_LIVE):
+    if not key.startswith(_LIVE_PREFIX):
         return None
-    node_id, *words = map(_decode_chunk, key[len(_LIVE) :].split("/"))
+    node_id, *words = map(_decode_chunk, key[len(_LIVE_PREFIX) :].split("/"))
     try:
         if words[:1] == ["node"] and len(words) == _NODE_CHUNKS:
             _kind, name, host, pid, language, generation, since = words
@@ -159,7 +159,7 @@ def parse_live(key: str) -> LiveToken | None:
             )
         if words[:1] == ["pub"] and len(words) == _PUBLISHER_CHUNKS:
             _kind, id_, topic, msg_type, codec, latched = words
-            if topic.startswith(PREFIX):  # a forged token could otherwise register a server
+            if topic.startswith(SERVICE_PREFIX):  # a forged token could otherwise register a server
                 return None
             record = PublisherRecord(
                 _parse_id(id_), topic, msg_type, codec, (data_key(topic),), latched == "latched"
@@ -167,7 +167,7 @@ def parse_live(key: str) -> LiveToken | None:
             return LiveToken(node_id, record)
         if words[:1] == ["sub"] and len(words) == _SUBSCRIBER_CHUNKS:
             _kind, id_, topic, msg_type = words
-            if topic.startswith(PREFIX):
+            if topic.startswith(SERVICE_PREFIX):
                 return None
             return LiveToken(node_id, SubscriberRecord(_parse_id(id_), topic, msg_type))
         return _parse_service(node_id, *words)
@@ -179,7 +179,7 @@ def _parse_service(node_id: str, kind: str = "", id_: str = "", *rest: str) -> L
     # Raises `ValueError`.
     if kind == "srv" and len(rest) == 2 and rest[0]:
         service, since = rest
-        endpoint = serve_key(service, _parse_id(since), _parse_id(id_))
+        endpoint = service_key(service, _parse_id(since), _parse_id(id_))
         record = PublisherRecord(
             _parse_id(id_), topic_of_service(service), SERVICE_TYPE, SERVICE_TYPE, (endpoint,)
         )

@@ -12,11 +12,11 @@ from typing import Any
 
 from nep.errors import BackendUnavailableError, NepError
 from nep.i18n import _
-from nep.system.forks import in_child
+from nep.system.forks import call_in_child
 
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
-_inherited: set[str] = set()
+_inherited_libraries: set[str] = set()
 """Names of libraries that were in use before a fork.
 
 In the child process zenoh would wait for threads that don't exist there.
@@ -24,14 +24,14 @@ In the child process zenoh would wait for threads that don't exist there.
 
 
 # zenoh is only partly typed
-def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401
+def load_zenoh(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401
     """Load and return the module zenoh.
 
     Raises:
         BackendUnavailableError: zenoh is not installed or can't be loaded.
         NepError: The process was forked from one that uses zenoh.
     """
-    if _inherited:
+    if _inherited_libraries:
         raise NepError(
             _(
                 "'zenoh' does not work in a forked process of a program that uses it; start the process "
@@ -46,14 +46,14 @@ def library(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:
         ) from error
 
 
-def callback(take: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
+def create_handler(take: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
     """Return a handler that runs in zenoh's network thread, so that messages stay in order."""
     return importlib.import_module("zenoh.handlers").Callback(take, drop, indirect=False)
 
 
 def open_session(config: Any) -> Any:  # noqa: ANN401 - zenoh is not typed
     """Open a session. Raises zenoh's `ZError`."""
-    session = library().open(config)
+    session = load_zenoh().open(config)
     _sessions.append(session)
     return session
 
@@ -72,7 +72,7 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
             _sessions.remove(session)
 
 
-def keep_forever(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+def prevent_finalization(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
     """Prevent an object from being finalized in a forked child process, which would notify the network."""
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
@@ -81,9 +81,9 @@ def _forked() -> None:
     # In a forked child sessions must never be closed, not even by their finalizers: that would block forever.
     if "zenoh" not in sys.modules or not _sessions:
         return
-    _inherited.add("zenoh")
+    _inherited_libraries.add("zenoh")
     for session in _sessions:
-        keep_forever(session)
+        prevent_finalization(session)
 
 
-in_child(_forked)
+call_in_child(_forked)

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from nep.backends.base import HANDSHAKE_S
+from nep.backends.base import HANDSHAKE_TIMEOUT_S
 from nep.backends.connection import Configuration
 from nep.backends.deadlines import Deadlines
 from nep.backends.services import ClientSpec, ServerSpec
@@ -14,7 +14,7 @@ from nep.backends.zenoh.services import ZenohClient, ZenohServer
 from nep.backends.zenoh.session import ZenohSession
 from nep.errors import ClosedError
 
-Sessions = Callable[[Configuration, float | None], ZenohSession]
+SessionProvider = Callable[[Configuration, float | None], ZenohSession]
 
 
 class ZenohServices:
@@ -23,7 +23,7 @@ class ZenohServices:
     `session` returns the node's session for a configuration; it raises `ClosedError` if the node is closed.
     """
 
-    def __init__(self, session: Sessions, node_name: str) -> None:
+    def __init__(self, session: SessionProvider, node_name: str) -> None:
         self._session = session
         self._node_name = node_name
         self._lock = threading.Lock()
@@ -32,34 +32,34 @@ class ZenohServices:
         self._clients: tuple[ZenohClient, ...] = ()
         self._is_closed = False
 
-    def server(self, spec: ServerSpec) -> ZenohServer:
+    def create_server(self, spec: ServerSpec) -> ZenohServer:
         """Create a server. See `ServiceTransport.server`."""
         session = self._session(spec.configuration, spec.wait_s)
         session.join()
-        server = ZenohServer(session, spec, self._forget)
+        server = ZenohServer(session, spec, self._discard)
         try:
             with self._lock:
                 self._check_open_locked()
                 self._servers = (*self._servers, server)
             session.add_server(server)
-            session.sync_all(HANDSHAKE_S)
+            session.sync_all(HANDSHAKE_TIMEOUT_S)
         except BaseException:  # also Ctrl+C: the caller has no object to close yet
             server.close(0.0)
             raise
         return server
 
-    def client(self, spec: ClientSpec) -> ZenohClient:
+    def create_client(self, spec: ClientSpec) -> ZenohClient:
         """Create a client or surveyor. See `ServiceTransport.client`."""
         session = self._session(spec.configuration, spec.wait_s)
         session.join()
-        client = ZenohClient(session, spec, self._deadlines, self._forget)
+        client = ZenohClient(session, spec, self._deadlines, self._discard)
         try:
             with self._lock:
                 self._check_open_locked()
                 self._clients = (*self._clients, client)
-                self._deadlines.watch(client)
+                self._deadlines.add_client(client)
             session.add_client(client)
-            session.sync_all(HANDSHAKE_S)
+            session.sync_all(HANDSHAKE_TIMEOUT_S)
         except BaseException:
             client.close()
             raise
@@ -69,7 +69,7 @@ class ZenohServices:
         if self._is_closed:
             raise ClosedError(f"node '{self._node_name}'")
 
-    def _forget(self, closed: ZenohServer | ZenohClient) -> None:
+    def _discard(self, closed: ZenohServer | ZenohClient) -> None:
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)

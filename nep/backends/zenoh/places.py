@@ -18,20 +18,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nep.backends.zenoh.library import library, open_session
-from nep.backends.zenoh.rendezvous import Rendezvous, SessionPort, free_port
+from nep.backends.zenoh.library import load_zenoh, open_session
+from nep.backends.zenoh.rendezvous import Rendezvous, SessionEntry, free_port
 from nep.backends.zeromq.sockets import LOOPBACK
 from nep.errors import NepError, WrongTypeError
 from nep.i18n import _
-from nep.system.descriptors import check_room
+from nep.system.descriptors import check_free_descriptors
 
 CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"
 """Environment variable with the default place: any value that `master` accepts."""
-_LOCAL = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)
+_LOCAL_ADDRESS = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)
 _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^\s,]{1,400}", re.ASCII)
-_SECURED = re.compile(r"\b(?:tls|quic)/")
-_FILES = (".json5", ".json", ".yaml", ".yml")
-_DEFAULT_LISTENS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
+_SECURE_PROTOCOL = re.compile(r"\b(?:tls|quic)/")
+_FILE_SUFFIXES = (".json5", ".json", ".yaml", ".yml")
+_DEFAULT_LISTEN_ENDPOINTS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]}
 _MESSAGE_WAIT_S = 0.05
 """Time in seconds that a message, or the first fragment of a large one, waits for room in a connection.
 
@@ -45,15 +45,15 @@ _FRAGMENTS_WAIT_S = 1.0
 zenoh's default of 50 ms passes before 8 MB are sent over a link of 100 MB/s, or on a busy computer.
 """
 _MAX_TIMEOUT_S = 10**6
-_SESSION_FILES = 16
-_PEER_FILES = 2
+_FDS_PER_SESSION = 16
+_FDS_PER_PEER = 2
 _PORT_ATTEMPTS = 5
 _CONNECTED_S, _CONNECT_POLL_S = 1.0, 0.005
-_TAIL = re.compile(r" at /\S+\.rs:\d+\.?")
+_SOURCE_LOCATION = re.compile(r" at /\S+\.rs:\d+\.?")
 
 
 @dataclass(frozen=True)
-class OpenedSession:
+class OpenSession:
     """Open session and its rendezvous entry.
 
     Attributes:
@@ -65,8 +65,8 @@ class OpenedSession:
     """
 
     session: Any
-    meeting: Rendezvous | None = None
-    entry: SessionPort | None = None
+    rendezvous: Rendezvous | None = None
+    entry: SessionEntry | None = None
     endpoints: tuple[str, ...] = ()
     routers: tuple[str, ...] = ()
 
@@ -76,20 +76,20 @@ class OpenedSession:
         info = self.session.info
         return bool(self.routers) and not (info.routers_zid() or info.peers_zid())
 
-    def leave(self) -> None:
+    def unregister(self) -> None:
         """Remove the session from the rendezvous, so that no other session connects to its address."""
-        if self.meeting is not None and self.entry is not None:
-            self.meeting.remove(self.entry)
+        if self.rendezvous is not None and self.entry is not None:
+            self.rendezvous.remove(self.entry)
 
 
-def place_name(master: str | None = None) -> str:
+def validate_address(master: str | None = None) -> str:
     """Validate a place and return it; None selects $NEP_ZENOH_CONFIG, else "local". Raises `NepError`."""
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
             _("a zenoh address must be a 'str', not a '{kind}'").format(kind=type(master).__name__)
         )
     place = master or os.environ.get(CONFIG_VARIABLE, "") or "local"
-    if _LOCAL.fullmatch(place) or place.endswith(_FILES) or _endpoints_in(place):
+    if _LOCAL_ADDRESS.fullmatch(place) or place.endswith(_FILE_SUFFIXES) or _parse_endpoints(place):
         return place
     raise NepError(
         _(
@@ -99,21 +99,21 @@ def place_name(master: str | None = None) -> str:
     )
 
 
-def _endpoints_in(place: str) -> tuple[str, ...]:
+def _parse_endpoints(place: str) -> tuple[str, ...]:
     # Returns () if the place isn't a list of endpoints.
     words = tuple(word.strip() for word in place.split(","))
     return words if all(map(_ENDPOINT.fullmatch, words)) else ()
 
 
-def open_place(place: str, wait_s: float | None) -> OpenedSession:
+def open_session_at(place: str, wait_s: float | None) -> OpenSession:
     """Open a session at a place; wait up to `wait_s` seconds for a router. Raises `NepError` on failure."""
-    local = _LOCAL.fullmatch(place)
+    local = _LOCAL_ADDRESS.fullmatch(place)
     if local is not None:
         return _open_local(local.group(1) or "nodes")
-    check_room(_SESSION_FILES, "a session of zenoh")
-    endpoints = _endpoints_in(place)
+    check_free_descriptors(_FDS_PER_SESSION, "a session of zenoh")
+    endpoints = _parse_endpoints(place)
     if not endpoints:
-        return OpenedSession(_open_file(Path(place)))
+        return OpenSession(_open_from_file(Path(place)))
     settings: dict[str, object] = {
         "mode": "client",
         "connect": {
@@ -125,18 +125,20 @@ def open_place(place: str, wait_s: float | None) -> OpenedSession:
     tcp_endpoints = tuple(
         f"tcp://{each.removeprefix('tcp/')}" for each in endpoints if each.startswith("tcp/")
     )
-    return OpenedSession(_open(_config(settings), place), endpoints=tcp_endpoints, routers=endpoints)
+    return OpenSession(
+        _open_session(_create_config(settings), place), endpoints=tcp_endpoints, routers=endpoints
+    )
 
 
-def _open_local(name: str) -> OpenedSession:
+def _open_local(name: str) -> OpenSession:
     meeting = Rendezvous(name)
     with meeting.exclusive():
         others = [entry.port for entry in meeting.entries()]
-        check_room(_SESSION_FILES + _PEER_FILES * len(others), "a session of zenoh")
+        check_free_descriptors(_FDS_PER_SESSION + _FDS_PER_PEER * len(others), "a session of zenoh")
         port, session = _open_at_free_port(others)
         entry = meeting.add(port)
     endpoints = tuple(f"tcp://{LOOPBACK}:{each}" for each in (port, *others))
-    return OpenedSession(session, meeting, entry, endpoints)
+    return OpenSession(session, meeting, entry, endpoints)
 
 
 def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
@@ -155,21 +157,21 @@ def _open_at_free_port(others: list[int]) -> tuple[int, Any]:
             "open": {"return_conditions": {"connect_scouted": False, "declares": True}},
         }
         try:
-            return port, open_session(_config(settings))
-        except library().ZError as error:
+            return port, open_session(_create_config(settings))
+        except load_zenoh().ZError as error:
             if not left:
                 raise NepError(
                     _("zenoh cannot listen at '{host}': {error}").format(
-                        host=LOOPBACK, error=_without_location(error)
+                        host=LOOPBACK, error=_error_text(error)
                     )
                 ) from error
     raise AssertionError
 
 
-def _open_file(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
+def _open_from_file(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     # Peers connect in the background, so wait a moment for them.
     config = _load_config(path)
-    session = _open(config, str(path))
+    session = _open_session(config, str(path))
     if json.loads(config.get_json("connect/endpoints")):
         pause, deadline = threading.Event(), time.monotonic() + _CONNECTED_S
         while time.monotonic() < deadline and not (session.info.routers_zid() or session.info.peers_zid()):
@@ -177,26 +179,26 @@ def _open_file(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     return session
 
 
-def _config(settings: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh is not typed
+def _create_config(settings: dict[str, object]) -> Any:  # noqa: ANN401 - zenoh is not typed
     drop = {
         "wait_before_drop": round(1e6 * _MESSAGE_WAIT_S),
         "max_wait_before_drop_fragments": round(1e6 * _FRAGMENTS_WAIT_S),
     }
     queue = {"queue": {"congestion_control": {"drop": drop}}}
-    return library().Config.from_json5(json.dumps({**settings, "transport": {"link": {"tx": queue}}}))
+    return load_zenoh().Config.from_json5(json.dumps({**settings, "transport": {"link": {"tx": queue}}}))
 
 
 def _load_config(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     # Defaults for options that the file leaves out: loopback, no multicast. Raises `NepError`.
     try:
-        config = library().Config.from_file(str(path.expanduser()))
-    except library().ZError as error:
+        config = load_zenoh().Config.from_file(str(path.expanduser()))
+    except load_zenoh().ZError as error:
         raise NepError(
             _("'{path}' is not a zenoh configuration: {error}; see DEFAULT_CONFIG.json5 of zenoh").format(
-                path=path, error=_without_location(error)
+                path=path, error=_error_text(error)
             )
         ) from error
-    if json.loads(config.get_json("listen/endpoints")) == _DEFAULT_LISTENS:
+    if json.loads(config.get_json("listen/endpoints")) == _DEFAULT_LISTEN_ENDPOINTS:
         ports = {mode: [f"tcp/{LOOPBACK}:{port}"] for mode, port in (("router", 7447), ("peer", 0))}
         config.insert_json5("listen/endpoints", json.dumps(ports))
     if json.loads(config.get_json("scouting/multicast/enabled")) is None:
@@ -204,12 +206,12 @@ def _load_config(path: Path) -> Any:  # noqa: ANN401 - zenoh is not typed
     return config
 
 
-def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
+def _open_session(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
     try:
         return open_session(config)
-    except library().ZError as error:
-        message = _without_location(error)
-        if _SECURED.search(message) is not None:
+    except load_zenoh().ZError as error:
+        message = _error_text(error)
+        if _SECURE_PROTOCOL.search(message) is not None:
             reason = _(
                 "zenoh cannot open a session at '{place}': {error}; check that a router is running there "
                 "and that each side trusts the certificate of the other"
@@ -222,6 +224,6 @@ def _open(config: Any, place: str) -> Any:  # noqa: ANN401 - zenoh is not typed
         raise NepError(reason.format(place=place, error=message)) from error
 
 
-def _without_location(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     # Removes the source location from zenoh's message.
-    return _TAIL.sub("", str(error)).strip().rstrip(".")
+    return _SOURCE_LOCATION.sub("", str(error)).strip().rstrip(".")

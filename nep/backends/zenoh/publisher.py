@@ -10,7 +10,7 @@ from typing import Any
 
 from nep.backends.base import PublisherSpec
 from nep.backends.zenoh.keys import data_key, hello_key
-from nep.backends.zenoh.library import callback, library
+from nep.backends.zenoh.library import create_handler, load_zenoh
 from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
@@ -31,7 +31,7 @@ class ZenohPublisher:
         count_subscribers: Callable[[str], int],
         on_close: Callable[[ZenohPublisher, float], None],
     ) -> None:
-        zenoh = library()
+        zenoh = load_zenoh()
         self.spec = spec
         self.record = PublisherRecord(
             spec.id, spec.topic, spec.msg_type, spec.codec.name, (data_key(spec.topic),), spec.is_latched
@@ -51,10 +51,10 @@ class ZenohPublisher:
         self._out: Any = session.declare_publisher(
             data_key(spec.topic), congestion_control=zenoh.CongestionControl.DROP
         )
-        self._listener: Any = self._out.declare_matching_listener(callback(self._handle_matching))
+        self._listener: Any = self._out.declare_matching_listener(create_handler(self._handle_matching))
         self._is_matched = bool(self._out.matching_status.matching)
         self._hellos: Any = session.declare_queryable(
-            hello_key(spec.topic, spec.id), callback(self._handle_hello)
+            hello_key(spec.topic, spec.id), create_handler(self._handle_hello)
         )
 
     # ---- subscribers
@@ -65,7 +65,7 @@ class ZenohPublisher:
         return self._count_subscribers(self.spec.topic)
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if the topic has subscribers, including programs that don't use nep."""
         return self._is_matched or self.subscribers > 0
 
@@ -101,7 +101,7 @@ class ZenohPublisher:
 
     # ---- sending
 
-    def lend(self, _size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
         """Return None, because this back end has no shared memory."""
         return None
 
@@ -136,7 +136,7 @@ class ZenohPublisher:
         """Flush for up to `timeout_s` seconds and unregister. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
-    def end(self) -> bool:
+    def mark_closed(self) -> bool:
         """Stop accepting messages; return False if the publisher is already closed."""
         with self._lock:
             was_closed, self._is_closed = self._is_closed, True
@@ -145,5 +145,5 @@ class ZenohPublisher:
     def release(self) -> None:
         """Undeclare the publisher's key expressions and token at the session."""
         for each in (self._hellos, self._listener, self._out):
-            with suppress(library().ZError):  # closing the session has undeclared it
+            with suppress(load_zenoh().ZError):  # closing the session has undeclared it
                 each.undeclare()

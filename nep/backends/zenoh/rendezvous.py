@@ -31,20 +31,20 @@ _logger = logging.getLogger("nep")
 _LOCK_TIMEOUT_S = 5.0
 _LOCK_POLL_S = 0.002
 _PORT_ATTEMPTS = 100
-_SUSPENDED = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
+_SUSPENDED_STATUSES = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_STOP})
 
 
-class SessionPort(NamedTuple):
+class SessionEntry(NamedTuple):
     """Port and process of a session, encoded in a file name. `began` distinguishes reused process ids."""
 
     port: int
     pid: int
-    began: int
+    start_time: int
 
     @property
     def name(self) -> str:
         """Name of the file."""
-        return f"{self.port}-{self.pid}-{self.began}"
+        return f"{self.port}-{self.pid}-{self.start_time}"
 
 
 def free_port() -> int:
@@ -62,7 +62,7 @@ class Rendezvous:
     """Folder of the sessions with one name. Raises `NepError` if the folder doesn't belong to the user."""
 
     def __init__(self, name: str) -> None:
-        self._folder = _own_folder(_own_folder(_root_folder()) / name)
+        self._folder = _create_private_folder(_create_private_folder(_root_folder()) / name)
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
@@ -80,7 +80,7 @@ class Rendezvous:
                 if is_held:
                     _unlock(file.fileno())
 
-    def entries(self) -> list[SessionPort]:
+    def entries(self) -> list[SessionEntry]:
         """Return the sessions of running processes; delete the files of others."""
         found = []
         for path in self._folder.iterdir():
@@ -90,7 +90,7 @@ class Rendezvous:
             status = _process_status(entry)
             if status is None:
                 path.unlink(missing_ok=True)
-            elif status in _SUSPENDED:
+            elif status in _SUSPENDED_STATUSES:
                 _logger.warning(
                     "skipping process %d, which is suspended; nodes created now can't reach it", entry.pid
                 )
@@ -98,13 +98,13 @@ class Rendezvous:
                 found.append(entry)
         return found
 
-    def add(self, port: int) -> SessionPort:
+    def add(self, port: int) -> SessionEntry:
         """Create the file of a session that listens on `port`."""
-        entry = SessionPort(port, os.getpid(), _start_time(os.getpid()))
+        entry = SessionEntry(port, os.getpid(), _start_time(os.getpid()))
         (self._folder / entry.name).touch(mode=0o600)
         return entry
 
-    def remove(self, entry: SessionPort) -> None:
+    def remove(self, entry: SessionEntry) -> None:
         """Delete the file of a session."""
         with contextlib.suppress(OSError):
             (self._folder / entry.name).unlink(missing_ok=True)
@@ -118,7 +118,7 @@ def _root_folder() -> Path:
     return Path(tempfile.gettempdir()) / f"nep-zenoh{user}"
 
 
-def _own_folder(folder: Path) -> Path:
+def _create_private_folder(folder: Path) -> Path:
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         found = folder.lstat()
@@ -139,11 +139,13 @@ def _own_folder(folder: Path) -> Path:
     return folder
 
 
-def _parse_entry(name: str) -> SessionPort | None:
+def _parse_entry(name: str) -> SessionEntry | None:
     words = name.split("-")
-    if len(words) != len(SessionPort._fields) or not all(each.isascii() and each.isdigit() for each in words):
+    if len(words) != len(SessionEntry._fields) or not all(
+        each.isascii() and each.isdigit() for each in words
+    ):
         return None
-    entry = SessionPort(*map(int, words))
+    entry = SessionEntry(*map(int, words))
     return entry if 0 < entry.port < 65536 and 0 < entry.pid < 2**31 else None
 
 
@@ -151,12 +153,12 @@ def _start_time(pid: int) -> int:
     return round(psutil.Process(pid).create_time() * 100)
 
 
-def _process_status(entry: SessionPort) -> str | None:
+def _process_status(entry: SessionEntry) -> str | None:
     # Returns None if the process has ended.
     try:
         process = psutil.Process(entry.pid)
         status = process.status()
-        is_same = abs(round(process.create_time() * 100) - entry.began) <= 1
+        is_same = abs(round(process.create_time() * 100) - entry.start_time) <= 1
     except psutil.NoSuchProcess:
         return None
     except psutil.Error:

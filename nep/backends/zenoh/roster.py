@@ -6,7 +6,13 @@ import threading
 from typing import TypeVar
 
 from nep.backends.zenoh.keys import LiveToken
-from nep.protocol.requests import Expected, NodeRecord, PublisherRecord, RemotePublisher, SubscriberRecord
+from nep.protocol.requests import (
+    ExpectedSubscriber,
+    NodeRecord,
+    PublisherRecord,
+    RemotePublisher,
+    SubscriberRecord,
+)
 from nep.protocol.service_wire import service_of, topic_of
 from nep.protocol.topic_pattern import is_pattern, matches
 
@@ -26,7 +32,7 @@ class Roster:
         self._patterns: set[str] = set()
         self._count = 0
 
-    def note(self, alive: LiveToken, *, is_there: bool) -> None:
+    def update(self, alive: LiveToken, *, is_there: bool) -> None:
         """Add or remove a token. Idempotent."""
         with self._lock:
             if is_there and self._count >= _MAX_TOKENS:
@@ -39,9 +45,9 @@ class Roster:
                     self._nodes[node_id] = record
                 self._count += len(self._nodes) - before
             elif isinstance(record, PublisherRecord):
-                self._count += _update(self._publishers, (node_id, record), is_there)
+                self._count += _update_table(self._publishers, (node_id, record), is_there)
             else:
-                self._count += _update(self._subscribers, (node_id, record), is_there)
+                self._count += _update_table(self._subscribers, (node_id, record), is_there)
                 if is_pattern(record.topic):
                     self._patterns.discard(record.topic)
                     if record.topic in self._subscribers:
@@ -60,13 +66,13 @@ class Roster:
         return [each for each in self._patterns if each != topic and matches(each, topic)]
 
     @property
-    def published(self) -> tuple[str, ...]:
+    def published_topics(self) -> tuple[str, ...]:
         """Names of topics that have publishers."""
         with self._lock:
             return tuple(each for each in self._publishers if service_of(each) is None)
 
     @property
-    def served(self) -> tuple[str, ...]:
+    def service_names(self) -> tuple[str, ...]:
         """Names of services that have servers."""
         with self._lock:
             return tuple(name for each in self._publishers if (name := service_of(each)) is not None)
@@ -77,7 +83,7 @@ class Roster:
             entries = self._publishers.get(topic_of(service), {}).values()
             return tuple(sorted(record.endpoints[0] for _node_id, record in entries if record.endpoints))
 
-    def subscribers_of(self, topic: str) -> tuple[Expected, ...]:
+    def subscribers_of(self, topic: str) -> tuple[ExpectedSubscriber, ...]:
         """Return the subscribers of a topic."""
         with self._lock:
             entries = [
@@ -85,18 +91,22 @@ class Roster:
                 for each in (topic, *self._matching_locked(topic))
                 for found in self._subscribers.get(each, {}).values()
             ]
-            return tuple(Expected(each.id, node_id, self._name(node_id)) for node_id, each in entries)
+            return tuple(
+                ExpectedSubscriber(each.id, node_id, self._node_name(node_id)) for node_id, each in entries
+            )
 
     def publishers_of(self, topic: str) -> tuple[RemotePublisher, ...]:
         """Return the publishers of a topic."""
         with self._lock:
             entries = self._publishers.get(topic, {}).values()
-            return tuple(RemotePublisher(each, node_id, self._name(node_id)) for node_id, each in entries)
+            return tuple(
+                RemotePublisher(each, node_id, self._node_name(node_id)) for node_id, each in entries
+            )
 
-    def remote(self, node_id: str, record: PublisherRecord) -> RemotePublisher:
+    def remote_publisher(self, node_id: str, record: PublisherRecord) -> RemotePublisher:
         """Return a publisher's record with the name of its node."""
         with self._lock:
-            return RemotePublisher(record, node_id, self._name(node_id))
+            return RemotePublisher(record, node_id, self._node_name(node_id))
 
     def members(
         self,
@@ -110,12 +120,12 @@ class Roster:
                 for each, node in self._nodes.items()
             ]
 
-    def _name(self, node_id: str) -> str:
+    def _node_name(self, node_id: str) -> str:
         node = self._nodes.get(node_id)
         return "" if node is None else node.name
 
 
-def _update(
+def _update_table(
     table: dict[str, dict[int, tuple[str, _Record]]], alive: tuple[str, _Record], is_there: bool
 ) -> int:
     # Returns the change of the number of entries.

@@ -26,12 +26,12 @@ from nep.backends.services import (
     ServerSpec,
     Tally,
     check_calls,
-    fitting,
-    refusal,
-    too_large,
+    limit_reply_size,
+    rejection_reply,
+    size_error_text,
 )
-from nep.backends.zenoh.keys import serve_key
-from nep.backends.zenoh.library import keep_forever, library
+from nep.backends.zenoh.keys import service_key
+from nep.backends.zenoh.library import load_zenoh, prevent_finalization
 from nep.backends.zenoh.session import ZenohSession
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError, WireError
@@ -52,7 +52,7 @@ _UNLIMITED_S = 1e9
 _TOKEN_DELAY_S = 0.5
 """Maximum time in seconds between the end of a server's queries and the removal of its token."""
 
-Then = Callable[[Outcome], None]
+OutcomeCallback = Callable[[Outcome], None]
 
 
 class ZenohServer:
@@ -70,7 +70,7 @@ class ZenohServer:
         self._refusals = RejectionLog()
         self._lock = threading.Lock()
         self._queries: set[Any] = set()
-        self._key = serve_key(spec.service, time.time_ns(), spec.id)
+        self._key = service_key(spec.service, time.time_ns(), spec.id)
         self.endpoints = (self._key,)
         self.record = PublisherRecord(
             spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, self.endpoints
@@ -85,7 +85,7 @@ class ZenohServer:
         try:
             call = NATIVE.read_call([attachment, data])
             if len(data) > PAYLOAD_MAX_BYTES:
-                raise WireError(too_large(len(data)))
+                raise WireError(size_error_text(len(data)))
         except WireError as error:
             query.drop()
             self.tally.add_unreadable()
@@ -102,22 +102,22 @@ class ZenohServer:
         deadline = None if call.timeout_s is None else time.monotonic() + call.timeout_s
         number = call.number
         incoming = IncomingCall(
-            data, call.codec, deadline, lambda reply: self._answer(query, number, fitting(reply))
+            data, call.codec, deadline, lambda reply: self._reply(query, number, limit_reply_size(reply))
         )
         if not self.calls.put(incoming):
-            incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+            incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _answer(self, query: Any, number: int, reply: Reply) -> bool:  # noqa: ANN401 - zenoh is not typed
+    def _reply(self, query: Any, number: int, reply: Reply) -> bool:  # noqa: ANN401 - zenoh is not typed
         self.tally.add(reply)
         with self._lock:
             if query not in self._queries:
                 return False
             self._queries.discard(query)
-        header, data = (bytes(each) for each in NATIVE.answer(number, reply))
+        header, data = (bytes(each) for each in NATIVE.reply(number, reply))
         try:
             with query:
                 query.reply(self._key, data, attachment=header)
-        except library().ZError as error:  # the session was closed meanwhile
+        except load_zenoh().ZError as error:  # the session was closed meanwhile
             _logger.debug("can't send a reply of '%s': %s", self.spec.service, error)
             return False
         return True
@@ -129,9 +129,9 @@ class ZenohServer:
 
     def begin_close(self) -> None:
         """Unregister; reject queued and new calls."""
-        self._session.forget_service(self)
+        self._session.discard_service(self)
         for call in self.calls.close():
-            call.answer(refusal(self.spec.service, is_closed=True))
+            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies are flushed by the session
         """Close the server; calls without a reply fail."""
@@ -141,7 +141,7 @@ class ZenohServer:
                 return
             self.is_closed = True
             left, self._queries = tuple(self._queries), set()
-        with suppress(library().ZError):  # closing the session has undeclared it
+        with suppress(load_zenoh().ZError):  # closing the session has undeclared it
             self._queryable.undeclare()
         for query in left:
             query.drop()
@@ -151,7 +151,7 @@ class ZenohServer:
         """Mark the server as closed in a forked child process."""
         self.is_closed = True
         for query in self._queries:
-            keep_forever(query)
+            prevent_finalization(query)
         self._lock = threading.Lock()
         self.calls.forked()
 
@@ -164,7 +164,7 @@ class _Call:
     data: bytes | memoryview
     timeout_s: float | None
     deadline: float
-    then: Then
+    callback: OutcomeCallback
     key: str = ""
     finished_at: float = math.inf
     size: int = 0
@@ -207,14 +207,18 @@ class ZenohClient(ClientCalls[_Call]):
         """Number of servers of the service."""
         return len(self._servers)
 
-    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+    def start_call(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> OpenCall:
         """Send a call. See `ClientTransport.begin`."""
         call = self._new_call(data, timeout_s, then)
         self._send(call, next(iter(self._servers), ""))
         self._deadlines.add(call.deadline)
         return call
 
-    def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
+    def start_survey(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> list[OpenCall]:
         """Send a call to each server. See `SurveyTransport.begin_all`."""
         calls: list[OpenCall] = []
         try:
@@ -224,11 +228,11 @@ class ZenohClient(ClientCalls[_Call]):
                 self._send(call, key)
                 self._deadlines.add(call.deadline)
         except BaseException:
-            self.forget_all(calls)
+            self.cancel_all(calls)
             raise
         return calls
 
-    def _new_call(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
+    def _new_call(self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback) -> _Call:
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -255,9 +259,9 @@ class ZenohClient(ClientCalls[_Call]):
                 parts,
                 query_s,
                 lambda reply: self._handle_reply(call, reply),
-                lambda: self._handle_finished(call),
+                lambda: self._handle_query_finished(call),
             )
-        except library().ZError as error:  # the session was closed meanwhile
+        except load_zenoh().ZError as error:  # the session was closed meanwhile
             _logger.debug("can't send a call of '%s': %s", self.spec.service, error)
             self._finish(call, self._closed_error())
 
@@ -268,7 +272,7 @@ class ZenohClient(ClientCalls[_Call]):
         sample = reply.ok
         attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
         try:
-            number, outcome = NATIVE.read_answer([attachment, sample.payload.to_bytes()])
+            number, outcome = NATIVE.read_reply([attachment, sample.payload.to_bytes()])
             if number != call.number:
                 raise WireError(_("it is not a service reply"))
         except WireError as error:
@@ -280,7 +284,7 @@ class ZenohClient(ClientCalls[_Call]):
             with self._lock:
                 self.late += 1
 
-    def _handle_finished(self, call: _Call) -> None:
+    def _handle_query_finished(self, call: _Call) -> None:
         # The query is finished: without a reply, the server has ended or never received the call.
         if call.key not in self._servers:
             self._finish(call, ServerGoneError(self.spec.service))
@@ -288,7 +292,7 @@ class ZenohClient(ClientCalls[_Call]):
         call.finished_at = time.monotonic() + _TOKEN_DELAY_S
         self._deadlines.add(call.finished_at)
 
-    def _fail_unanswered(self, call: _Call, now: float) -> None:
+    def _fail_without_reply(self, call: _Call, now: float) -> None:
         # Handles calls whose query is finished without a reply.
         if call.key not in self._servers:
             self._finish(call, ServerGoneError(self.spec.service))
@@ -309,10 +313,10 @@ class ZenohClient(ClientCalls[_Call]):
         self._run_callback(call, outcome)
         return True
 
-    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel several calls; their callbacks aren't called."""
         for call in calls:
-            self.forget(call)
+            self.cancel(call)
 
     # ---- events
 
@@ -330,7 +334,7 @@ class ZenohClient(ClientCalls[_Call]):
         with self._lock:
             finished = [each for each in self._calls.values() if each.finished_at < math.inf]
         for call in finished:
-            self._fail_unanswered(call, now)
+            self._fail_without_reply(call, now)
         with self._lock:
             late = [each for each in self._calls.values() if each.deadline <= now]
         for call in late:
@@ -342,7 +346,7 @@ class ZenohClient(ClientCalls[_Call]):
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - immediate
         """Return the names of services that have a server."""
-        return tuple(sorted(self._session.roster.served))
+        return tuple(sorted(self._session.roster.service_names))
 
     def counts(self) -> SubscriberCount:
         """Return the statistics shown in the graph."""
@@ -357,8 +361,8 @@ class ZenohClient(ClientCalls[_Call]):
                 return
             self.is_closed = True
             left, self._calls = list(self._calls.values()), {}
-        self._session.forget_service(self)
-        self._deadlines.forget(self)
+        self._session.discard_service(self)
+        self._deadlines.remove_client(self)
         self._on_close(self)
         for call in left:
             self._run_callback(call, self._closed_error())

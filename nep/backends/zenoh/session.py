@@ -10,23 +10,23 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from nep.backends.zenoh.keys import (
-    ALL_CALLS,
-    ALL_LIVE,
+    ALL_CALLS_KEY,
+    ALL_TOKENS_KEY,
     call_key,
     client_key,
     data_key,
-    data_keys,
     hello_key,
     hellos_key,
-    hellos_keys,
     node_key,
-    parse_live,
+    parse_token,
+    pattern_data_key,
+    pattern_hellos_key,
     publisher_key,
     server_key,
     subscriber_key,
 )
-from nep.backends.zenoh.library import callback, close_session, library
-from nep.backends.zenoh.places import open_place
+from nep.backends.zenoh.library import close_session, create_handler, load_zenoh
+from nep.backends.zenoh.places import open_session_at
 from nep.backends.zenoh.publisher import ZenohPublisher
 from nep.backends.zenoh.roster import Roster
 from nep.backends.zenoh.subscriber import ZenohSubscriber
@@ -54,7 +54,7 @@ from nep.system.cpu import CpuLoad
 _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
 """Extra time in seconds before a query times out here; zenoh normally reports the timeout earlier."""
-_GREETING_S = 10.0
+_HANDSHAKE_TIMEOUT_S = 10.0
 _MAX_REPLIES, _MAX_LIST_ITEMS = 100, 20_000
 
 
@@ -139,15 +139,15 @@ class ZenohSession:
         self._outputs: dict[int, Any] = {}
         self._load = CpuLoad()
         self._graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
-        self._opened = open_place(place, wait_s)
+        self._opened = open_session_at(place, wait_s)
         self.endpoints = self._opened.endpoints
         self._zenoh: Any = self._opened.session
         try:
             self._declared = (
                 self._zenoh.liveliness().declare_subscriber(
-                    ALL_LIVE, callback(self._handle_token), history=True
+                    ALL_TOKENS_KEY, create_handler(self._handle_token), history=True
                 ),
-                self._zenoh.declare_queryable(call_key(node.id), callback(self._handle_query)),
+                self._zenoh.declare_queryable(call_key(node.id), create_handler(self._handle_query)),
             )
         except BaseException:
             self.close(0.0)
@@ -155,7 +155,7 @@ class ZenohSession:
 
     # ---- requests
 
-    def ask(
+    def send_query(
         self,
         key: str,
         request: Request | None,
@@ -178,17 +178,17 @@ class ZenohSession:
         Returns:
             The query, whose replies can be waited for.
         """
-        zenoh = library()
+        zenoh = load_zenoh()
         query = PendingQuery(timeout_s, over)
 
-        def answered(reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
+        def handle_reply(reply: Any) -> None:  # noqa: ANN401 - zenoh is not typed
             if take is not None and reply.ok is not None:
                 take(reply.ok)
             query.add_reply(reply)
 
         self._zenoh.get(
             key,
-            callback(answered, query.finish),
+            create_handler(handle_reply, query.finish),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=max(timeout_s, 0.001),
@@ -203,9 +203,9 @@ class ZenohSession:
 
         Afterwards both sides know all declarations that the other made before.
         """
-        if self._opened.meeting is None:
+        if self._opened.rendezvous is None:
             self._sync_routers(timeout_s)
-        query = self.ask(ALL_CALLS, requests.Ping(), timeout_s)
+        query = self.send_query(ALL_CALLS_KEY, requests.Ping(), timeout_s)
         query.wait()
         return query.replies
 
@@ -213,7 +213,7 @@ class ZenohSession:
         # The reply of the routers follows the declarations of all reachable nodes.
         query = PendingQuery(timeout_s)
         self._zenoh.liveliness().get(
-            node_key(self.node), callback(query.add_reply, query.finish), timeout=max(timeout_s, 0.001)
+            node_key(self.node), create_handler(query.add_reply, query.finish), timeout=max(timeout_s, 0.001)
         )
         query.wait()
 
@@ -221,11 +221,11 @@ class ZenohSession:
         # Runs in a zenoh thread.
         asked = decode_request(b"" if query.payload is None else query.payload.to_bytes()).request
         answer = b""
-        if isinstance(asked, requests.Look):
+        if isinstance(asked, requests.QueryGraph):
             answer = pack_saturated([encode_request(each, 0) for each in self._own_requests()])
         elif isinstance(asked, requests.RemovePublisher):
             for subscriber in self._subscribers:
-                subscriber.bye(asked.id, asked.last_seq)
+                subscriber.handle_bye(asked.id, asked.last_seq)
         with query:
             query.reply(call_key(self.node.id), answer)
 
@@ -276,11 +276,11 @@ class ZenohSession:
 
     def _handle_token(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
         # Runs in a zenoh thread.
-        alive = parse_live(str(sample.key_expr))
+        alive = parse_token(str(sample.key_expr))
         if alive is None:
             return
-        is_there = sample.kind == library().SampleKind.PUT
-        self.roster.note(alive, is_there=is_there)
+        is_there = sample.kind == load_zenoh().SampleKind.PUT
+        self.roster.update(alive, is_there=is_there)
         record = alive.record
         if not isinstance(record, PublisherRecord):
             return
@@ -292,19 +292,19 @@ class ZenohSession:
         for subscriber in self._subscribers:
             if subscriber.matches_topic(record.topic):
                 if is_there:
-                    subscriber.add_publisher(self.roster.remote(alive.node_id, record))
-                    self._greet(record, subscriber)
+                    subscriber.add_publisher(self.roster.remote_publisher(alive.node_id, record))
+                    self._start_handshake(record, subscriber)
                 else:
                     subscriber.mark_silent(record.id)
 
-    def _greet(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
+    def _start_handshake(self, record: PublisherRecord, subscriber: ZenohSubscriber) -> None:
         # Greets a publisher that was created after its subscriber.
-        self.ask(
+        self.send_query(
             hello_key(record.topic, record.id),
             None,
-            _GREETING_S,
+            _HANDSHAKE_TIMEOUT_S,
             take=subscriber.receive_reply,
-            over=lambda: subscriber.end_greeting((record.id,)),
+            over=lambda: subscriber.end_handshake((record.id,)),
         )
 
     def query_graph(self, timeout_s: float) -> GraphView:
@@ -318,9 +318,9 @@ class ZenohSession:
                     place=",".join(self._opened.routers)
                 )
             )
-        query = self.ask(ALL_CALLS, requests.Look(), timeout_s)
+        query = self.send_query(ALL_CALLS_KEY, requests.QueryGraph(), timeout_s)
         query.wait()
-        told = [_requests_in(key, answer) for key, answer in query.replies.items()]
+        told = [_parse_requests(key, answer) for key, answer in query.replies.items()]
         with self._lock:
             now = time.monotonic()
             spoken = {each.node.id for said in told for each in said if isinstance(each, requests.Join)}
@@ -346,16 +346,16 @@ class ZenohSession:
         """Announce this node by its token."""
         with self._lock:
             if self.node.id not in self._tokens:
-                self._tokens[self.node.id] = self._declare(node_key(self.node))
+                self._tokens[self.node.id] = self._declare_token(node_key(self.node))
 
-    def _declare(self, key: str) -> Any:  # noqa: ANN401 - zenoh is not typed
+    def _declare_token(self, key: str) -> Any:  # noqa: ANN401 - zenoh is not typed
         return self._zenoh.liveliness().declare_token(key)
 
     def add_publisher(self, publisher: ZenohPublisher) -> None:
         """Announce a publisher by its token."""
         with self._lock:
             self._publishers = (*self._publishers, publisher)
-            self._tokens[publisher] = self._declare(publisher_key(self.node.id, publisher.record))
+            self._tokens[publisher] = self._declare_token(publisher_key(self.node.id, publisher.record))
 
     def add_subscriber(self, subscriber: ZenohSubscriber) -> None:
         """Subscribe at zenoh and announce a subscriber by its token."""
@@ -363,13 +363,15 @@ class ZenohSession:
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
         for remote in self._publishers_for(subscriber):  # messages that arrive before the greeting are queued
             subscriber.add_publisher(remote)
-        key = data_keys(spec.topic) if spec.is_pattern else data_key(spec.topic)
+        key = pattern_data_key(spec.topic) if spec.is_pattern else data_key(spec.topic)
         with self._lock:
             self._subscribers = (*self._subscribers, subscriber)
-            self._outputs[spec.id] = self._zenoh.declare_subscriber(key, callback(subscriber.receive_message))
-            self._tokens[subscriber] = self._declare(subscriber_key(self.node.id, record))
+            self._outputs[spec.id] = self._zenoh.declare_subscriber(
+                key, create_handler(subscriber.receive_message)
+            )
+            self._tokens[subscriber] = self._declare_token(subscriber_key(self.node.id, record))
 
-    def greet_all(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
+    def perform_handshake(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
         """Send a hello to all publishers of a subscriber's topic.
 
         They reply with their history and the sequence number of their last message.
@@ -378,12 +380,12 @@ class ZenohSession:
         for remote in there:
             subscriber.add_publisher(remote)
         spec = subscriber.spec
-        key = hellos_keys(spec.topic) if spec.is_pattern else hellos_key(spec.topic)
-        self.ask(key, None, timeout_s, take=subscriber.receive_reply).wait()
-        subscriber.end_greeting(each.publisher.id for each in there)
+        key = pattern_hellos_key(spec.topic) if spec.is_pattern else hellos_key(spec.topic)
+        self.send_query(key, None, timeout_s, take=subscriber.receive_reply).wait()
+        subscriber.end_handshake(each.publisher.id for each in there)
 
     def _publishers_for(self, subscriber: ZenohSubscriber) -> tuple[RemotePublisher, ...]:
-        topics = self.roster.published if subscriber.spec.is_pattern else (subscriber.spec.topic,)
+        topics = self.roster.published_topics if subscriber.spec.is_pattern else (subscriber.spec.topic,)
         return tuple(
             remote
             for topic in topics
@@ -391,11 +393,11 @@ class ZenohSession:
             for remote in self.roster.publishers_of(topic)
         )
 
-    def publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
+    def create_publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
         """Create a publisher. `make` receives zenoh's session."""
         return make(self._zenoh)
 
-    def forget(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
+    def discard(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
         """Remove a closed publisher or subscriber and its token."""
         with self._lock:
             self._publishers = tuple(each for each in self._publishers if each is not closed)
@@ -405,7 +407,7 @@ class ZenohSession:
                 undeclared.append(self._outputs.pop(closed.spec.id, None))
         for each in undeclared:
             if each is not None:
-                with suppress(library().ZError):  # closing the session has undeclared it
+                with suppress(load_zenoh().ZError):  # closing the session has undeclared it
                     each.undeclare()
 
     # ---- servers and clients
@@ -414,27 +416,27 @@ class ZenohSession:
         """Announce a server by its token."""
         with self._lock:
             self._servers = (*self._servers, server)
-            self._tokens[server] = self._declare(server_key(self.node.id, server.record))
+            self._tokens[server] = self._declare_token(server_key(self.node.id, server.record))
 
     def add_client(self, client: ListedClient) -> None:
         """Announce a client by its token."""
         with self._lock:
             self._clients = (*self._clients, client)
-            self._tokens[client] = self._declare(client_key(self.node.id, client.record))
+            self._tokens[client] = self._declare_token(client_key(self.node.id, client.record))
 
-    def forget_service(self, closed: ListedServer | ListedClient) -> None:
+    def discard_service(self, closed: ListedServer | ListedClient) -> None:
         """Remove a closed server or client and its token. Idempotent."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
             token = self._tokens.pop(closed, None)
         if token is not None:
-            with suppress(library().ZError):  # closing the session has undeclared it
+            with suppress(load_zenoh().ZError):  # closing the session has undeclared it
                 token.undeclare()
 
     def declare_queryable(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
         """Declare a queryable at `key`; `take` is called with each query."""
-        return self._zenoh.declare_queryable(key, callback(take))
+        return self._zenoh.declare_queryable(key, create_handler(take))
 
     def call(
         self,
@@ -445,11 +447,11 @@ class ZenohSession:
         over: Callable[[], None],
     ) -> None:
         """Send a call to the server at `key`. Raises zenoh's `ZError`."""
-        zenoh = library()
+        zenoh = load_zenoh()
         header, data = (each if isinstance(each, bytes) else bytes(each) for each in parts)
         self._zenoh.get(
             key,
-            callback(take, over),
+            create_handler(take, over),
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,
@@ -462,7 +464,7 @@ class ZenohSession:
 
     def close(self, timeout_s: float) -> None:
         """Remove all tokens, wait until the other nodes know that, and close the session."""
-        self._opened.leave()
+        self._opened.unregister()
         with self._lock:
             tokens = list(self._tokens.values())
             self._tokens.clear()
@@ -473,7 +475,7 @@ class ZenohSession:
         close_session(self._zenoh)
 
 
-def _requests_in(key: str, answer: bytes) -> tuple[Request, ...]:
+def _parse_requests(key: str, answer: bytes) -> tuple[Request, ...]:
     # Ignores malformed requests and those about other nodes.
     try:
         bodies = unpack_bounded(answer, _MAX_REPLIES, _MAX_LIST_ITEMS) if answer else []

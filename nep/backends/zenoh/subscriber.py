@@ -34,7 +34,7 @@ class _TopicParser(NamedTuple):
     # Parser for one topic. `topic` and `own` are the first parts of messages to all, and to this subscriber
     # alone.
     topic: bytes
-    own: bytes
+    subscriber_part: bytes
     parser: CarefulParser
 
 
@@ -63,7 +63,9 @@ class ZenohSubscriber(WakingSubscriber):
     def _new_topic_parser(self, topic: str) -> _TopicParser:
         spec = self.spec if topic == self.spec.topic else replace(self.spec, topic=topic)
         own = hello_part(spec.id, topic)
-        parser = CarefulParser(spec, own, self._sources, self._leave, lambda _publisher, _seq: None)
+        parser = CarefulParser(
+            spec, own, self._sources, self._remove_publisher, lambda _publisher, _seq: None
+        )
         return _TopicParser(topic_part(topic), own, parser)
 
     def matches_topic(self, topic: str) -> bool:
@@ -109,7 +111,7 @@ class ZenohSubscriber(WakingSubscriber):
     def take_batch(self) -> list[Message]:
         """Remove and return the messages for one call of the sink."""
         with self._inboxes.changed:
-            return self._inbox.take_all(_BATCH_BYTES)
+            return self._inbox.pop_all(_BATCH_BYTES)
 
     @property
     def received(self) -> int:
@@ -147,7 +149,7 @@ class ZenohSubscriber(WakingSubscriber):
         """Handle a publisher's reply to a hello: a message of its history, or its last sequence number."""
         topic_parser = self._topic_parser_for(sample)
         if topic_parser is not None:
-            self._process(sample, topic_parser, topic_parser.own)
+            self._process(sample, topic_parser, topic_parser.subscriber_part)
 
     def _process(self, sample: Any, topic_parser: _TopicParser, first: bytes) -> None:  # noqa: ANN401 - zenoh is not typed
         payload: bytes = sample.payload.to_bytes()
@@ -171,32 +173,36 @@ class ZenohSubscriber(WakingSubscriber):
         try:
             if not rest[0]:
                 raise WireError(_("it has no header; the publisher is not a nep program"), len(rest[-1]))
-            if first == topic_parser.topic and _is_latched(rest[0]) and self._is_early(topic_parser, rest):
+            if (
+                first == topic_parser.topic
+                and _is_latched(rest[0])
+                and self._queue_if_early(topic_parser, rest)
+            ):
                 return
-            self._append(topic_parser.parser.parse(first, rest))
-            if first == topic_parser.own and len(rest) == 1:  # end of the reply to a hello
+            self._enqueue(topic_parser.parser.parse(first, rest))
+            if first == topic_parser.subscriber_part and len(rest) == 1:  # end of the reply to a hello
                 self._release_early(read_header(rest[0]).publisher)
         except WireError as error:
             if self._refusals.add(error.reason):
                 _logger.warning("malformed message on '%s': %s", self.spec.topic, error)
 
-    def _is_early(self, topic_parser: _TopicParser, rest: list[bytes]) -> bool:
+    def _queue_if_early(self, topic_parser: _TopicParser, rest: list[bytes]) -> bool:
         header = read_header(rest[0])
-        is_early = self._early.keep(header, (topic_parser, rest), sum(map(len, rest)))
+        is_early = self._early.queue_if_early(header, (topic_parser, rest), sum(map(len, rest)))
         if not is_early:  # messages queued before this one need not wait any longer, either
             self._release_early(header.publisher)
         return is_early
 
-    def _append(self, message: Message | None) -> None:
+    def _enqueue(self, message: Message | None) -> None:
         if message is not None:
             self._sources.count_dropped(self._inbox.put(message))
             self.notify_waiting()
 
     def _release_early(self, publisher: int) -> None:
         for topic_parser, rest in self._early.pop(publisher):
-            self._append(topic_parser.parser.parse(topic_parser.topic, rest))
+            self._enqueue(topic_parser.parser.parse(topic_parser.topic, rest))
 
-    def end_greeting(self, publishers: Iterable[int]) -> None:
+    def end_handshake(self, publishers: Iterable[int]) -> None:
         """Stop waiting for these publishers' replies to a hello."""
         with self._inboxes.changed:
             for publisher in publishers:
@@ -205,7 +211,7 @@ class ZenohSubscriber(WakingSubscriber):
     def add_publisher(self, remote: RemotePublisher) -> None:
         """Add a publisher."""
         with self._inboxes.changed:
-            for old in self._sources.replaced_by(remote):
+            for old in self._sources.replaced_publishers(remote):
                 self._sources.pop(old)
             self._sources.add_listed(remote).is_silent = False
 
@@ -215,10 +221,10 @@ class ZenohSubscriber(WakingSubscriber):
             source = self._sources.find(publisher)
             if source is not None:
                 source.is_silent = True
-            for each in self._sources.expired(0.0):
+            for each in self._sources.expired_publishers(0.0):
                 self._sources.pop(each)
 
-    def bye(self, publisher: int, last_seq: int) -> None:
+    def handle_bye(self, publisher: int, last_seq: int) -> None:
         """Handle a publisher's bye, which states `last_seq` as its last message."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
@@ -227,7 +233,7 @@ class ZenohSubscriber(WakingSubscriber):
                     self._sources.advance_to(publisher, last_seq)
                 self._sources.pop(publisher)
 
-    def _leave(self, publisher: int) -> None:
+    def _remove_publisher(self, publisher: int) -> None:
         self._sources.pop(publisher)
 
     # ---- closing
@@ -238,7 +244,7 @@ class ZenohSubscriber(WakingSubscriber):
             if self.is_closed:
                 return
             self.is_closed = True
-            self._inbox.take_all()
+            self._inbox.pop_all()
             self.notify_waiting()
         self._inboxes.remove_sink(self)
         self._on_close(self)

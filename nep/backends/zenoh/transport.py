@@ -10,12 +10,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from nep.backends.base import HANDSHAKE_S, PublisherSpec, SubscriberSpec, SubscriberTransport
+from nep.backends.base import HANDSHAKE_TIMEOUT_S, PublisherSpec, SubscriberSpec, SubscriberTransport
 from nep.backends.connection import Configuration, Direct
-from nep.backends.services import CallQueue, ClientSpec, ServerSpec, woken_by
+from nep.backends.services import CallQueue, ClientSpec, ServerSpec, wake_on_call
 from nep.backends.zenoh.inboxes import Inboxes
-from nep.backends.zenoh.keys import ALL_CALLS, call_key
-from nep.backends.zenoh.library import library
+from nep.backends.zenoh.keys import ALL_CALLS_KEY, call_key
+from nep.backends.zenoh.library import load_zenoh
 from nep.backends.zenoh.node_services import ZenohServices
 from nep.backends.zenoh.publisher import ZenohPublisher
 from nep.backends.zenoh.services import ZenohClient, ZenohServer
@@ -24,8 +24,8 @@ from nep.backends.zenoh.subscriber import ZenohSubscriber
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import Expected, NodeRecord, RemovePublisher, SubscriberRecord
-from nep.system.forks import give_up, watch
+from nep.protocol.requests import ExpectedSubscriber, NodeRecord, RemovePublisher, SubscriberRecord
+from nep.system.forks import close_in_child, watch
 
 _logger = logging.getLogger("nep")
 _CLOSE_TIMEOUT_S = 0.3
@@ -37,14 +37,14 @@ class _PendingFlush:
     # Closing publisher, and its flush request to the nodes of its subscribers.
     session: ZenohSession
     query: PendingQuery
-    expected: tuple[Expected, ...]
+    expected: tuple[ExpectedSubscriber, ...]
 
 
 class ZenohTransport:
     """Connection of one node. Raises `BackendUnavailableError` if zenoh is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
-        library()
+        load_zenoh()
         self._node = node
         self._inboxes = Inboxes(node.name)
         self._lock = threading.Lock()
@@ -60,12 +60,12 @@ class ZenohTransport:
 
     # ---- publishers and subscribers
 
-    def publisher(self, spec: PublisherSpec) -> ZenohPublisher:
+    def create_publisher(self, spec: PublisherSpec) -> ZenohPublisher:
         """Create a publisher. See `Transport.publisher`."""
-        with self._closed_errors():
-            return self._publisher(spec)
+        with self._translate_closed_errors():
+            return self._create_publisher(spec)
 
-    def _publisher(self, spec: PublisherSpec) -> ZenohPublisher:
+    def _create_publisher(self, spec: PublisherSpec) -> ZenohPublisher:
         session = self._session(spec.configuration, spec.wait_s)
 
         def make(zenoh_session: Any) -> ZenohPublisher:  # noqa: ANN401 - zenoh is not typed
@@ -74,12 +74,12 @@ class ZenohTransport:
             )
 
         session.join()
-        publisher = session.publisher(make)
+        publisher = session.create_publisher(make)
         try:
             session.check(publisher.record)
             self._add(self._publishers, publisher, session)
             session.add_publisher(publisher)
-            answered = session.sync_all(HANDSHAKE_S)
+            answered = session.sync_all(HANDSHAKE_TIMEOUT_S)
             expected = session.roster.subscribers_of(spec.topic)
             missing = [each for each in expected if call_key(each.node_id) not in answered]
             publisher.missing = tuple(dict.fromkeys(each.node_name for each in missing))
@@ -89,12 +89,12 @@ class ZenohTransport:
             raise
         return publisher
 
-    def subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
+    def create_subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
         """Create a subscriber. See `Transport.subscriber`."""
-        with self._closed_errors():
-            return self._subscriber(spec)
+        with self._translate_closed_errors():
+            return self._create_subscriber(spec)
 
-    def _subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
+    def _create_subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
         session = self._session(spec.configuration, spec.wait_s)
         session.check(SubscriberRecord(spec.id, spec.topic, spec.msg_type))
         session.join()
@@ -102,8 +102,8 @@ class ZenohTransport:
         self._add(self._subscribers, subscriber, session)
         try:
             session.add_subscriber(subscriber)
-            session.sync_all(HANDSHAKE_S)
-            session.greet_all(subscriber, HANDSHAKE_S)
+            session.sync_all(HANDSHAKE_TIMEOUT_S)
+            session.perform_handshake(subscriber, HANDSHAKE_TIMEOUT_S)
             if spec.sink is not None:
                 self._inboxes.add_sink(subscriber)
         except BaseException:
@@ -111,26 +111,26 @@ class ZenohTransport:
             raise
         return subscriber
 
-    def server(self, spec: ServerSpec) -> ZenohServer:
+    def create_server(self, spec: ServerSpec) -> ZenohServer:
         """Create a server. See `ServiceTransport.server`."""
-        with self._closed_errors():
-            return self._services.server(spec)
+        with self._translate_closed_errors():
+            return self._services.create_server(spec)
 
-    def client(self, spec: ClientSpec) -> ZenohClient:
+    def create_client(self, spec: ClientSpec) -> ZenohClient:
         """Create a client. See `ServiceTransport.client`."""
-        with self._closed_errors():
-            return self._services.client(spec)
+        with self._translate_closed_errors():
+            return self._services.create_client(spec)
 
-    def survey(self, spec: ClientSpec) -> ZenohClient:
+    def create_surveyor(self, spec: ClientSpec) -> ZenohClient:
         """Create a surveyor. See `ServiceTransport.survey`."""
-        return self.client(spec)
+        return self.create_client(spec)
 
     @contextmanager
-    def _closed_errors(self) -> Iterator[None]:
+    def _translate_closed_errors(self) -> Iterator[None]:
         # Converts errors of zenoh to `ClosedError` if the node was closed meanwhile.
         try:
             yield
-        except library().ZError as error:
+        except load_zenoh().ZError as error:
             with self._lock:
                 is_closed = self._is_closed
             if is_closed:
@@ -177,26 +177,26 @@ class ZenohTransport:
         with self._lock:
             session = self._subscribers.pop(subscriber, None)
         if session is not None:
-            session.forget(subscriber)
+            session.discard(subscriber)
 
     def _close_publisher(self, publisher: ZenohPublisher, timeout_s: float) -> None:
-        self._say_bye(publisher)
-        self._finish(publisher, time.monotonic() + timeout_s)
+        self._send_bye(publisher)
+        self._wait_for_flush(publisher, time.monotonic() + timeout_s)
 
-    def _say_bye(self, publisher: ZenohPublisher) -> None:
+    def _send_bye(self, publisher: ZenohPublisher) -> None:
         # Asks the subscribers' nodes to confirm that all messages have arrived; doesn't wait.
         with self._lock:
             session = self._publishers.get(publisher)
-        if not publisher.end() or session is None:
+        if not publisher.mark_closed() or session is None:
             return
         expected = session.roster.subscribers_of(publisher.spec.topic)
         if expected and publisher.count:
             request = RemovePublisher(self._node.id, publisher.spec.id, publisher.count)
-            query = session.ask(ALL_CALLS, request, _MAX_FLUSH_S, is_last=True)
+            query = session.send_query(ALL_CALLS_KEY, request, _MAX_FLUSH_S, is_last=True)
             with self._lock:
                 self._pending_flushes[publisher] = _PendingFlush(session, query, expected)
 
-    def _finish(self, publisher: ZenohPublisher, deadline: float) -> None:
+    def _wait_for_flush(self, publisher: ZenohPublisher, deadline: float) -> None:
         # Waits for the confirmations until `deadline`; logs undelivered messages.
         with self._lock:
             pending_flush = self._pending_flushes.pop(publisher, None)
@@ -220,7 +220,7 @@ class ZenohTransport:
                 )
         publisher.release()
         if session is not None:
-            session.forget(publisher)
+            session.discard(publisher)
 
     # ---- waiting
 
@@ -232,8 +232,8 @@ class ZenohTransport:
     ) -> None:
         """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
-        before = self._inboxes.wakes
-        with woken_by(calls, self.wake) as is_empty:
+        before = self._inboxes.wake_count
+        with wake_on_call(calls, self.wake) as is_empty:
             if is_empty:
                 self._inboxes.wait(own_subscribers, timeout_s, before)
 
@@ -245,8 +245,8 @@ class ZenohTransport:
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
         """Return the current graph. See `Transport.graph`."""
-        with self._closed_errors():
-            return self._session(configuration, timeout_s).query_graph(min(timeout_s, HANDSHAKE_S))
+        with self._translate_closed_errors():
+            return self._session(configuration, timeout_s).query_graph(min(timeout_s, HANDSHAKE_TIMEOUT_S))
 
     def begin_close(self) -> None:
         """Notify all peers that the node is closing; doesn't wait. See `Transport.begin_close`."""
@@ -257,7 +257,7 @@ class ZenohTransport:
             publishers = list(self._publishers)
         self._services.begin_close()
         for publisher in publishers:
-            self._say_bye(publisher)
+            self._send_bye(publisher)
 
     def close(self, timeout_s: float) -> None:
         """Close all sockets, sessions and threads. See `Transport.close`."""
@@ -271,7 +271,7 @@ class ZenohTransport:
         for subscriber in subscribers:
             subscriber.close()
         for publisher in publishers:
-            self._finish(publisher, deadline)
+            self._wait_for_flush(publisher, deadline)
         self._services.close(max(_CLOSE_TIMEOUT_S, deadline - time.monotonic()))
         self._inboxes.close(max(_CLOSE_TIMEOUT_S, deadline - time.monotonic()))
         with self._opening:
@@ -282,7 +282,7 @@ class ZenohTransport:
     def forked(self) -> None:
         """Close the descriptors of the parent's sockets in a forked child process. See `nep.system.forks`."""
         for session in self._sessions.values():
-            give_up(*session.endpoints)
+            close_in_child(*session.endpoints)
         self._services.forked()
         for subscriber in self._subscribers:
             subscriber.forked()

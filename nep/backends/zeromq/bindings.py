@@ -23,43 +23,49 @@ import zmq
 from nep.backends.zeromq.sockets import LOOPBACK, Socket, bind_free_port, keep_alive
 from nep.errors import AddressInUseError, TooManyFilesError
 from nep.protocol.requests import RemotePublisher
-from nep.system.addresses import endpoint_of, is_loopback, nearest
-from nep.system.descriptors import has_room
+from nep.system.addresses import endpoint_of, is_loopback, reachable_endpoint
+from nep.system.descriptors import has_free_descriptors
 
 _logger = logging.getLogger("nep")
 SMALL_CODECS = frozenset({"json", "string", "msgpack"})
 """Codecs whose messages are usually small: commands, replies, states."""
-_TCP = f"tcp://{LOOPBACK}:"
-_LOCAL = "ipc://@nep-"
-_FILES_TO_BIND_LOCAL = 384
-_FILES_TO_STAY_LOCAL = 192
+_TCP_PREFIX = f"tcp://{LOOPBACK}:"
+_UNIX_SOCKET_PREFIX = "ipc://@nep-"
+_MIN_FREE_FDS_TO_BIND = 384
+_MIN_FREE_FDS_TO_ACCEPT = 192
 """Number of descriptors to keep free: enough for the connections that can arrive between two checks."""
-_probed: set[bool] = set()
+_probe_results: set[bool] = set()
 """Contains True after a successful probe, so that later probes are skipped."""
 
 
-def has_local_names() -> bool:
+def has_unix_sockets() -> bool:
     """Return True if abstract Unix sockets can be used on this system."""
     return sys.platform == "linux" and zmq.has("ipc")
 
 
-def has_room_for_local() -> bool:
+def has_room_for_unix_sockets() -> bool:
     """Return True if this process has enough free descriptors to accept connections on a Unix socket.
 
     libzmq 4.3 aborts the process when it has none left; TCP connections wait in the kernel instead.
     """
-    return has_room(_FILES_TO_STAY_LOCAL)
+    return has_free_descriptors(_MIN_FREE_FDS_TO_ACCEPT)
 
 
-def local_name(endpoint: str) -> str:
+def unix_socket_name(endpoint: str) -> str:
     """Return the Unix socket name for a loopback endpoint; "" for other endpoints."""
-    return f"{_LOCAL}{endpoint.removeprefix(_TCP)}" if endpoint.startswith(_TCP) else ""
+    return (
+        f"{_UNIX_SOCKET_PREFIX}{endpoint.removeprefix(_TCP_PREFIX)}"
+        if endpoint.startswith(_TCP_PREFIX)
+        else ""
+    )
 
 
-def _bind_local_name(owner: Socket, endpoint: str) -> str:
+def _bind_unix_socket(owner: Socket, endpoint: str) -> str:
     name = (
-        local_name(endpoint)
-        if has_local_names() and has_room(_FILES_TO_BIND_LOCAL) and os.environ.get("NEP_LOCAL", "") != "0"
+        unix_socket_name(endpoint)
+        if has_unix_sockets()
+        and has_free_descriptors(_MIN_FREE_FDS_TO_BIND)
+        and os.environ.get("NEP_LOCAL", "") != "0"
         else ""
     )
     if name:
@@ -73,14 +79,14 @@ def _bind_local_name(owner: Socket, endpoint: str) -> str:
 
 def _is_reachable(name: str) -> bool:
     # A sandbox may block Unix sockets. The first success is cached.
-    if not _probed:
+    if not _probe_results:
         try:
             with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
                 probe.connect("\0" + name.removeprefix("ipc://@"))
         except OSError as error:
             _logger.debug("can't connect to '%s': %s", name, error)
             return False
-        _probed.add(True)
+        _probe_results.add(True)
     return True
 
 
@@ -96,9 +102,9 @@ def select_endpoint(remote: RemotePublisher, master: str) -> RemotePublisher:
     publisher = remote.publisher
     if not publisher.endpoints:
         return remote
-    chosen = nearest(publisher.endpoints, master)
-    if publisher.local and has_local_names() and is_loopback(master):
-        name = local_name(chosen)
+    chosen = reachable_endpoint(publisher.endpoints, master)
+    if publisher.local and has_unix_sockets() and is_loopback(master):
+        name = unix_socket_name(chosen)
         chosen = name if name and _is_reachable(name) else chosen
     return replace(remote, publisher=replace(publisher, endpoints=(chosen,) if chosen else ()))
 
@@ -144,7 +150,7 @@ class Bindings:
                 try:
                     keep_alive(self._socket, endpoint_of(f"{host}:*"), is_watched=self._is_watched)
                     self._bound[host] = bind_free_port(self._socket, host)
-                    name = _bind_local_name(self._socket, self._bound[host]) if self._may_be_local else ""
+                    name = _bind_unix_socket(self._socket, self._bound[host]) if self._may_be_local else ""
                     if name:
                         self._local[host] = name
                 except (AddressInUseError, TooManyFilesError) as error:

@@ -16,11 +16,11 @@ MIN_WINDOW_BYTES = 24 * 2**20
 
 It is two steps long, so that sending continues while an acknowledgement is under way.
 """
-ACK_STEP_BYTES = 12 * 2**20
+ACK_INTERVAL_BYTES = 12 * 2**20
 """Number of bytes after which an acknowledgement is requested from a subscriber."""
-BACKLOG_STEP_BYTES = 2**20
+TRACKING_INTERVAL_BYTES = 2**20
 """Number of bytes after which a message is tracked for subscribers without acknowledgements."""
-_ENTRY_BYTES = 2**20
+_MAX_ENTRY_BYTES = 2**20
 """Maximum size of an entry that several small messages share; acknowledged with its newest message."""
 _ACK_RETRY_S = 0.5
 """Interval in seconds for repeating a request. libzmq drops requests while the subscriber's queue is full."""
@@ -43,24 +43,24 @@ class SendWindow:
 
         A message larger than the window is sent when the window is almost empty.
         """
-        return self.unacked_bytes <= ACK_STEP_BYTES or self.unacked_bytes + size_bytes <= self._bound
+        return self.unacked_bytes <= ACK_INTERVAL_BYTES or self.unacked_bytes + size_bytes <= self._bound
 
-    def sent(self, seq: int, size_bytes: int) -> None:
+    def add_sent(self, seq: int, size_bytes: int) -> None:
         """Add `size_bytes` that were sent up to and including message `seq`."""
-        if self._sent and self._sent[-1][1] + size_bytes <= _ENTRY_BYTES:
+        if self._sent and self._sent[-1][1] + size_bytes <= _MAX_ENTRY_BYTES:
             self._sent.append((seq, self._sent.pop()[1] + size_bytes))
         else:
             self._sent.append((seq, size_bytes))
         self.unacked_bytes += size_bytes
         self._bytes_since_request += size_bytes
 
-    def note_drop(self) -> None:
+    def record_drop(self) -> None:
         """Record that a message was dropped because the window is full."""
         self._has_drops = True
 
     def should_notify(self) -> bool:
         """Return True once when the subscriber has room again after a drop and should be notified."""
-        if not self._has_drops or self.unacked_bytes > ACK_STEP_BYTES:
+        if not self._has_drops or self.unacked_bytes > ACK_INTERVAL_BYTES:
             return False
         self._has_drops = False
         return True
@@ -73,7 +73,7 @@ class SendWindow:
 
     def should_request_ack(self, now: float, *, has_room: bool) -> bool:
         """Return True, and restart the interval, if an acknowledgement should be requested."""
-        if self._bytes_since_request < ACK_STEP_BYTES and (
+        if self._bytes_since_request < ACK_INTERVAL_BYTES and (
             has_room or now < self._requested_at + _ACK_RETRY_S
         ):
             return False
@@ -82,7 +82,7 @@ class SendWindow:
         return True
 
 
-class Tracker(Protocol):
+class ReleaseTracker(Protocol):
     """Object that reports when libzmq has released a message, as `zmq.MessageTracker` does."""
 
     @property
@@ -98,16 +98,16 @@ class Backlog:
     """
 
     def __init__(self) -> None:
-        self._held: deque[tuple[Tracker, int]] = deque()
+        self._held: deque[tuple[ReleaseTracker, int]] = deque()
         self._bytes = 0
 
     def has_room(self, size_bytes: int) -> bool:
         """Return True if a message of this size can be sent."""
         while self._held and self._held[0][0].done:
             self._bytes -= self._held.popleft()[1]
-        return self._bytes <= BACKLOG_STEP_BYTES or self._bytes + size_bytes <= WINDOW_BYTES
+        return self._bytes <= TRACKING_INTERVAL_BYTES or self._bytes + size_bytes <= WINDOW_BYTES
 
-    def sent(self, tracker: Tracker, size_bytes: int) -> None:
+    def add_sent(self, tracker: ReleaseTracker, size_bytes: int) -> None:
         """Add `size_bytes` that were sent since the last call; `tracker` belongs to the newest message."""
         self._held.append((tracker, size_bytes))
         self._bytes += size_bytes

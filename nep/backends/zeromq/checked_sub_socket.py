@@ -16,14 +16,14 @@ from nep.backends.base import SubscriberSpec
 from nep.backends.zeromq.sockets import Socket
 from nep.backends.zeromq.sub_socket import SubSocket
 from nep.i18n import _
-from nep.protocol.wire import HEADER_BYTES, unpack_at, unpack_quickly
+from nep.protocol.wire import HEADER_BYTES, unpack_header, unpack_header_at
 
 CHECKED_TYPES = frozenset({"robot/answer"})
 """Message types that are accepted only from their listed publisher: the confirmation of a robot's stop."""
 
 _DONTWAIT = int(zmq.DONTWAIT)
 _SRCFD = int(zmq.SRCFD)
-_ADDRESS = re.compile(r"\d+\.\d+\.\d+\.\d+", re.ASCII)
+_IPV4_ADDRESS = re.compile(r"\d+\.\d+\.\d+\.\d+", re.ASCII)
 
 
 class CheckedSubSocket(SubSocket):
@@ -53,9 +53,9 @@ class CheckedSubSocket(SubSocket):
     def _is_authentic(self, parts: list[zmq.Frame]) -> bool:
         first = parts[0].bytes
         if len(first) >= self._body and first.startswith(self._topic):
-            publisher = unpack_at(first, self._topic_length)[-1]
+            publisher = unpack_header_at(first, self._topic_length)[-1]
         elif len(parts) > 1 and len(parts[1]) == HEADER_BYTES:
-            publisher = unpack_quickly(parts[1].bytes)[-1]
+            publisher = unpack_header(parts[1].bytes)[-1]
         else:
             return False
         source = self.sources.by_id.get(publisher)
@@ -80,4 +80,4 @@ def _is_connection_to(frame: zmq.Frame, endpoint: str) -> bool:
     host, _colon, port = place.rpartition(":")
     if not isinstance(peer, tuple) or str(peer[1]) != port:
         return False
-    return not _ADDRESS.fullmatch(host) or peer[0] == host
+    return not _IPV4_ADDRESS.fullmatch(host) or peer[0] == host

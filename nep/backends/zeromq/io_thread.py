@@ -34,7 +34,14 @@ from zmq.utils import garbage
 from nep.backends.zeromq.sockets import Socket
 from nep.errors import ClosedError, TooManyFilesError
 from nep.system import forks
-from nep.system.descriptors import SPARE, check_room, has_room, is_lack, limit, opened
+from nep.system.descriptors import (
+    RESERVED_DESCRIPTORS,
+    check_free_descriptors,
+    descriptor_limit,
+    has_free_descriptors,
+    is_descriptor_shortage,
+    open_descriptor_count,
+)
 from nep.system.forks import watch
 from nep.system.wakeup import Waker
 
@@ -43,14 +50,14 @@ _RETRY_S = 1.0
 
 _MAX_SOCKETS = 65_535
 """libzmq's upper limit; the limit on open files is reached first."""
-_CONTEXT_FILES = 12
-_SOCKET_FILES = 4
+_FDS_PER_CONTEXT = 12
+_FDS_PER_SOCKET = 4
 """Number of descriptors per socket: the socket, its port, its Unix socket and a connection."""
-_IDLE_WAKERS = 8
+_MAX_IDLE_WAKERS = 8
 _ROOM_CHECKS, _ROOM_CHECK_S = 10, 0.01
 _ReadyKey = tuple[selectors.SelectorKey, int]
 _EPOLL_TICK_S = 0.001
-_EPOLL = getattr(selectors, "EpollSelector", ())
+_EPOLL_SELECTOR = getattr(selectors, "EpollSelector", ())
 _SELECT_MAX_FD = 1024
 """Limit of `select`, which supports only descriptors below this number."""
 
@@ -66,7 +73,7 @@ class PollState(NamedTuple):
 
     pause_reading: bool = False
     due: float | None = None
-    sends: bool = False
+    wants_write: bool = False
 
 
 class Pollable(Protocol):
@@ -167,7 +174,7 @@ class IoThread:
         while not self._is_closing:
             self._turns += 1
             try:
-                self._turn()
+                self._run_once()
             except Exception:
                 if not self._is_closing:
                     _logger.exception("polling failed; rebuilding the poller")
@@ -177,9 +184,9 @@ class IoThread:
             if done is not None:
                 done.set()
 
-    def _turn(self) -> None:
+    def _run_once(self) -> None:
         timeout_s = self._timeout()
-        ready = _ready(self._selector, timeout_s)
+        ready = _select(self._selector, timeout_s)
         # Each system call releases the GIL and then waits for it, so avoid needless ones.
         if any(key.data is None for key, _events in ready):
             self._waker.clear()
@@ -229,7 +236,7 @@ class IoThread:
         if served not in self._served or self._is_closing:
             return  # removed while it was served
         try:
-            self._poll(served, _events(rest))
+            self._update_registration(served, _event_mask(rest))
         except (OSError, ValueError, KeyError) as error:
             _logger.error("can't poll a socket, serving it every second instead: %s", error)  # noqa: TRY400
             self._polled.pop(served, None)
@@ -265,7 +272,7 @@ class IoThread:
             trial.select(0)
         self._suspects.discard(served)
 
-    def _poll(self, served: Pollable, mask: int) -> None:
+    def _update_registration(self, served: Pollable, mask: int) -> None:
         polled = self._polled.get(served)
         if polled is None:
             if mask:
@@ -286,23 +293,25 @@ class IoThread:
         self._wake_times.pop(served, None)
         if served in self._polled:
             with suppress(OSError, ValueError, KeyError):  # the poller is closed or was rebuilt
-                self._poll(served, 0)
+                self._update_registration(served, 0)
 
     def _release(self) -> None:
         self._selector.close()
         self._waker.close()
 
 
-def _events(rest: PollState) -> int:
-    return (0 if rest.pause_reading else selectors.EVENT_READ) | (selectors.EVENT_WRITE if rest.sends else 0)
+def _event_mask(rest: PollState) -> int:
+    return (0 if rest.pause_reading else selectors.EVENT_READ) | (
+        selectors.EVENT_WRITE if rest.wants_write else 0
+    )
 
 
-def _ready(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequence[_ReadyKey]:
+def _select(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequence[_ReadyKey]:
     # epoll rounds timeouts up to a whole millisecond.
     if (
         timeout_s
         and timeout_s < _EPOLL_TICK_S
-        and isinstance(selector, _EPOLL)
+        and isinstance(selector, _EPOLL_SELECTOR)
         and selector.fileno() < _SELECT_MAX_FD
     ):
         if not select.select((selector.fileno(),), (), (), timeout_s)[0]:
@@ -315,7 +324,7 @@ class SharedContext:
     """ZeroMQ context of the process. Each call of `shared_context` must be followed by one of `leave`."""
 
     def __init__(self) -> None:
-        check_room(_CONTEXT_FILES, "a node")
+        check_free_descriptors(_FDS_PER_CONTEXT, "a node")
         self._context: zmq.Context[Socket] = zmq.Context()
         # libzmq rejects values above its compile-time limit, which is 16383 on Windows
         self._context.set(zmq.MAX_SOCKETS, min(_MAX_SOCKETS, self._context.get(zmq.SOCKET_LIMIT)))
@@ -338,8 +347,8 @@ class SharedContext:
         try:
             created = self._context.socket(kind)
         except zmq.ZMQError as error:
-            if is_lack(error.errno):
-                raise TooManyFilesError(what, opened(), limit()) from error
+            if is_descriptor_shortage(error.errno):
+                raise TooManyFilesError(what, open_descriptor_count(), descriptor_limit()) from error
             if self._context.closed:
                 raise ClosedError("the node") from error
             raise
@@ -349,31 +358,31 @@ class SharedContext:
     def _wait_for_room(self, what: str) -> None:
         # libzmq closes sockets asynchronously, so recently closed ones may still hold descriptors.
         for _ in range(_ROOM_CHECKS):
-            if has_room(_SOCKET_FILES + SPARE):
+            if has_free_descriptors(_FDS_PER_SOCKET + RESERVED_DESCRIPTORS):
                 return
             self._pause.wait(_ROOM_CHECK_S)
-        check_room(_SOCKET_FILES, what)
+        check_free_descriptors(_FDS_PER_SOCKET, what)
 
-    def take_waker(self) -> Waker:
+    def acquire_waker(self) -> Waker:
         """Return a waker for a waiting thread, from the pool if possible. Raises `TooManyFilesError`."""
         with self._lock:
             return self._idle_wakers.pop() if self._idle_wakers else Waker()
 
-    def give_waker(self, waker: Waker) -> None:
+    def release_waker(self, waker: Waker) -> None:
         """Return a waker to the pool for reuse."""
         waker.clear()
         with self._lock:
-            if not self._is_terminated and len(self._idle_wakers) < _IDLE_WAKERS:
+            if not self._is_terminated and len(self._idle_wakers) < _MAX_IDLE_WAKERS:
                 self._idle_wakers.append(waker)
                 return
         waker.close()
 
-    def join(self) -> None:
+    def acquire(self) -> None:
         """Add a user, so that the context isn't terminated before the matching `leave`."""
         with _lock:
             self.users += 1
 
-    def leave(self) -> None:
+    def release(self) -> None:
         """Remove a user, which must have closed all its sockets.
 
         The last user stops the thread and terminates the context.
@@ -382,7 +391,7 @@ class SharedContext:
             self.users -= 1
             if self.users:
                 return
-            _forget(self)
+            _discard_shared(self)
         self.io.close()
         self._context.term()
         with self._lock:
@@ -395,10 +404,10 @@ class SharedContext:
 _lock = threading.Lock()
 
 
-_shared: SharedContext | None = None
+_shared_context: SharedContext | None = None
 
 
-_inherited: list[SharedContext] = []
+_inherited_contexts: list[SharedContext] = []
 
 
 """Contexts inherited by a forked child process. They are kept: destroying them would affect the parent."""
@@ -406,28 +415,28 @@ _inherited: list[SharedContext] = []
 
 def shared_context() -> SharedContext:
     """Return the context of this process; create it if needed. Raises `TooManyFilesError`."""
-    global _shared  # noqa: PLW0603 - one per process
+    global _shared_context  # noqa: PLW0603 - one per process
     with _lock:
-        if _shared is None:
-            _shared = SharedContext()
-        _shared.users += 1
-        return _shared
+        if _shared_context is None:
+            _shared_context = SharedContext()
+        _shared_context.users += 1
+        return _shared_context
 
 
-def _forget(terminated: SharedContext) -> None:
-    global _shared  # noqa: PLW0603 - one per process
-    if _shared is terminated:
-        _shared = None
+def _discard_shared(terminated: SharedContext) -> None:
+    global _shared_context  # noqa: PLW0603 - one per process
+    if _shared_context is terminated:
+        _shared_context = None
 
 
 def _forked() -> None:
-    global _lock, _shared  # noqa: PLW0603 - one per process
+    global _lock, _shared_context  # noqa: PLW0603 - one per process
     _lock = threading.Lock()
-    if _shared is not None:
-        _inherited.append(_shared)
-        _shared = None
+    if _shared_context is not None:
+        _inherited_contexts.append(_shared_context)
+        _shared_context = None
     # pyzmq starts its garbage-collection thread under this lock; a fork at that moment leaves it locked.
     garbage.gc._lock = threading.Lock()  # noqa: SLF001
 
 
-forks.in_child(_forked)
+forks.call_in_child(_forked)

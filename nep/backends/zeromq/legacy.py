@@ -18,7 +18,7 @@ import zmq
 
 from nep.backends.base import PublisherSpec, SubscriberSpec
 from nep.backends.connection import Direct
-from nep.backends.zeromq.byte_window import BACKLOG_STEP_BYTES, Backlog
+from nep.backends.zeromq.byte_window import TRACKING_INTERVAL_BYTES, Backlog
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.sockets import (
     RejectionLog,
@@ -133,7 +133,7 @@ class OriginalPublisher:
         self._close_monitor.connect(monitor_endpoint)
 
     @property
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if any filter is set."""
         return self._filters > 0
 
@@ -150,7 +150,7 @@ class OriginalPublisher:
     def report(self, problem: str) -> None:
         """Ignore the problem, because a direct connection has no graph to report it in."""
 
-    def lend(self, _size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, _size_bytes: int) -> memoryview | None:
         """Return None, because the original wire has no shared memory."""
         return None
 
@@ -174,12 +174,12 @@ class OriginalPublisher:
 
     def _send(self, frame: bytes) -> None:
         self._untracked_bytes += len(frame)
-        if self._untracked_bytes < BACKLOG_STEP_BYTES:
+        if self._untracked_bytes < TRACKING_INTERVAL_BYTES:
             self._socket.send(frame, zmq.DONTWAIT)
             return
         tracked = zmq.Frame(frame, track=True, copy=False, copy_threshold=0)
         self._socket.send(tracked, zmq.DONTWAIT)
-        self._backlog.sent(tracked.tracker, self._untracked_bytes)
+        self._backlog.add_sent(tracked.tracker, self._untracked_bytes)
         self._untracked_bytes = 0
 
     def serve(self, now: float) -> PollState:  # noqa: ARG002 - nothing to schedule
@@ -192,7 +192,7 @@ class OriginalPublisher:
         """Unregister, flush and close the socket. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
-    def say_bye(self) -> None:
+    def send_bye(self) -> None:
         """Stop accepting messages."""
         with self._changed:
             self._is_closed = True
@@ -286,7 +286,7 @@ class OriginalSubSocket(UnbatchedReader):
                 self.received += 1
                 return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
 
-    def dropped(self, count: int) -> None:
+    def count_dropped(self, count: int) -> None:
         """Count messages dropped from the full queue, the only detectable losses."""
         self.received -= count
         self.lost = (self.lost or 0) + count

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from nep.errors import WireError
 from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
-from nep.messages.message import MessageKind, kind_of
+from nep.messages.message import MessageKind, message_kind
 from nep.protocol.requests import RemotePublisher
 from nep.system.addresses import is_loopback
 from nep.system.computer import computer_id
@@ -22,7 +22,7 @@ GAP_MAX = 2**32
 MIN_RECONNECT_S, MAX_RECONNECT_S = 2.0, 30.0
 UNLISTED_MAX = 1000
 """Maximum number of tracked publishers that the master doesn't list; any sender can invent ids."""
-_UNKNOWN = kind_of("", "", "")
+_UNKNOWN_KIND = message_kind("", "", "")
 
 
 @dataclass
@@ -38,18 +38,18 @@ class TrackedPublisher:
     form: int = 0
     shared_form: int = 0
     """Header form of its last message in shared memory."""
-    kind: MessageKind = _UNKNOWN
+    kind: MessageKind = _UNKNOWN_KIND
     clock: PublisherClock = field(default_factory=PublisherClock)
     """Clock of the publisher's computer; its messages refer to it."""
     remote: RemotePublisher | None = None
     endpoint: str = ""
-    refused: str = ""
+    failed_endpoint: str = ""
     """Endpoint to which connecting failed; `problem` has the reason."""
     problem: str = ""
     early_until: float | None = None
     """Time until which messages before the echo are skipped. See `PublisherTracker.is_early`."""
     last: int | None = None
-    is_heard: bool = False
+    has_responded: bool = False
     """True if a message, echo or bye was received."""
     is_connected: bool = False
     """True if a message, echo or bye was received since the socket was connected to `endpoint`."""
@@ -57,8 +57,8 @@ class TrackedPublisher:
     reconnect_at: float = math.inf
     has_echoed: bool = False
     is_silent: bool = False
-    ends_at: float | None = None
-    promised: int = 0
+    bye_deadline: float | None = None
+    announced_seq: int = 0
     """Newest sequence number reported by the master, or stated when the publisher was unregistered."""
     late_from: int = 0
     late_to: int = 0
@@ -70,7 +70,7 @@ class TrackedPublisher:
     jump_seq: int = 0
     """Sequence number of a message rejected because of a too large gap before it; 0 if there is none."""
 
-    def connecting(self, endpoint: str) -> None:
+    def reset_connection(self, endpoint: str) -> None:
         """Reset the state of the connection before the same socket connects to `endpoint`."""
         is_retry = endpoint == self.endpoint
         self.reconnect_s = min(MAX_RECONNECT_S, 2 * self.reconnect_s) if is_retry else MIN_RECONNECT_S
@@ -102,7 +102,7 @@ class PublisherTracker:
                 self.pop(next(iter(self._unlisted)))
         return source
 
-    def expect_all_of(self, publisher: int) -> None:
+    def expect_all_messages(self, publisher: int) -> None:
         """Count losses from the first message of a new publisher. No effect after its first message."""
         source = self.get(publisher)
         if source.last is None:
@@ -112,7 +112,7 @@ class PublisherTracker:
         """Return the state of a publisher that the master lists; create it if needed."""
         source = self.get(remote.publisher.id)
         source.remote = remote
-        source.clock.difference = self._difference(remote)
+        source.clock.difference = self._clock_difference(remote)
         self._unlisted.pop(remote.publisher.id, None)
         return source
 
@@ -121,10 +121,10 @@ class PublisherTracker:
         self._clocks = clocks
         for source in self.by_id.values():
             if source.remote is not None:
-                source.clock.difference = self._difference(source.remote)
+                source.clock.difference = self._clock_difference(source.remote)
 
-    def _difference(self, remote: RemotePublisher) -> ClockDifference | None:
-        return SAME_CLOCK if _is_here(remote) else self._clocks.get(remote.node_id)
+    def _clock_difference(self, remote: RemotePublisher) -> ClockDifference | None:
+        return SAME_CLOCK if _is_on_this_computer(remote) else self._clocks.get(remote.node_id)
 
     def find(self, publisher: int) -> TrackedPublisher | None:
         """Return a publisher's state, or None."""
@@ -140,7 +140,7 @@ class PublisherTracker:
         return list(self.by_id.items())
 
     @property
-    def echoing(self) -> int:
+    def echo_count(self) -> int:
         """Number of publishers that have sent an echo to this subscriber."""
         return sum(source.has_echoed for source in self.by_id.values())
 
@@ -152,13 +152,13 @@ class PublisherTracker:
         continues from there, counting restarts with an unknown number of losses.
         """
         source = self.get(publisher)
-        source.is_heard = source.is_connected = True
+        source.has_responded = source.is_connected = True
         last = source.last
         if last is not None and seq - last > GAP_MAX:
             if not source.jump_seq or source.jump_seq != seq - 1:
                 source.jump_seq = seq
                 raise WireError(f"its sequence number jumps from {last} to {seq}", code="seq-leap")
-            source.jump_seq, source.promised, source.last = 0, 0, seq
+            source.jump_seq, source.announced_seq, source.last = 0, 0, seq
             self.received += 1
             return True
         if last is None or seq > last:
@@ -181,7 +181,7 @@ class PublisherTracker:
         of publishers that send no echo are accepted after `EARLY_MESSAGES_S`.
         """
         source = self.by_id.get(publisher)
-        if source is None or source.has_echoed or source.is_heard or source.remote is None:
+        if source is None or source.has_echoed or source.has_responded or source.remote is None:
             return False
         if source.remote.publisher.history <= 1:
             return False
@@ -196,7 +196,7 @@ class PublisherTracker:
         Returns False, and counts nothing, if the gap exceeds `GAP_MAX`.
         """
         source = self.get(publisher)
-        source.is_heard = source.is_connected = True
+        source.has_responded = source.is_connected = True
         if source.last is not None and seq - source.last > GAP_MAX:
             return False
         if source.last is not None and seq > source.last:
@@ -215,12 +215,12 @@ class PublisherTracker:
         source = self.by_id.get(publisher)
         if source is None or source.last is None or seq - source.last > GAP_MAX:
             return
-        if source.promised > source.last:
+        if source.announced_seq > source.last:
             if source.late_to != source.last:
                 source.late_from = source.last + 1
-            self.lost += source.promised - source.last
-            source.last = source.late_to = source.promised
-        source.promised = seq
+            self.lost += source.announced_seq - source.last
+            source.last = source.late_to = source.announced_seq
+        source.announced_seq = seq
 
     def count_dropped(self, count: int) -> None:
         """Count received messages that were dropped from a full queue."""
@@ -230,35 +230,37 @@ class PublisherTracker:
     def mark_closing(self, publisher: int, final: int, now: float) -> None:
         """Record that a publisher was unregistered or replaced. `final` is its last message, 0 if unknown."""
         source = self.by_id.get(publisher)
-        if source is not None and source.ends_at is None:
-            source.ends_at = now + BYE_TIMEOUT_S
-            source.promised = max(source.promised, final)
+        if source is not None and source.bye_deadline is None:
+            source.bye_deadline = now + BYE_TIMEOUT_S
+            source.announced_seq = max(source.announced_seq, final)
 
     def mark_silent(self, publisher: int, final: int) -> None:
         """Record that a publisher is no longer listed. `final` is the newest message known to the master."""
         source = self.by_id.get(publisher)
         if source is not None:
             source.is_silent = True
-            source.promised = max(source.promised, final)
+            source.announced_seq = max(source.announced_seq, final)
 
     def count_missing(self, publisher: int) -> None:
         """Count the missing messages of a publisher as lost, before the publisher is removed."""
         source = self.by_id.get(publisher)
         if source is not None and source.last is not None:
-            self.advance_to(publisher, source.promised)
+            self.advance_to(publisher, source.announced_seq)
 
-    def expired(self, now: float) -> list[int]:
+    def expired_publishers(self, now: float) -> list[int]:
         """Return the ids of publishers to remove.
 
         These are unregistered publishers whose bye is overdue, and the oldest silent ones beyond
         `UNLISTED_MAX`.
         """
         all_ = self.by_id.items()
-        silent = [each for each, source in all_ if source.is_silent and source.ends_at is None]
-        over = [each for each, source in all_ if source.ends_at is not None and now >= source.ends_at]
+        silent = [each for each, source in all_ if source.is_silent and source.bye_deadline is None]
+        over = [
+            each for each, source in all_ if source.bye_deadline is not None and now >= source.bye_deadline
+        ]
         return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
 
-    def silent(self, now: float) -> list[int]:
+    def unresponsive_publishers(self, now: float) -> list[int]:
         """Return publishers from which nothing was received in time after connecting to them."""
         return [
             each
@@ -266,7 +268,7 @@ class PublisherTracker:
             if source.endpoint and not source.is_connected and now >= source.reconnect_at
         ]
 
-    def replaced_by(self, remote: RemotePublisher) -> list[int]:
+    def replaced_publishers(self, remote: RemotePublisher) -> list[int]:
         """Return the silent publishers that `remote` replaces, because its program was restarted."""
         return [
             each
@@ -278,7 +280,7 @@ class PublisherTracker:
         ]
 
 
-def _is_here(remote: RemotePublisher) -> bool:
+def _is_on_this_computer(remote: RemotePublisher) -> bool:
     # Older versions don't send the id of the computer; then the endpoints are compared.
     own = computer_id()
     if own and remote.computer:

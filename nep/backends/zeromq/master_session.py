@@ -14,11 +14,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
-from nep.backends.zeromq.bindings import has_room_for_local, select_endpoint
+from nep.backends.zeromq.bindings import has_room_for_unix_sockets, select_endpoint
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.pattern_subscriber import PatternSubscriber
-from nep.backends.zeromq.rpc import PendingCall, RpcClient
-from nep.backends.zeromq.sockets import CONNECT_MS, LOOPBACK, Socket, local_address_towards
+from nep.backends.zeromq.rpc import PendingRequest, RpcClient
+from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, LOOPBACK, Socket, local_address_towards
 from nep.backends.zeromq.subscriber import NativeSubscriber
 from nep.errors import (
     AddressInUseError,
@@ -37,15 +37,16 @@ from nep.protocol.requests import (
     AddPublisher,
     AddSubscriber,
     Found,
+    GraphReply,
     Join,
     Leave,
-    Look,
     NodeRecord,
-    PublisherCame,
+    PublisherAdded,
     PublisherCount,
-    PublisherGone,
     PublisherRecord,
+    PublisherRemoved,
     Push,
+    QueryGraph,
     RemotePublisher,
     RemovePublisher,
     RemoveSubscriber,
@@ -53,12 +54,11 @@ from nep.protocol.requests import (
     Renewed,
     Reply,
     ReportMissing,
-    Seen,
     SubscriberCount,
     SubscriberRecord,
 )
 from nep.protocol.topic_pattern import matches
-from nep.system.addresses import MasterName, is_endpoint, is_loopback, look_up
+from nep.system.addresses import MasterName, is_endpoint, is_loopback, resolve_host
 from nep.system.cpu import CpuLoad
 
 _MAX_RENEW_S = 30.0
@@ -69,7 +69,7 @@ _logger = logging.getLogger("nep")
 _ADDRESS_CHECK_S = 1.0
 """Interval in seconds for checking whether the publishers have to move to other addresses."""
 _JOIN_RETRY_S = 0.5
-_RECONNECT_S, _RECONNECT_FAR_S = 2.0, 2 * CONNECT_MS / 1000
+_RECONNECT_S, _RECONNECT_FAR_S = 2.0, 2 * CONNECT_TIMEOUT_MS / 1000
 """Reconnection intervals for a master on this and on another computer.
 
 libzmq gives up after a failed handshake, for example with a PUB socket at the master's address.
@@ -114,7 +114,7 @@ class SessionSubscriber(Protocol):
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of publishers."""
 
-    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Handle a renewal: the newest sequence numbers known to the master, as (publisher id, number)."""
 
     def reconnect_remote(self) -> None:
@@ -158,7 +158,7 @@ class MasterSession:
         io: IoThread,
         node: NodeRecord,
         address: str,
-        look_up: Callable[[str], str] = look_up,
+        look_up: Callable[[str], str] = resolve_host,
     ) -> None:
         self.address = address
         self._node = node
@@ -174,7 +174,7 @@ class MasterSession:
         self._address_check_at = 0.0
         self._was_connected = False
         self._is_closed = False
-        self._leaving: PendingCall | None = None
+        self._leaving: PendingRequest | None = None
         self._left_at = 0.0
         self._is_near = is_loopback(address)
         self._reconnect_s = _RECONNECT_S if self._is_near else _RECONNECT_FAR_S
@@ -215,7 +215,7 @@ class MasterSession:
         with self._lock:
             return not self._publishers and not self._subscribers and not self._calls.has_waiting_calls
 
-    def wait_for_name(self, wait_s: float | None) -> None:
+    def wait_for_address(self, wait_s: float | None) -> None:
         """Wait until the master's address is resolved; None waits forever. Raises `MasterUnreachable`."""
         if not self._name.wait(wait_s) and wait_s is not None:
             raise MasterUnreachable(self.address, wait_s, is_known=False)
@@ -232,7 +232,7 @@ class MasterSession:
         with self._lock:
             self._publishers[record.id] = (record, publisher)
         try:
-            reply = self._calls.ask(AddPublisher(self._node, record), wait_s)
+            reply = self._calls.request(AddPublisher(self._node, record), wait_s)
         except BaseException:
             self.remove_publisher(record.id, 0)
             raise
@@ -258,7 +258,7 @@ class MasterSession:
         with self._lock:
             self._subscribers[record.id] = (record, subscriber)
         try:
-            reply = self._calls.ask(AddSubscriber(self._node, record), wait_s)
+            reply = self._calls.request(AddSubscriber(self._node, record), wait_s)
         except BaseException:
             self.remove_subscriber(record.id)
             raise
@@ -290,9 +290,9 @@ class MasterSession:
 
     def query_graph(self, timeout_s: float) -> GraphView:
         """Request the graph. Raises as `RpcClient.ask` does."""
-        self.wait_for_name(timeout_s)
-        reply = self._calls.ask(Look(), timeout_s)
-        if not isinstance(reply, Seen):
+        self.wait_for_address(timeout_s)
+        reply = self._calls.request(QueryGraph(), timeout_s)
+        if not isinstance(reply, GraphReply):
             raise RequestRefusedError(
                 _("the master at '{address}' did not reply with its graph").format(address=self.address)
             )
@@ -311,7 +311,7 @@ class MasterSession:
             self._subscribers.clear()
             self._confirmed.clear()
         if self._epoch != 0 and self._calls.is_connected:
-            self._leaving = self._calls.begin(Leave(self._node.id))
+            self._leaving = self._calls.send_request(Leave(self._node.id))
             self._left_at = time.monotonic()
 
     def leave(self, timeout_s: float) -> None:
@@ -337,9 +337,9 @@ class MasterSession:
         answers = self._calls.read()
         self._read_at = self._clock.now() if answers else self._read_at
         for answer in answers:
-            self._handle_reply(answer.what, now)
-            if answer.then is not None and not isinstance(answer.what, Push):
-                answer.then(answer.what)
+            self._handle_reply(answer.content, now)
+            if answer.callback is not None and not isinstance(answer.content, Push):
+                answer.callback(answer.content)
         if self._is_closed:
             return PollState()
         is_connected = self._calls.is_connected
@@ -350,7 +350,7 @@ class MasterSession:
             self._reconnect_at = now + self._reconnect_s
         else:
             self._name.resolve(now)
-            self._connect_when_due(now)
+            self._reconnect_if_due(now)
         is_due = now >= self._renewal_timer.due_at
         if is_due or now >= self._address_check_at:
             self._address_check_at = now + _ADDRESS_CHECK_S
@@ -361,7 +361,7 @@ class MasterSession:
         due = min(self._renewal_timer.due_at, self._address_check_at)
         return PollState(due=now if self._calls.has_more else due)
 
-    def _connect_when_due(self, now: float) -> None:
+    def _reconnect_if_due(self, now: float) -> None:
         if now >= self._reconnect_at:
             self._reconnect_at = now + self._reconnect_s
             self._calls.reconnect()
@@ -371,7 +371,7 @@ class MasterSession:
         if not self._is_near and self._name.known:
             self._own_host = local_address_towards(self._name.known) or self._own_host
             self._reconnect_from(self._own_host)
-        is_cramped = not has_room_for_local()
+        is_cramped = not has_room_for_unix_sockets()
         if self.hosts == self._moved_to and not is_cramped:
             return
         self._moved_to = self.hosts
@@ -406,9 +406,9 @@ class MasterSession:
         if isinstance(answer, Added | Found | Renewed) and answer.hosts != self._served_hosts:
             self._served_hosts = answer.hosts
             self._renewal_timer.due_at = now
-        if isinstance(answer, PublisherCame):
+        if isinstance(answer, PublisherAdded):
             self._handle_publisher_added(answer)
-        elif isinstance(answer, PublisherGone):
+        elif isinstance(answer, PublisherRemoved):
             self._handle_publisher_removed(answer)
         elif isinstance(answer, Renewed):
             self._handle_renewed(answer, now)
@@ -417,19 +417,19 @@ class MasterSession:
         if self._epoch not in {0, answer.epoch}:
             self._join(now)
 
-    def _handle_publisher_added(self, added: PublisherCame) -> None:
+    def _handle_publisher_added(self, added: PublisherAdded) -> None:
         remotes = self._select_endpoints((added.publisher,))
         can_be_heard = any(is_endpoint(each) for remote in remotes for each in remote.publisher.endpoints)
         for subscriber in self._subscribers_of(added.publisher.publisher.topic):
             if added.is_new and can_be_heard and isinstance(subscriber, NativeSubscriber):
-                subscriber.expect_all_of(added.publisher.publisher.id)
+                subscriber.expect_all_messages(added.publisher.publisher.id)
             subscriber.connect(remotes)
 
-    def _handle_publisher_removed(self, gone: PublisherGone) -> None:
+    def _handle_publisher_removed(self, gone: PublisherRemoved) -> None:
         if gone.is_closed:
             for _record, each in self._all_subscribers():
                 if isinstance(each, PatternSubscriber):
-                    each.note_early_close(gone.id)
+                    each.record_early_close(gone.id)
         for subscriber in self._subscribers_of(gone.topic, may_create=False):
             subscriber.publisher_removed(gone.id, gone.last_seq, is_closed=gone.is_closed)
 
@@ -476,11 +476,11 @@ class MasterSession:
         for topic in answer.topics:
             for subscriber in self._subscribers_of(topic.topic):
                 subscriber.reconcile(self._select_endpoints(topic.publishers))
-        self._update_clocks(self._differences_in(answer))
+        self._update_clocks(self._parse_clock_differences(answer))
         for _record, each in self._all_subscribers():
-            each.tick(now, answer.last_seqs.items())
+            each.handle_renewal(now, answer.last_seqs.items())
 
-    def _differences_in(self, answer: Renewed) -> Mapping[str, ClockDifference]:
+    def _parse_clock_differences(self, answer: Renewed) -> Mapping[str, ClockDifference]:
         known_at_ns = time.monotonic_ns()
         found = {
             node_id: ClockDifference(*clock_times, known_at_ns)
@@ -497,7 +497,7 @@ class MasterSession:
             for _record, each in self._all_subscribers():
                 # replies of servers have no time stamps
                 if isinstance(each, NativeSubscriber | PatternSubscriber):
-                    each.correct(clocks)
+                    each.set_clock_differences(clocks)
 
     def _join(self, now: float) -> None:
         # Registers everything again, at most once per `_JOIN_RETRY_S`.
@@ -518,7 +518,7 @@ class MasterSession:
         if not isinstance(reply, Found):
             return
         self._epoch, self._revision = reply.epoch, reply.revision
-        self._clock.forget()  # the master may run on another computer now
+        self._clock.clear()  # the master may run on another computer now
         self._join_retry_at = 0.0
         with self._lock:
             self._confirmed = items & (self._publishers.keys() | self._subscribers.keys())

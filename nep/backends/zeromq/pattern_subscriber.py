@@ -59,7 +59,7 @@ class PatternSubscriber(WakingSubscriber):
         self._closed_early: set[int] | None = set()
         """Ids of publishers that closed before `begin`; None after `begin`."""
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
-        self._removed_totals = _Totals()
+        self._removed_totals = _RemovedTotals()
         self._dropped = 0
         self._problem = self._member_error = ""
         self._failures = 0
@@ -83,7 +83,7 @@ class PatternSubscriber(WakingSubscriber):
         """True if input is available or the subscriber is closed."""
         return self.is_closed or len(self._inbox) > 0
 
-    def _receive(self, messages: Sequence[Message]) -> None:
+    def _handle_messages(self, messages: Sequence[Message]) -> None:
         # Called in the thread that serves the members.
         if self.spec.sink is not None:
             self.spec.sink(messages)
@@ -159,7 +159,7 @@ class PatternSubscriber(WakingSubscriber):
             self._member_error = ""
             is_registered = self._closed_early is None
         if is_registered:
-            member.begin(())
+            member.connect_listed(())
         self._io.add(member)
         return member
 
@@ -171,25 +171,25 @@ class PatternSubscriber(WakingSubscriber):
             topic=topic,
             keep="all",
             max_messages=MAX_MESSAGES,
-            sink=self._receive,
+            sink=self._handle_messages,
             is_pattern=False,
         )
         return NativeSubscriber(self._new_readable(spec), self._io, spec, lambda _id: None)
 
-    def begin(self, remotes: Iterable[RemotePublisher]) -> None:
+    def connect_listed(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to the publishers listed at registration, except those that have closed since."""
         with self._members_lock:
             closed, self._closed_early = self._closed_early or set(), None
             members = list(self._members.values())
         for member in members:
-            member.begin(())
+            member.connect_listed(())
         for remote in remotes:
             if remote.publisher.id not in closed:
                 found = self.member(remote.publisher.topic)
                 if found is not None:
                     found.connect((remote,))
 
-    def note_early_close(self, publisher: int) -> None:
+    def record_early_close(self, publisher: int) -> None:
         """Record that a publisher closed, because the reply to the registration may still list it."""
         with self._members_lock:
             if self._closed_early is not None:
@@ -207,16 +207,16 @@ class PatternSubscriber(WakingSubscriber):
         """Topics that have a member."""
         return tuple(self._members)
 
-    def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+    def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
         """Set the clock differences of other computers, by node id."""
         for member in list(self._members.values()):
-            member.correct(clocks)
+            member.set_clock_differences(clocks)
 
-    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Handle a renewal as `NativeSubscriber.tick` does, and remove members without publishers."""
         seqs = tuple(last_seqs)
         for topic, member in list(self._members.items()):
-            member.tick(now, seqs)
+            member.handle_renewal(now, seqs)
             if self.spec.sink is None and not member.has_publishers:
                 with self._members_lock:
                     del self._members[topic]
@@ -236,7 +236,7 @@ class PatternSubscriber(WakingSubscriber):
             if self.is_closed:
                 return
             self.is_closed = True
-            self._inbox.take_all()
+            self._inbox.pop_all()
             self.notify_waiting()
             members = list(self._members.values())
         self._on_close(self.spec.id)
@@ -250,7 +250,7 @@ class PatternSubscriber(WakingSubscriber):
             member.forked()
 
 
-class _Totals:
+class _RemovedTotals:
     """Statistics of removed members."""
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from nep.backends.base import QuickPublish
+from nep.backends.base import PublishHooks
 from nep.messages.codecs import NULL
 from nep.messages.encoded import Encoded
 from nep.protocol.batch import BATCH_MAX
@@ -34,7 +34,7 @@ _time_ns = time.time_ns
 class SendPath(Protocol):
     """Sending end of a publisher, as the batch uses it."""
 
-    is_heard: bool
+    has_subscribers: bool
     """True if any subscriber is connected."""
     problem: str
     """Reason why the newest payload was rejected; "" if it was encoded."""
@@ -76,7 +76,7 @@ class PendingBatch:
         """True if the publisher has sent a full batch since the I/O thread last checked."""
         self._may_wait = may_wait
 
-    def allow(self, *, reads_batches: bool) -> None:
+    def set_allowed(self, *, reads_batches: bool) -> None:
         """Set whether all current subscribers accept batches."""
         self.is_allowed = self._may_wait and reads_batches
         if not self.is_allowed:
@@ -88,7 +88,7 @@ class PendingBatch:
             self.until_ns = stamp_ns + BATCH_WINDOW_NS
 
     def publish_function(
-        self, hooks: QuickPublish, path: SendPath, lock: threading.Lock
+        self, hooks: PublishHooks, path: SendPath, lock: threading.Lock
     ) -> Callable[..., None]:
         """Return the function that implements `Publisher.publish`.
 
@@ -107,7 +107,7 @@ class PendingBatch:
                 fallback(payload, strict=True)
                 return
             stamp_ns = _time_ns()
-            if owner.is_closed or path.problem or not path.is_heard or type(payload) is Encoded:
+            if owner.is_closed or path.problem or not path.has_subscribers or type(payload) is Encoded:
                 fallback(payload)
                 return
             try:

@@ -16,20 +16,20 @@ from typing import NoReturn, cast
 
 import zmq
 
-from nep.backends.base import PublisherSpec, QuickPublish
+from nep.backends.base import PublisherSpec, PublishHooks
 from nep.backends.zeromq.bindings import SMALL_CODECS, Bindings
-from nep.backends.zeromq.byte_window import ACK_STEP_BYTES, BACKLOG_STEP_BYTES, Backlog
+from nep.backends.zeromq.byte_window import ACK_INTERVAL_BYTES, TRACKING_INTERVAL_BYTES, Backlog
 from nep.backends.zeromq.io_thread import Pollable, PollState
 from nep.backends.zeromq.pending_batch import MAX_BATCHED_BYTES, PendingBatch
-from nep.backends.zeromq.shared.memory import SHARED_BYTES, begin_sharing, can_share
+from nep.backends.zeromq.shared.memory import MIN_SHARED_BYTES, can_share, start_sharing
 from nep.backends.zeromq.shared.payloads import SharedPayloads
 from nep.backends.zeromq.sockets import (
-    FarConnection,
     Part,
     RejectionLog,
+    RemoteConnection,
     Socket,
-    sendable,
     set_send_high_water_mark,
+    to_sendable,
     wait_until,
 )
 from nep.backends.zeromq.subscriptions import Subscriptions
@@ -37,7 +37,7 @@ from nep.errors import ClosedError
 from nep.messages.encoded import Encoded
 from nep.messages.history import History
 from nep.protocol.batch import batch_part
-from nep.protocol.requests import Expected, PublisherCount
+from nep.protocol.requests import ExpectedSubscriber, PublisherCount
 from nep.protocol.wire import (
     BYE,
     LATCHED,
@@ -46,7 +46,7 @@ from nep.protocol.wire import (
     SIZE_MAX,
     extension_part,
     form_of,
-    pack_quickly,
+    pack_header,
     parse_hello,
     topic_part,
 )
@@ -69,11 +69,11 @@ _IO_CHECK_S = 0.02
 _BYE_RETRY_S = 0.05
 
 
-def _only_bytes(payload: object) -> NoReturn:
+def _reject_payload(payload: object) -> NoReturn:
     raise TypeError(payload)
 
 
-class GreetedPublisher:
+class HandshakePublisher:
     """Publisher that waits for the hellos of listed subscribers. `changed` guards its state."""
 
     def __init__(self, changed: threading.Condition, seen: dict[int, int]) -> None:
@@ -99,14 +99,14 @@ class GreetedPublisher:
         with self._changed:
             return tuple(sorted({self._names[each] for each in self._expected - set(self._seen)}))
 
-    def expect(self, expected: Iterable[Expected]) -> None:
+    def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
         """Add registered subscribers that will connect."""
         with self._changed:
             for each in expected:
                 self._expected.add(each.id)
                 self._names[each.id] = each.node_name
 
-    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
+    def wait_for(self, expected: Iterable[ExpectedSubscriber], timeout_s: float) -> tuple[int, ...]:
         """Wait for the hellos of these subscribers; return the ids of those that are still missing."""
         wanted = {each.id for each in expected}
         with self._changed:
@@ -114,11 +114,11 @@ class GreetedPublisher:
             return tuple(wanted - self._seen.keys())
 
 
-class NativePublisher(GreetedPublisher):
+class NativePublisher(HandshakePublisher):
     """Publisher on the native wire. Owns `socket`, an XPUB that is already bound or connected."""
 
     is_closed = False
-    is_heard = False
+    has_subscribers = False
     """True if any subscriber is connected, with or without a hello."""
 
     def __init__(
@@ -138,7 +138,9 @@ class NativePublisher(GreetedPublisher):
         self._socket = socket
         set_send_high_water_mark(socket)
         self._bindings = Bindings(
-            socket, may_be_local=spec.codec.name in SMALL_CODECS, is_watched=FarConnection.can_tell
+            socket,
+            may_be_local=spec.codec.name in SMALL_CODECS,
+            is_watched=RemoteConnection.can_detect_silence,
         )
         # bypasses pyzmq's handling of routing ids and groups, which takes half of the time
         self._send: Callable[..., object] = super(zmq.Socket, socket).send
@@ -167,7 +169,7 @@ class NativePublisher(GreetedPublisher):
         self._lock = threading.Lock()
         super().__init__(threading.Condition(self._lock), self._subscriptions.seen)
         self.fd = int(socket.getsockopt(zmq.FD))
-        bytes_only = QuickPublish(self, bytes, _only_bytes, None, self.send_now)
+        bytes_only = PublishHooks(self, bytes, _reject_payload, None, self.send_now)
         self._send_bytes = self._batch.publish_function(bytes_only, self, self._lock)
 
     @property
@@ -188,7 +190,7 @@ class NativePublisher(GreetedPublisher):
         Called once per second; therefore also closes connections that don't respond.
         """
         with self._changed:
-            self._subscriptions.end_silent()
+            self._subscriptions.close_silent()
             return PublisherCount(
                 self.spec.id, self.count, self._bytes, self.count, self._last_stamp_ns, self.problem
             )
@@ -246,7 +248,7 @@ class NativePublisher(GreetedPublisher):
         else:
             self._send_now(data, extension_fields)
 
-    def quick_publish(self, asked: QuickPublish) -> Callable[..., None]:
+    def quick_publish(self, asked: PublishHooks) -> Callable[..., None]:
         """Return the fast publish function. See `nep.backends.base.PublishesQuickly`."""
         return self._batch.publish_function(asked, self, self._lock)
 
@@ -257,11 +259,11 @@ class NativePublisher(GreetedPublisher):
     def _send_now(self, payload: bytes | memoryview, extension_fields: Mapping[str, object] | None) -> None:
         data: Part = payload
         extension = None
-        if (payload.nbytes if type(payload) is memoryview else len(payload)) >= SHARED_BYTES:
+        if (payload.nbytes if type(payload) is memoryview else len(payload)) >= MIN_SHARED_BYTES:
             self._send_large(payload, extension_part(extension_fields) if extension_fields else None)
             return
         if extension_fields or type(payload) is not bytes:
-            data = sendable(payload) if len(payload) >= _MAX_ONE_PART_BYTES else bytes(payload)
+            data = to_sendable(payload) if len(payload) >= _MAX_ONE_PART_BYTES else bytes(payload)
             extension = extension_part(extension_fields) if extension_fields else None
         size = len(data)
         with self._lock:
@@ -269,21 +271,21 @@ class NativePublisher(GreetedPublisher):
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.flush_locked()
             if self._flags:
-                self._greet_before_locked(size)
+                self._update_subscribers_before_locked(size)
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
             if total >= self._full_path_at or extension or self._flags:
                 self._send_all_locked(data, extension, size)
             elif size < _MAX_ONE_PART_BYTES and not self._legacy_filters and type(data) is bytes:
-                head = pack_quickly(self._form, size, seq, stamp_ns, self._id)
+                head = pack_header(self._form, size, seq, stamp_ns, self._id)
                 self._send(b"".join((self._topic, head, data)))
                 self._batch.open_window(stamp_ns)
             else:
                 self._send_in_parts_locked(data, size, seq, stamp_ns)
             self._poll_subscriptions_locked(stamp_ns)
 
-    def _greet_before_locked(self, size: int) -> None:
+    def _update_subscribers_before_locked(self, size: int) -> None:
         # Read subscriptions before a kept message is counted, so that a new subscriber receives it once, in
         # order. Without a history only if `_send_all_locked` would read them.
         if self.spec.history > 1 or self._bytes + size >= self._full_path_at:
@@ -293,17 +295,17 @@ class NativePublisher(GreetedPublisher):
         # The payload is copied at most once.
         shared = self._subscriptions.shared
         # before taking the lock: loading the library is slow
-        opened = begin_sharing() if shared is not None and self._seen and not shared.readers else None
+        opened = start_sharing() if shared is not None and self._seen and not shared.readers else None
         if shared is not None and opened is None and not shared.readers:
             shared = None
-        data = sendable(payload) if shared is None or not shared.readers else None
+        data = to_sendable(payload) if shared is None or not shared.readers else None
         size = payload.nbytes if isinstance(payload, memoryview) else len(payload)
         with self._lock:
             if self.is_closed:
                 raise ClosedError(f"publisher '{self.spec.topic}'")
             self.flush_locked()
             if self._flags:
-                self._greet_before_locked(size)
+                self._update_subscribers_before_locked(size)
             number = (
                 shared.write(payload, self._seen, time.monotonic())
                 if shared and not self._legacy_filters
@@ -311,7 +313,7 @@ class NativePublisher(GreetedPublisher):
             )
             is_for_all = number is not None and shared is not None and shared.readers >= self._seen.keys()
             if data is None and not is_for_all:
-                data = sendable(payload)
+                data = to_sendable(payload)
             self._count = seq = self._count + 1
             self._bytes = total = self._bytes + size
             self._last_stamp_ns = stamp_ns = _time_ns()
@@ -321,21 +323,21 @@ class NativePublisher(GreetedPublisher):
                 and total < self._full_path_at
                 and not (extension or self._flags)
             ):
-                head = pack_quickly(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
+                head = pack_header(self._form | SHARED << 16, len(number), seq, stamp_ns, self._id)
                 # subscribers with shared memory accept one part
                 self._send(b"".join((self._topic, head, number)))
             else:
                 self._send_all_locked(b"" if data is None else data, extension, size, number)
             self._poll_subscriptions_locked(stamp_ns)
 
-    def lend(self, size_bytes: int) -> memoryview | None:
+    def borrow_memory(self, size_bytes: int) -> memoryview | None:
         """Return writable shared memory for a payload, or None if no subscriber shares memory."""
         shared = self._subscriptions.shared
         with self._lock:
-            return None if shared is None or self.is_closed else shared.lend(size_bytes)
+            return None if shared is None or self.is_closed else shared.borrow_memory(size_bytes)
 
     def _send_offer_locked(self, subscriber: int, generation: int) -> None:
-        notice = pack_quickly(form_of(self._codec, OFFER), generation, self._count, time.time_ns(), self._id)
+        notice = pack_header(form_of(self._codec, OFFER), generation, self._count, time.time_ns(), self._id)
         self._send_parts_locked(self._subscriptions.hellos[subscriber], (notice,))
 
     def _poll_subscriptions_locked(self, stamp_ns: int) -> None:
@@ -351,7 +353,7 @@ class NativePublisher(GreetedPublisher):
         # Sends three parts.
         send = self._send
         send(self._topic, _SNDMORE)
-        send(pack_quickly(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id), _SNDMORE)
+        send(pack_header(self._form, size if size <= SIZE_MAX else 0, seq, stamp_ns, self._id), _SNDMORE)
         send(data, 0, size < _NO_COPY_BYTES)
 
     def flush_soon_locked(self) -> None:
@@ -383,10 +385,10 @@ class NativePublisher(GreetedPublisher):
                 self._bytes += size
                 self._send(part)
             else:
-                self._send_each_locked(taken)
+                self._send_separately_locked(taken)
             self._poll_subscriptions_locked(stamp_ns)
 
-    def _send_each_locked(self, taken: Iterable[tuple[bytes, int]]) -> None:
+    def _send_separately_locked(self, taken: Iterable[tuple[bytes, int]]) -> None:
         for data, stamp_ns in taken:
             self._last_stamp_ns = stamp_ns
             self._count += 1
@@ -399,8 +401,8 @@ class NativePublisher(GreetedPublisher):
         # Full path for messages with flags, and for flow control. Call with the lock held. `number` replaces
         # `data` for subscribers that read shared memory.
         self.flush_locked()
-        tail = self._tail(data, extension, size, 0)
-        shared = None if number is None else self._tail(number, extension, len(number), SHARED)
+        tail = self._message_parts(data, extension, size, 0)
+        shared = None if number is None else self._message_parts(number, extension, len(number), SHARED)
         self._history.add(tail, size)
         if self._bytes < self._full_path_at:
             self._send_to_all_locked(tail, shared)
@@ -409,10 +411,10 @@ class NativePublisher(GreetedPublisher):
                 self._read_subscriptions_locked()
             self._send_with_flow_control_locked(tail, shared, size)
 
-    def _tail(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
+    def _message_parts(self, data: Part, extension: bytes | None, size: int, flags: int) -> tuple[Part, ...]:
         form = self._form | flags << 16 | (0 if extension is None else EXTENSION_FLAG << 16)
         size_field = size if size <= SIZE_MAX else 0
-        header = pack_quickly(form, size_field, self._count, self._last_stamp_ns or 0, self._id)
+        header = pack_header(form, size_field, self._count, self._last_stamp_ns or 0, self._id)
         return (header, data) if extension is None else (header, data, extension)
 
     def _send_to_all_locked(self, tail: tuple[Part, ...], shared: tuple[Part, ...] | None) -> None:
@@ -443,7 +445,7 @@ class NativePublisher(GreetedPublisher):
         since = self._bytes - size - self._windowed_bytes  # sent to all
         if since:
             for window in windows.values():
-                window.sent(self._count - 1, since)
+                window.add_sent(self._count - 1, since)
         self._windowed_bytes = self._bytes
         has_acks = self._subscriptions.all_acknowledge
         has_room = {each: window.has_room(size) for each, window in windows.items()}
@@ -452,7 +454,7 @@ class NativePublisher(GreetedPublisher):
                 self._send_to_all_locked(tail, shared)
             else:
                 self._send_tracked_locked(tail, size + since)
-            self._full_path_at = self._bytes + (ACK_STEP_BYTES if has_acks else BACKLOG_STEP_BYTES)
+            self._full_path_at = self._bytes + (ACK_INTERVAL_BYTES if has_acks else TRACKING_INTERVAL_BYTES)
             receivers = windows
         else:
             self._full_path_at = 0  # check each message until all have room again
@@ -463,20 +465,20 @@ class NativePublisher(GreetedPublisher):
                     chosen = shared if is_shared and shared is not None else tail
                     self._send_parts_locked(self._subscriptions.hellos[each], chosen)
                 else:
-                    window.note_drop()
+                    window.record_drop()
         for window in receivers.values():
-            window.sent(self._count, size)
+            window.add_sent(self._count, size)
         now = time.monotonic()
         for each, window in windows.items():
             if window.should_request_ack(now, has_room=has_room[each]):
-                self._send_parts_locked(self._subscriptions.hellos[each], (self._notice(0),))
+                self._send_parts_locked(self._subscriptions.hellos[each], (self._encode_notice(0),))
 
     def _send_tracked_locked(self, tail: tuple[Part, ...], size: int) -> None:
         # `size` is the number of bytes since the last tracked message, including this one.
         data = tail[1].buffer if isinstance(tail[1], zmq.Frame) else tail[1]
         frame = zmq.Frame(data, track=True, copy=False, copy_threshold=0)
         self._send_parts_locked(self._topic, (tail[0], frame, *tail[2:]))
-        self._backlog.sent(frame.tracker, size)
+        self._backlog.add_sent(frame.tracker, size)
 
     def _send_parts_locked(self, first: bytes, tail: tuple[Part, ...]) -> None:
         # XPUB never blocks: it drops messages for subscribers whose queue is full.
@@ -509,15 +511,17 @@ class NativePublisher(GreetedPublisher):
         # Reads until the socket is empty.
         while not self._socket.closed and int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
             event = self._socket.recv(zmq.DONTWAIT, copy=False)
-            own = self._subscriptions.note(event.bytes, self._count, partial(FarConnection.of, event))
+            own = self._subscriptions.handle_event(
+                event.bytes, self._count, partial(RemoteConnection.from_frame, event)
+            )
             # Before the echo: a subscriber that received it must already be counted.
             self.subscribers = len(self._seen)
             # a connected subscriber may leave without being reported as missing
             self._expected.difference_update(self._seen)
-            self.is_heard = self._subscriptions.is_there
-            self._batch.allow(reads_batches=self._subscriptions.reads_batches)
+            self.has_subscribers = self._subscriptions.has_subscribers
+            self._batch.set_allowed(reads_batches=self._subscriptions.all_accept_batches)
             if own is not None:
-                self._greet_locked(own)
+                self._complete_handshake_locked(own)
             self._changed.notify_all()
             if self._full_path_at == 0:
                 self._notify_drops_locked()
@@ -525,9 +529,9 @@ class NativePublisher(GreetedPublisher):
     def _notify_drops_locked(self) -> None:
         for each, window in self._subscriptions.windows.items():
             if window.should_notify():
-                self._send_parts_locked(self._subscriptions.hellos[each], (self._notice(0),))
+                self._send_parts_locked(self._subscriptions.hellos[each], (self._encode_notice(0),))
 
-    def _greet_locked(self, own: bytes) -> None:
+    def _complete_handshake_locked(self, own: bytes) -> None:
         # The history, then the echo: from here on the subscriber counts losses.
         for message in self._history:
             self._send_parts_locked(own, message)
@@ -535,11 +539,11 @@ class NativePublisher(GreetedPublisher):
             hello = parse_hello(own)
             window = self._subscriptions.windows.get(hello.subscriber) if hello is not None else None
             if window is not None:
-                window.sent(self._count, self._history.size_bytes)
-        self._send_parts_locked(own, (self._notice(0),))
+                window.add_sent(self._count, self._history.size_bytes)
+        self._send_parts_locked(own, (self._encode_notice(0),))
 
-    def _notice(self, flags: int) -> bytes:
-        return pack_quickly(form_of(self._codec, flags), 0, self._count, time.time_ns(), self._id)
+    def _encode_notice(self, flags: int) -> bytes:
+        return pack_header(form_of(self._codec, flags), 0, self._count, time.time_ns(), self._id)
 
     # ---- closing
 
@@ -547,7 +551,7 @@ class NativePublisher(GreetedPublisher):
         """Unregister, flush and close the socket. Called once, by the publisher."""
         self._on_close(self, timeout_s)
 
-    def say_bye(self) -> None:
+    def send_bye(self) -> None:
         """Send the bye: subscribers read the remaining messages and disconnect."""
         with self._changed:
             self.is_closed = True
@@ -570,7 +574,7 @@ class NativePublisher(GreetedPublisher):
                         sum(map(bool, undelivered)),
                         max(undelivered),
                     )
-                self._subscriptions.forget()
+                self._subscriptions.clear()
                 self.subscribers = 0
 
     def release(self) -> None:
@@ -584,5 +588,5 @@ class NativePublisher(GreetedPublisher):
     def _send_bye_locked(self) -> None:
         if not self._socket.closed:
             for own in self._subscriptions.hellos.values():
-                self._send_parts_locked(own, (self._notice(BYE),))
+                self._send_parts_locked(own, (self._encode_notice(BYE),))
             self._read_subscriptions_locked()

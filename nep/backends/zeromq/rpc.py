@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import zmq
 
-from nep.backends.zeromq.sockets import CONNECT_MS, RejectionLog, Socket, wait_until
+from nep.backends.zeromq.sockets import CONNECT_TIMEOUT_MS, RejectionLog, Socket, wait_until
 from nep.errors import ClosedError, MasterUnreachable, RequestRefusedError, WireError
 from nep.i18n import _
-from nep.protocol.encoding import call_of_view, decode_answer, encode_request
+from nep.protocol.encoding import call_of_graph_reply, decode_reply, encode_request
 from nep.protocol.requests import Push, Refused, Reply, Request
 from nep.system.addresses import endpoint_of, is_loopback
 
@@ -27,27 +27,27 @@ _RESEND_S = 0.5
 """Interval in seconds for sending an unanswered request again; the master may have been shutting down."""
 _MAX_CALLS = 256
 
-Then = Callable[[Reply], None]
+ReplyCallback = Callable[[Reply], None]
 
 
 @dataclass
-class PendingCall:
+class PendingRequest:
     """Request in flight."""
 
     body: bytes
-    is_waited: bool
-    then: Then | None = None
+    has_waiter: bool
+    callback: ReplyCallback | None = None
     reply: Reply | None = None
     is_sent: bool = False
     view: bytes | None = None
     """Undecoded graph reply; the waiting thread decodes it."""
 
 
-class ReceivedAnswer(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """Message from the master, with the callback of the request that it replies to, or None."""
 
-    what: Reply | Push
-    then: Then | None
+    content: Reply | Push
+    callback: ReplyCallback | None
 
 
 class RpcClient:
@@ -60,7 +60,7 @@ class RpcClient:
         self.address = address
         self._socket = socket
         self._after_use = after_use
-        self._calls: dict[int, PendingCall] = {}
+        self._calls: dict[int, PendingRequest] = {}
         self._numbers = itertools.count(1)
         self._is_closed = False
         self.refusals = RejectionLog()
@@ -76,7 +76,7 @@ class RpcClient:
         if not is_loopback(address):  # a computer that loses power doesn't close its connections
             socket.setsockopt(zmq.HEARTBEAT_IVL, 1000)
             socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3000)
-            socket.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS)
+            socket.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_TIMEOUT_MS)
         self.endpoint = ""
         """Endpoint of the connection; "" before `connect`."""
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -85,7 +85,7 @@ class RpcClient:
     def has_waiting_calls(self) -> bool:
         """True if a thread waits for a reply."""
         with self._changed:
-            return any(call.is_waited for call in self._calls.values())
+            return any(call.has_waiter for call in self._calls.values())
 
     def connect(self, address: str) -> None:
         """Disconnect from the previous address and connect to `address`. Thread-safe."""
@@ -107,7 +107,7 @@ class RpcClient:
             self._socket.connect(self.endpoint)
             self.is_connected = False
 
-    def ask(self, request: Request, timeout_s: float | None) -> Reply:
+    def request(self, request: Request, timeout_s: float | None) -> Reply:
         """Send a request and return the reply.
 
         Args:
@@ -119,20 +119,20 @@ class RpcClient:
             RequestRefusedError: The master rejected the request.
             ClosedError: The client was closed meanwhile.
         """
-        return self.wait(self.begin(request), timeout_s)
+        return self.wait(self.send_request(request), timeout_s)
 
-    def begin(self, request: Request) -> PendingCall:
+    def send_request(self, request: Request) -> PendingRequest:
         """Send a request and return it for `wait`."""
         return self._send(request, is_waited=True, then=None)
 
-    def wait(self, call: PendingCall, timeout_s: float | None) -> Reply:
+    def wait(self, call: PendingRequest, timeout_s: float | None) -> Reply:
         """Wait for the reply to a request. Raises as `ask` does."""
         started = time.monotonic()
         with self._changed:
             while not wait_until(
                 self._changed,
                 lambda: call.reply is not None or call.view is not None or self._is_closed,
-                _left(started, timeout_s),
+                _remaining_s(started, timeout_s),
             ):
                 if timeout_s is not None and time.monotonic() - started >= timeout_s:
                     self._calls = {number: each for number, each in self._calls.items() if each is not call}
@@ -141,17 +141,17 @@ class RpcClient:
                 self._flush_locked()
                 self._after_use()
         if call.view is not None:
-            return self._decoded(call.view)
+            return self._decode_reply(call.view)
         if call.reply is None:
             raise ClosedError("the node")
         if isinstance(call.reply, Refused):
             raise RequestRefusedError(call.reply.reason)
         return call.reply
 
-    def _decoded(self, view: bytes) -> Reply:
+    def _decode_reply(self, view: bytes) -> Reply:
         # Runs in the calling thread: decoding a graph of thousands of topics takes long.
         try:
-            reply = decode_answer(view)[1]
+            reply = decode_reply(view)[1]
         except WireError as error:
             self._reject(error)
             raise RequestRefusedError(
@@ -161,16 +161,16 @@ class RpcClient:
             raise RequestRefusedError(_("the master's message is not a reply"))
         return reply
 
-    def notify(self, request: Request, then: Then | None = None) -> None:
+    def notify(self, request: Request, then: ReplyCallback | None = None) -> None:
         """Send a request without waiting. The request is dropped if no master is connected.
 
         `then` is called with the reply in the I/O thread.
         """
         self._send(request, is_waited=False, then=then)
 
-    def read(self) -> list[ReceivedAnswer]:
+    def read(self) -> list[ReceivedMessage]:
         """Return up to `_READ_MAX` received messages, and send pending requests. Only for the I/O thread."""
-        answers: list[ReceivedAnswer] = []
+        answers: list[ReceivedMessage] = []
         events = 0
         with self._changed:
             while not (has_more := len(answers) >= _READ_MAX):
@@ -197,10 +197,10 @@ class RpcClient:
             self._is_closed = True
             self._socket.close(0)
 
-    def _send(self, request: Request, *, is_waited: bool, then: Then | None) -> PendingCall:
+    def _send(self, request: Request, *, is_waited: bool, then: ReplyCallback | None) -> PendingRequest:
         with self._changed:
             number = next(self._numbers)
-            call = PendingCall(encode_request(request, number), is_waited, then)
+            call = PendingRequest(encode_request(request, number), is_waited, then)
             if self._is_closed:
                 return call
             self._calls[number] = call
@@ -217,7 +217,7 @@ class RpcClient:
 
     def _drop_oldest_locked(self) -> None:
         # Requests without a waiting thread would pile up while the master hangs.
-        oldest = next((number for number, call in self._calls.items() if not call.is_waited), None)
+        oldest = next((number for number, call in self._calls.items() if not call.has_waiter), None)
         if oldest is not None:
             del self._calls[oldest]
 
@@ -232,13 +232,13 @@ class RpcClient:
                 self._socket.send(call.body, zmq.DONTWAIT)
                 call.is_sent = has_sent = True
             except zmq.Again:
-                if not call.is_waited:
+                if not call.has_waiter:
                     del self._calls[number]
         return has_sent
 
-    def _read_one_locked(self) -> ReceivedAnswer | None:
+    def _read_one_locked(self) -> ReceivedMessage | None:
         body = self._socket.recv_multipart(zmq.DONTWAIT)[-1]
-        view_number = call_of_view(body)
+        view_number = call_of_graph_reply(body)
         if view_number is not None:
             graph_call = self._calls.pop(view_number, None)
             if graph_call is not None:  # otherwise its request has timed out
@@ -246,16 +246,16 @@ class RpcClient:
                 self._changed.notify_all()
             return None
         try:
-            number, answer = decode_answer(body)
+            number, answer = decode_reply(body)
         except WireError as error:
             self._reject(error)
             return None
         call = self._calls.pop(number, None)
         if call is None or isinstance(answer, Push):
-            return ReceivedAnswer(answer, None)
+            return ReceivedMessage(answer, None)
         call.reply = answer
         self._changed.notify_all()
-        return ReceivedAnswer(answer, call.then)
+        return ReceivedMessage(answer, call.callback)
 
     def _reject(self, error: WireError) -> None:
         if self.refusals.add(error.reason):
@@ -270,7 +270,7 @@ class RpcClient:
         return 0 if self._socket.closed else int(self._socket.getsockopt(zmq.EVENTS))
 
 
-def _left(started: float, timeout_s: float | None) -> float:
+def _remaining_s(started: float, timeout_s: float | None) -> float:
     if timeout_s is None:
         return _RESEND_S
     return max(0.0, min(_RESEND_S, started + timeout_s - time.monotonic()))

@@ -18,12 +18,12 @@ import zmq
 
 from nep.errors import AddressInUseError, NepError
 from nep.i18n import _
-from nep.system.addresses import endpoint_of, host_of, in_numbers, is_endpoint, is_loopback
-from nep.system.descriptors import check_room
+from nep.system.addresses import endpoint_of, host_of, is_endpoint, is_loopback, resolve_address
+from nep.system.descriptors import check_free_descriptors
 from nep.system.log_rarely import is_logged
 
 _logger = logging.getLogger("nep")
-_REPORT_S = 5.0
+_REPORT_DURATION_S = 5.0
 
 Socket = zmq.Socket[bytes]
 Part = bytes | memoryview | zmq.Frame
@@ -33,20 +33,20 @@ SHORT_WAIT_S = 0.005
 
 Shorter waits are no faster: a timer that ends before the kernel's next tick costs more than the wait.
 """
-_SLICE_S = 0.1
+_WAIT_SLICE_S = 0.1
 _IN_USE_ERRORS = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
 """Errors of bind which mean that the address exists but can't be used now."""
 _SEND_HIGH_WATER_MARK = 50_000
 _IMAGE_HIGH_WATER_MARK = 32
-_PORT_FILES = 2
-SILENT_MS = 15_000
+_FDS_PER_PORT = 2
+SILENCE_TIMEOUT_MS = 15_000
 """Time in milliseconds without an acknowledgement after which a connection to another computer is closed."""
-CONNECT_MS = 3000
+CONNECT_TIMEOUT_MS = 3000
 """Timeout in milliseconds for connecting to other computers. The system's own retries get ever slower."""
 ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
 """Ports on which programs of the original NEP expect something else."""
 
-_TcpInfo = struct.Struct("=2xBB52xI")
+_TCP_INFO = struct.Struct("=2xBB52xI")
 """Fields of Linux's `tcp_info`: retransmissions, window probes, and ms since the last acknowledgement."""
 _MIN_RETRIES = 3
 _SRCFD = int(zmq.SRCFD)
@@ -69,7 +69,7 @@ class RejectionLog:
 
     def recent_message(self) -> str:
         """Return the newest reason and the count, or "" if nothing was rejected in the last seconds."""
-        if not self.count or time.monotonic() - self._last_at > _REPORT_S:
+        if not self.count or time.monotonic() - self._last_at > _REPORT_DURATION_S:
             return ""
         return _("{reason} ({count} so far)").format(reason=self._reason, count=self.count)
 
@@ -107,7 +107,7 @@ def bind_free_port(owner: Socket, host: str) -> str:
 
 def bind(owner: Socket, address: str) -> str:
     """Bind to an address; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
-    check_room(_PORT_FILES, f"a port of '{host_of(address)}'")
+    check_free_descriptors(_FDS_PER_PORT, f"a port of '{host_of(address)}'")
     try:
         owner.bind(endpoint_of(address))
     except zmq.ZMQError as error:
@@ -124,7 +124,7 @@ def connect(owner: Socket, address: str) -> str:
                 address=address
             )
         )
-    endpoint = endpoint_of(in_numbers(address))
+    endpoint = endpoint_of(resolve_address(address))
     owner.connect(endpoint)
     return endpoint
 
@@ -141,7 +141,7 @@ def local_address_towards(address: str) -> str | None:
         return None
 
 
-def is_far(endpoint: str) -> bool:
+def is_remote(endpoint: str) -> bool:
     """Return True if the endpoint is on another computer, or can be reached from one."""
     return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
@@ -156,10 +156,10 @@ def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> Non
     themselves where the system supports that (`is_watched`, see `FarConnection`). Only needed for other
     computers, because on the same computer the kernel reports the end of every connection.
     """
-    far = is_far(endpoint)
+    far = is_remote(endpoint)
     owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if far else -1)
-    owner.setsockopt(zmq.TCP_MAXRT, SILENT_MS if far and not is_watched else 0)
-    owner.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_MS if far else 0)
+    owner.setsockopt(zmq.TCP_MAXRT, SILENCE_TIMEOUT_MS if far and not is_watched else 0)
+    owner.setsockopt(zmq.CONNECT_TIMEOUT, CONNECT_TIMEOUT_MS if far else 0)
     if far:
         owner.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 4)
         owner.setsockopt(zmq.TCP_KEEPALIVE_INTVL, 2)
@@ -176,11 +176,11 @@ def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout
         left = deadline - time.monotonic()
         if left <= 0.0:
             return False
-        changed.wait(min(left, _SLICE_S))
+        changed.wait(min(left, _WAIT_SLICE_S))
     return True
 
 
-def sendable(data: bytes | memoryview) -> Part:
+def to_sendable(data: bytes | memoryview) -> Part:
     """Return `data`, or a copy if it is mutable, so that it can be sent without a further copy."""
     if isinstance(data, bytes):
         return data
@@ -193,7 +193,7 @@ def sendable(data: bytes | memoryview) -> Part:
 
 
 @dataclass(frozen=True)
-class FarConnection:
+class RemoteConnection:
     """Connection over which a subscriber on another computer has sent its hello.
 
     Identified by its descriptor, which may be reused, and its peer address. When a computer changes its
@@ -204,11 +204,11 @@ class FarConnection:
     fd: int
     peer: tuple[str, int]
 
-    can_tell: ClassVar[bool] = sys.platform == "linux"
+    can_detect_silence: ClassVar[bool] = sys.platform == "linux"
     """True if `is_silent` is supported on this system."""
 
     @classmethod
-    def of(cls, received: zmq.Frame) -> FarConnection | None:
+    def from_frame(cls, received: zmq.Frame) -> RemoteConnection | None:
         """Return the connection that delivered `received`; None if it is local or unknown."""
         try:
             host = str(received.get("Peer-Address"))
@@ -226,22 +226,22 @@ class FarConnection:
         The kernel acknowledges probes for a program stopped in a debugger, because its receive window is
         full.
         """
-        if not self.can_tell:
+        if not self.can_detect_silence:
             return False
         try:
-            with _duplicated(self.fd) as connection:
+            with _duplicate_socket(self.fd) as connection:
                 if connection.getpeername() != self.peer:
                     return False
-                tcp_info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TcpInfo.size)
-            resent, asked, last_answer_ms = _TcpInfo.unpack(tcp_info)
+                tcp_info = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO.size)
+            resent, asked, last_answer_ms = _TCP_INFO.unpack(tcp_info)
         except (OSError, struct.error):
             return False
-        return bool(max(resent, asked) >= _MIN_RETRIES and last_answer_ms >= SILENT_MS)
+        return bool(max(resent, asked) >= _MIN_RETRIES and last_answer_ms >= SILENCE_TIMEOUT_MS)
 
-    def end(self) -> None:
+    def close(self) -> None:
         """Close the connection if it still exists; libzmq then releases its queue."""
         try:
-            with _duplicated(self.fd) as connection:
+            with _duplicate_socket(self.fd) as connection:
                 if connection.getpeername() == self.peer:
                     connection.shutdown(socket.SHUT_RDWR)
         except OSError as error:
@@ -249,12 +249,12 @@ class FarConnection:
 
 
 def _peer_of(fd: int) -> tuple[str, int] | None:
-    with _duplicated(fd) as connection:
+    with _duplicate_socket(fd) as connection:
         peer = connection.getpeername()
     return (str(peer[0]), int(peer[1])) if connection.family == socket.AF_INET else None
 
 
-def _duplicated(fd: int) -> socket.socket:
+def _duplicate_socket(fd: int) -> socket.socket:
     # Duplicates the descriptor, because libzmq may close the original at any moment.
     own = os.dup(fd)
     try:

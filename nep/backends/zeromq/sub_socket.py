@@ -22,16 +22,24 @@ from nep.backends.zeromq.shared.payloads import SharedSources
 from nep.backends.zeromq.sockets import (
     RejectionLog,
     Socket,
-    is_far,
+    is_remote,
     keep_alive,
     receive_high_water_mark,
     set_receive_timeout,
 )
 from nep.errors import DecodeError, WireError
 from nep.i18n import _, lazy
-from nep.messages.codecs import codec_for, codec_numbered
-from nep.messages.message import NOTHING, UNDECODED, Message, MessageKind, arrived, kind_of, new_message
-from nep.protocol.batch import BATCH_FORM, BATCH_MAX, check_batch, entries, table_of, unknown_codec
+from nep.messages.codecs import codec_by_number, codec_for
+from nep.messages.message import (
+    NO_EXTENSION,
+    UNDECODED,
+    Message,
+    MessageKind,
+    message_kind,
+    new_message,
+    received_message,
+)
+from nep.protocol.batch import BATCH_FORM_FLAG, BATCH_MAX, check_batch, entries, table_struct, unknown_codec
 from nep.protocol.requests import RemotePublisher
 from nep.protocol.wire import (
     BYE,
@@ -40,19 +48,19 @@ from nep.protocol.wire import (
     LATCHED,
     OFFER,
     SHARED,
+    Acknowledgement,
     Header,
-    Read,
-    Shares,
-    apart,
+    OfferAcceptance,
+    acceptance_part,
+    acknowledgement_part,
     form_of,
     hello_part,
     read_header,
-    read_part,
-    shares_part,
     split_rest,
+    split_single_part,
     topic_part,
-    unpack_at,
-    unpack_quickly,
+    unpack_header,
+    unpack_header_at,
 )
 from nep.system.addresses import is_endpoint
 
@@ -63,7 +71,7 @@ _NO_COPY_BYTES = 8_192
 """Size in bytes from which libzmq receives into separate memory, of which a view can be kept."""
 SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
-_Run = tuple[MessageKind, int, int, tuple[int, ...], Sequence[bytes]]
+_DecodedRun = tuple[MessageKind, int, int, tuple[int, ...], Sequence[bytes]]
 """Messages whose payloads were decoded: kind, publisher id, first seq, time stamps and encoded payloads."""
 
 _logger = logging.getLogger("nep")
@@ -109,34 +117,34 @@ class CarefulParser:
         is_alone = first == self._hello
         is_one_part = not rest and first.startswith(self._topic)
         if is_one_part:
-            first, *rest = apart(first)
+            first, *rest = split_single_part(first)
         if not is_alone and first != self._topic:
-            raise _other_topic()
+            raise _topic_error()
         if is_alone and len(rest) == 1:
-            self._notice(read_header(bytes(rest[0])))
+            self._handle_notice(read_header(bytes(rest[0])))
             return None
-        return self._message(*split_rest(rest, is_one_part=is_one_part), is_alone=is_alone)
+        return self._parse_message(*split_rest(rest, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
         """Return the messages of a batch. Raises `WireError`."""
-        topic, head, body = apart(first)
+        topic, head, body = split_single_part(first)
         if topic != self._topic:
-            raise _other_topic()
+            raise _topic_error()
         header, _payload, _extension = split_rest((head, body), is_one_part=True)
         check_batch(header, body)
         one = header._replace(flags=0)
         read = (
-            self._message(
+            self._parse_message(
                 one._replace(seq=header.seq + each.number, stamp_ns=each.stamp_ns),
                 body[each.begin : each.end],
-                NOTHING,
+                NO_EXTENSION,
                 is_alone=False,
             )
             for each in entries(body)
         )
         return [each for each in read if each is not None]
 
-    def _notice(self, header: Header) -> None:
+    def _handle_notice(self, header: Header) -> None:
         source = self._sources.get(header.publisher)
         last = source.last
         is_possible = self._sources.advance_to(header.publisher, header.seq)
@@ -157,10 +165,10 @@ class CarefulParser:
                 code="seq-leap",
             )
 
-    def _message(
+    def _parse_message(
         self, header: Header, payload: _Part, extension: Mapping[str, object], *, is_alone: bool
     ) -> Message | None:
-        codec = codec_numbered(header.codec)
+        codec = codec_by_number(header.codec)
         if codec is None:
             raise unknown_codec(header.codec)
         if not is_alone and self._sources.is_early(header.publisher):
@@ -179,7 +187,7 @@ class CarefulParser:
                 return None
         source = self._sources.get(header.publisher)
         msg_type = self._msg_type if source.remote is None else source.remote.publisher.msg_type
-        source.kind = kind_of(
+        source.kind = message_kind(
             self._name,
             codec.name,
             msg_type,
@@ -195,14 +203,16 @@ class CarefulParser:
             source.form = plain
             source.shared_form = source.shared_form if source.shared_form == plain | SHARED_FORM else 0
         if shared is not None:
-            return arrived(source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension)
+            return received_message(
+                source.kind, shared, header.stamp_ns, header.seq, header.publisher, extension
+            )
         # a small view must not keep a large receive buffer alive
         is_large = len(payload) >= _NO_COPY_BYTES
         data = memoryview(payload).toreadonly() if is_large else bytes(payload)
-        return arrived(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)
+        return received_message(source.kind, data, header.stamp_ns, header.seq, header.publisher, extension)
 
 
-def _other_topic() -> WireError:
+def _topic_error() -> WireError:
     return WireError(_("a message does not begin with its topic"), code="first-part")
 
 
@@ -222,15 +232,15 @@ class SubSocket:
         self._topic = topic_part(spec.topic)
         self._hello = hello_part(spec.id, spec.topic, batches=True)
         self._id = spec.id
-        self._shared = SharedSources(spec.id, self._answer)
+        self._shared = SharedSources(spec.id, self._confirm_offer)
         self._parser = CarefulParser(
-            spec, self._hello, self.sources, self.leave, self._acknowledge, self._shared
+            spec, self._hello, self.sources, self.disconnect, self._acknowledge, self._shared
         )
         self._topic_length = len(self._topic)
         self.payloads: deque[Any] = deque()
         """Decoded payloads. See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
-        self._run: _Run | None = None
+        self._run: _DecodedRun | None = None
         self._body = self._topic_length + HEADER_BYTES
         """Offset of the payload in a message of one part."""
         # sizes at which a payload can't be told apart from the first part of the next message
@@ -263,9 +273,9 @@ class SubSocket:
         source = self.sources.add_listed(remote)
         source.form = 0  # its message type may have changed
         source.is_silent = False
-        source.ends_at = None
-        if endpoint and endpoint not in (source.endpoint, source.refused):
-            source.refused = source.problem = ""
+        source.bye_deadline = None
+        if endpoint and endpoint not in (source.endpoint, source.failed_endpoint):
+            source.failed_endpoint = source.problem = ""
             if is_endpoint(endpoint):
                 self._connect(source, endpoint)
             else:
@@ -278,7 +288,7 @@ class SubSocket:
 
     def _disconnect_replaced(self, remote: RemotePublisher, endpoint: str) -> None:
         # Removes silent publishers once their last messages are read; at once if their endpoint is reused.
-        for old in self.sources.replaced_by(remote):
+        for old in self.sources.replaced_publishers(remote):
             self.sources.mark_closing(old, 0, time.monotonic())
         known = self.sources.find(remote.publisher.id)
         if not endpoint or (known is not None and known.endpoint == endpoint):
@@ -286,12 +296,12 @@ class SubSocket:
         for old, source in self.sources.items():
             if source.endpoint == endpoint:
                 self.sources.count_missing(old)
-                self.leave(old)
+                self.disconnect(old)
 
     def _connect(self, source: TrackedPublisher, endpoint: str) -> None:
         if source.endpoint:  # its computer has a new address, or its master has restarted
             self._disconnect(source.endpoint)
-        source.connecting(endpoint)
+        source.reset_connection(endpoint)
         try:
             keep_alive(self._socket, endpoint)
             self._socket.connect(endpoint)
@@ -303,7 +313,7 @@ class SubSocket:
     def reconnect_remote(self) -> None:
         """Reconnect to publishers on other computers. Their unread messages are discarded."""
         for source in self.sources.by_id.values():
-            if is_far(source.endpoint):
+            if is_remote(source.endpoint):
                 self._connect(source, source.endpoint)
 
     def reconnect(self, publisher: int) -> None:
@@ -315,7 +325,7 @@ class SubSocket:
         # An invalid endpoint is reported, not raised: it must not affect other publishers.
         name = source.remote.node_name if source.remote is not None else ""
         shown = ascii(endpoint[:100])[1:-1]
-        source.refused = endpoint
+        source.failed_endpoint = endpoint
         source.problem = _("cannot connect to the endpoint '{shown}' of '{name}': {why}").format(
             shown=shown, name=name, why=why
         )
@@ -328,20 +338,20 @@ class SubSocket:
         listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
         return next((each.problem for each in listed), "")
 
-    def leave(self, publisher: int) -> None:
+    def disconnect(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
         source = self.sources.pop(publisher)
-        self._shared.leave(publisher)
+        self._shared.close_publisher(publisher)
         if source is not None and source.endpoint:
             self._disconnect(source.endpoint)
 
     def _acknowledge(self, publisher: int, seq: int) -> None:
         # Acknowledges `seq` to a publisher, and assigns it a share of the receive window.
-        bound = WINDOW_BYTES // max(1, self.sources.echoing)
-        self._send_filter(read_part(Read(self._id, publisher, seq, bound)))
+        bound = WINDOW_BYTES // max(1, self.sources.echo_count)
+        self._send_filter(acknowledgement_part(Acknowledgement(self._id, publisher, seq, bound)))
 
-    def _answer(self, shares: Shares) -> None:
-        self._send_filter(shares_part(shares))
+    def _confirm_offer(self, shares: OfferAcceptance) -> None:
+        self._send_filter(acceptance_part(shares))
 
     def _send_filter(self, filter_part: bytes) -> None:
         # Reaches all publishers, as a filter that is set and removed at once.
@@ -388,7 +398,7 @@ class SubSocket:
                     first = recv(flags)
                     flags = _DONTWAIT  # all parts of a message are available with its first one
                 if len(first) >= body and first.startswith(topic):
-                    form, size, seq, stamp_ns, publisher = unpack_at(first, cut)
+                    form, size, seq, stamp_ns, publisher = unpack_header_at(first, cut)
                     source = find(publisher)
                     if (
                         source
@@ -400,14 +410,14 @@ class SubSocket:
                         message.kind, message.raw = source.kind, first[body:]
                         message.stamp_ns = stamp_ns
                         message.seq = source.last = seq
-                        message.publisher, message.extension = publisher, NOTHING
+                        message.publisher, message.extension = publisher, NO_EXTENSION
                         message.decoded = UNDECODED
                         append(message)
                         count += 1
                         max_bytes -= size
                         first = None
                         continue
-                    if form & BATCH_FORM:
+                    if form & BATCH_FORM_FLAG:
                         got, new = self._read_batch(first, into)
                         # a rejected batch returns 0, so the caller waits as for an empty socket
                         count, uncounted, max_bytes, first = (
@@ -420,7 +430,7 @@ class SubSocket:
                     other = self._read_shared(first) if form & SHARED_FORM else None
                 else:
                     other = None
-                first, other = (None, other) if other is not None else self._in_parts(first)
+                first, other = (None, other) if other is not None else self._read_parts(first)
                 if other is not None:
                     append(other)
                     count += 1
@@ -434,13 +444,13 @@ class SubSocket:
     def _read_batch(self, first: bytes, into: MessageBuffer) -> tuple[int, int]:
         # Returns the number of messages, and how many of them aren't counted yet.
         body = self._body
-        form, size, seq, _stamp_ns, publisher = unpack_at(first, self._topic_length)
+        form, size, seq, _stamp_ns, publisher = unpack_header_at(first, self._topic_length)
         source = self.sources.by_id.get(publisher)
         count = int.from_bytes(first[body : body + 4], "little")
-        is_next = source and source.last == seq - 1 and source.form | BATCH_FORM == form
+        is_next = source and source.last == seq - 1 and source.form | BATCH_FORM_FLAG == form
         if not (source and is_next and 0 < count <= BATCH_MAX and len(first) == body + size):
             return self._read_any_batch(first, into)
-        table = table_of(count)
+        table = table_struct(count)
         at = body + table.size
         if at > len(first):
             return self._read_any_batch(first, into)
@@ -459,7 +469,7 @@ class SubSocket:
             message.kind, message.raw = kind, first[at : (at := at + size)]
             message.stamp_ns = stamp_ns
             message.seq = seq
-            message.publisher, message.extension = publisher, NOTHING
+            message.publisher, message.extension = publisher, NO_EXTENSION
             message.decoded = UNDECODED
             append(message)
             seq += 1
@@ -479,10 +489,10 @@ class SubSocket:
         kind = source.kind
         decode = kind.decode
         try:
-            self.payloads.extend([decode(raw, NOTHING) for raw in raws[1:]])
+            self.payloads.extend([decode(raw, NO_EXTENSION) for raw in raws[1:]])
         except DecodeError:
             return False
-        into.append(arrived(kind, raws[0], stamps_ns[0], seq, publisher))
+        into.append(received_message(kind, raws[0], stamps_ns[0], seq, publisher))
         source.last = seq + len(raws) - 1
         self._run = kind, publisher, seq, stamps_ns, raws
         return True
@@ -499,13 +509,13 @@ class SubSocket:
             except IndexError:
                 return
             number -= 1
-            message = arrived(kind, raws[number], stamps_ns[number], first + number, publisher)
+            message = received_message(kind, raws[number], stamps_ns[number], first + number, publisher)
             message.decoded = payload
             into.appendleft(message)
 
     def _read_shared(self, first: bytes) -> Message | None:
         # Fast path for shared memory. Returns None to continue on the careful path.
-        form, size, seq, stamp_ns, publisher = unpack_at(first, self._topic_length)
+        form, size, seq, stamp_ns, publisher = unpack_header_at(first, self._topic_length)
         source = self.sources.by_id.get(publisher)
         if (
             not source
@@ -519,7 +529,7 @@ class SubSocket:
             return None
         self.sources.received += 1
         source.last = seq
-        return arrived(source.kind, data, stamp_ns, seq, publisher)
+        return received_message(source.kind, data, stamp_ns, seq, publisher)
 
     def _read_any_batch(self, first: bytes, into: MessageBuffer) -> tuple[int, int]:
         if self._has_more():
@@ -546,7 +556,7 @@ class SubSocket:
         except zmq.Again:
             return None
         if len(first) >= self._body and first.startswith(self._topic):
-            form, size, seq, stamp_ns, publisher = unpack_at(first, self._topic_length)
+            form, size, seq, stamp_ns, publisher = unpack_header_at(first, self._topic_length)
             source = self.sources.by_id.get(publisher)
             raw = first[self._body :]
             if source and source.form == form and source.last == seq - 1 and len(raw) == size:
@@ -555,7 +565,7 @@ class SubSocket:
                 message.kind, message.raw = source.kind, raw
                 message.stamp_ns = stamp_ns
                 message.seq = source.last = seq
-                message.publisher, message.extension = publisher, NOTHING
+                message.publisher, message.extension = publisher, NO_EXTENSION
                 message.decoded = UNDECODED
                 return message
         one: deque[Message] = deque()
@@ -565,7 +575,7 @@ class SubSocket:
         rest.extend(one)
         return message
 
-    def _in_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
+    def _read_parts(self, first: bytes) -> tuple[bytes | None, Message | None]:
         # Asking pyzmq whether a part is the last takes longer than receiving it, so this assumes three parts,
         # see `_parse_parts`.
         if first != self._topic:
@@ -574,7 +584,7 @@ class SubSocket:
         try:
             head = recv(_DONTWAIT)
             if len(head) == HEADER_BYTES:
-                form, size, seq, stamp_ns, publisher = unpack_quickly(head)
+                form, size, seq, stamp_ns, publisher = unpack_header(head)
                 source = self.sources.by_id.get(publisher)
                 if (
                     source
@@ -587,7 +597,7 @@ class SubSocket:
                         self.sources.received += 1
                         source.last = seq
                         raw = data if size < _NO_COPY_BYTES else memoryview(data).toreadonly()
-                        return None, arrived(source.kind, raw, stamp_ns, seq, publisher)
+                        return None, received_message(source.kind, raw, stamp_ns, seq, publisher)
         except zmq.Again:
             self.refusals.add(_(_TOO_SHORT))
             return None, None
@@ -617,7 +627,7 @@ class SubSocket:
             self.refusals.add(error.reason)
             return None, None
 
-    def dropped(self, count: int) -> None:
+    def count_dropped(self, count: int) -> None:
         """Count received messages that were dropped from a full queue."""
         self.sources.count_dropped(count)
 

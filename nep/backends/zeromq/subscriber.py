@@ -26,18 +26,18 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import zmq
 
-from nep.backends.base import SubscriberSpec, Wakes
+from nep.backends.base import SubscriberSpec, Wakeable
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.loss import PublisherTracker
 from nep.backends.zeromq.sockets import SHORT_WAIT_S, RejectionLog, wait_until
 from nep.backends.zeromq.sub_socket import MessageBuffer, SubSocket
 from nep.messages.clocks import ClockDifference
 from nep.messages.message import Message
-from nep.messages.queue import AHEAD_MOST, Inbox, ReadAhead
+from nep.messages.queue import MAX_READ_AHEAD, Inbox, ReadAhead
 from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 from nep.system.wakeup import Waker
 
-_AHEAD_BYTES = 2**18
+_READ_AHEAD_BYTES = 2**18
 
 _logger = logging.getLogger("nep")
 _POLLIN = int(zmq.POLLIN)
@@ -47,7 +47,7 @@ _WAITER_CHECK_S = 0.1
 """Interval in seconds at which the I/O thread checks whether a reader still waits."""
 _MAX_IO_DELAY_S = _WAITER_CHECK_S + LEASE_S
 """Maximum time in seconds until the I/O thread's next check; a read wakes it only if that is later."""
-_BATCH_S = 0.005
+_BATCH_INTERVAL_S = 0.005
 """Minimum interval in seconds between two calls of a sink or two transfers to the inbox."""
 _BATCH_MESSAGES = 10_000
 _BATCH_BYTES = 64 * 2**20
@@ -95,7 +95,7 @@ class Readable(Protocol):
         Other messages of the same batch are appended to `rest`.
         """
 
-    def dropped(self, count: int) -> None:
+    def count_dropped(self, count: int) -> None:
         """Count received messages that were dropped from a full queue."""
 
     def close(self) -> None:
@@ -133,7 +133,7 @@ class NativeReadable(Readable, Protocol):
     def connect(self, remote: RemotePublisher) -> None:
         """Connect to a publisher. Idempotent."""
 
-    def leave(self, publisher: int) -> None:
+    def disconnect(self, publisher: int) -> None:
         """Disconnect from a publisher and remove it."""
 
     def reconnect_remote(self) -> None:
@@ -168,7 +168,7 @@ class SocketSubscriber(Generic[R]):
         """Decoded payloads. See `nep.backends.base.GivesPayloads`."""
         self.wants_payloads = False
         self._ahead = ReadAhead(spec.max_messages)
-        self._may_exceed_bound = spec.max_messages >= 10 * AHEAD_MOST
+        self._may_exceed_bound = spec.max_messages >= 10 * MAX_READ_AHEAD
         """True if the queue is long enough to exceed its limit by a few messages."""
         self._read_at = 0.0
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
@@ -176,9 +176,9 @@ class SocketSubscriber(Generic[R]):
         self._io_check_at = _INFINITE
         self._is_hot = False
         self._lock_requests: deque[None] = deque()
-        self._waiters: list[Wakes] = []
+        self._waiters: list[Wakeable] = []
         self._waker: Waker | None = None
-        self._woken: set[Wakes] = set()
+        self._woken: set[Wakeable] = set()
         self._problem = ""
         # `with` is three times faster on the lock than on the condition
         self._lock = threading.Lock()
@@ -211,10 +211,10 @@ class SocketSubscriber(Generic[R]):
         try:
             zmq.zmq_poll([(self.fd, _POLLIN), (waker.fd, _POLLIN)], int(timeout_s * 1000) + 1)
         finally:
-            message = self._waited(waker, began)
+            message = self._finish_wait(waker, began)
         return message
 
-    def _waited(self, waker: Waker, began: float) -> Message | None:
+    def _finish_wait(self, waker: Waker, began: float) -> Message | None:
         with self._lock:
             self._waiters.remove(waker)
             if waker in self._woken:
@@ -261,7 +261,7 @@ class SocketSubscriber(Generic[R]):
 
     # ---- waiting
 
-    def enter_wait(self, waker: Wakes) -> bool:
+    def enter_wait(self, waker: Wakeable) -> bool:
         """Prepare to poll the descriptor; return False if a message is available or it is closed."""
         self._lock_requests.append(None)  # as `_requested_lock` does, but faster
         try:
@@ -279,7 +279,7 @@ class SocketSubscriber(Generic[R]):
         finally:
             self._lock_requests.pop()
 
-    def leave_wait(self, waker: Wakes) -> None:
+    def leave_wait(self, waker: Wakeable) -> None:
         """End the wait that `enter_wait` prepared."""
         with self._lock:
             self._waiters.remove(waker)
@@ -340,7 +340,7 @@ class SocketSubscriber(Generic[R]):
                 sink(batch)
             except BaseException:  # also SystemExit: the sink thread continues with the next batch
                 _logger.exception("the sink of '%s' failed", self.spec.topic)
-        return PollState(pause_reading=True, due=now + _BATCH_S) if count or batch else PollState()
+        return PollState(pause_reading=True, due=now + _BATCH_INTERVAL_S) if count or batch else PollState()
 
     # ---- closing
 
@@ -352,7 +352,7 @@ class SocketSubscriber(Generic[R]):
             self.is_closed = True
             self.payloads.clear()
             self.ready.clear()
-            self._inbox.take_all()
+            self._inbox.pop_all()
             self._wake_waiters_locked()
         self._on_close(self.spec.id)
         self._io.remove(self)
@@ -410,22 +410,22 @@ class SocketSubscriber(Generic[R]):
             span, self._read_at = now - self._read_at, now
             if span > self._ahead.span_s:
                 if self._ahead.now > 1:
-                    self._ahead.begin()
+                    self._ahead.reset()
                 message = self._read(self.ready, may_wait=may_wait)
-                return self._bounded_locked(message) if self.ready else message
-            max_messages = self._ahead.more()
-            if self._read_into(self.ready, max_messages, _AHEAD_BYTES, may_wait=may_wait) < max_messages:
-                self._ahead.begin()
+                return self._drop_excess_locked(message) if self.ready else message
+            max_messages = self._ahead.increase()
+            if self._read_into(self.ready, max_messages, _READ_AHEAD_BYTES, may_wait=may_wait) < max_messages:
+                self._ahead.reset()
         if self.ready:
-            return self._bounded_locked(self.ready.popleft())
+            return self._drop_excess_locked(self.ready.popleft())
         if not self._queues_all:
             self._fill_locked()
         elif self._may_exceed_bound and self._inbox.messages:
-            self._inbox.move(self.ready, AHEAD_MOST, _AHEAD_BYTES)
+            self._inbox.move(self.ready, MAX_READ_AHEAD, _READ_AHEAD_BYTES)
             return self.ready.popleft()
         return self._inbox.pop()
 
-    def _bounded_locked(self, message: Message | None) -> Message | None:
+    def _drop_excess_locked(self, message: Message | None) -> Message | None:
         # Returns the oldest of `message` and those behind it for which there is room; counts the others as
         # dropped.
         over = 0
@@ -433,7 +433,7 @@ class SocketSubscriber(Generic[R]):
             message = self.ready.popleft()
             over += 1
         if over:
-            self._readable.dropped(over)
+            self._readable.count_dropped(over)
         return message
 
     def _fill_locked(self, max_messages: int = _BATCH_MESSAGES) -> int:
@@ -442,17 +442,17 @@ class SocketSubscriber(Generic[R]):
         count = self._read_into(messages, max_messages, _BATCH_BYTES)
         dropped = sum(map(self._inbox.put, messages))
         if dropped:
-            self._readable.dropped(dropped)
+            self._readable.count_dropped(dropped)
         return count
 
     def _fill_batch_locked(self, batch: list[Message]) -> int:
         if self._queues_all and self.spec.max_messages >= _BATCH_MESSAGES and not self._inbox.messages:
             return self._read_into(batch, _BATCH_MESSAGES, _BATCH_BYTES)
         count = self._fill_locked()
-        batch += self._inbox.take_all()
+        batch += self._inbox.pop_all()
         return count
 
-    def _after_use_locked(self) -> None:
+    def _recheck_input_locked(self) -> None:
         # Call after using the socket without emptying it, which may have consumed the edge of ZMQ_FD.
         if self._readable.has_input:
             self._wake_waiters_locked()
@@ -507,7 +507,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         """Endpoints of all connections."""
         return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
 
-    def begin(self, remotes: Iterable[RemotePublisher]) -> None:
+    def connect_listed(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to the publishers listed at registration, except those that have closed since.
 
         The notification of a close is read in another thread than the reply and may be handled first.
@@ -516,12 +516,12 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             closed, self._closed_early = self._closed_early or set(), None
             self._connect_locked(each for each in remotes if each.publisher.id not in closed)
 
-    def expect_all_of(self, publisher: int) -> None:
+    def expect_all_messages(self, publisher: int) -> None:
         """Count losses from the first message of a publisher that was created after this subscriber."""
         with self._requested_lock():
             is_registered = self._closed_early is None
             if is_registered and not self.is_closed:
-                self._readable.sources.expect_all_of(publisher)
+                self._readable.sources.expect_all_messages(publisher)
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
         """Connect to publishers. Idempotent."""
@@ -532,7 +532,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         if not self.is_closed:
             for remote in remotes:
                 self._readable.connect(remote)
-            self._after_use_locked()
+            self._recheck_input_locked()
 
     def reconnect_remote(self) -> None:
         """Reconnect to publishers on other computers, because the address of this computer has changed."""
@@ -541,7 +541,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._fill_locked()
                 self._wake_waiters_locked()
                 self._readable.reconnect_remote()
-                self._after_use_locked()
+                self._recheck_input_locked()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
         """Replace the list of publishers: connect to new ones, and mark missing ones as silent."""
@@ -563,12 +563,12 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             else:
                 self._readable.sources.mark_silent(publisher, final)
 
-    def correct(self, clocks: Mapping[str, ClockDifference]) -> None:
+    def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
         """Set the clock differences of other computers, by node id."""
         with self._requested_lock():
             self._readable.sources.set_clock_differences(clocks)
 
-    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Handle a renewal: remove publishers that closed without a bye, and update the losses.
 
         `last_seqs` contains the newest sequence numbers known to the master, as (publisher id, number).
@@ -577,13 +577,13 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             if self.is_closed:
                 return
             sources = self._readable.sources
-            for publisher in sources.expired(now):
+            for publisher in sources.expired_publishers(now):
                 sources.count_missing(publisher)
-                self._readable.leave(publisher)
+                self._readable.disconnect(publisher)
             if not self._readable.has_input:
                 # libzmq never connects again after a failed handshake, as with another program's PULL.
-                for publisher in sources.silent(now):
+                for publisher in sources.unresponsive_publishers(now):
                     self._readable.reconnect(publisher)
                 for publisher, seq in last_seqs:
                     sources.expect_up_to(publisher, seq)
-            self._after_use_locked()
+            self._recheck_input_locked()

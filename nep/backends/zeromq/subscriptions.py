@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from nep.backends.zeromq.byte_window import SendWindow
 from nep.backends.zeromq.shared.payloads import SharedPayloads
-from nep.backends.zeromq.sockets import FarConnection, RejectionLog
-from nep.protocol.wire import Hello, parse_hello, parse_read, parse_shares, topic_part
+from nep.backends.zeromq.sockets import RejectionLog, RemoteConnection
+from nep.protocol.wire import Hello, parse_acceptance, parse_acknowledgement, parse_hello, topic_part
 
 _logger = logging.getLogger("nep")
 MAX_SUBSCRIBERS = 10_000
@@ -32,7 +32,7 @@ class Subscriptions:
         self._without_batches: set[int] = set()
         self.windows: dict[int, SendWindow] = {}
         """Send windows of subscribers that acknowledge messages, by id."""
-        self._far: dict[int, FarConnection] = {}
+        self._far: dict[int, RemoteConnection] = {}
         """Connections of subscribers on other computers, by id."""
         self.shared: SharedPayloads | None = None
         self.refusals = RejectionLog()
@@ -41,12 +41,12 @@ class Subscriptions:
         self._topic = topic_part(topic)
 
     @property
-    def is_there(self) -> bool:
+    def has_subscribers(self) -> bool:
         """True if any subscriber is connected."""
         return bool(self.seen or self.legacy_filters)
 
     @property
-    def reads_batches(self) -> bool:
+    def all_accept_batches(self) -> bool:
         """True if all current subscribers accept batches."""
         return not self.legacy_filters and not self._without_batches
 
@@ -55,7 +55,7 @@ class Subscriptions:
         """True if all current subscribers acknowledge messages."""
         return not self.legacy_filters and len(self.windows) == len(self.seen)
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """Remove all subscribers that have sent a hello."""
         self.seen.clear()
         self.hellos.clear()
@@ -63,8 +63,8 @@ class Subscriptions:
         self._far.clear()
         self._without_batches.clear()
 
-    def note(
-        self, event: bytes, count: int, connection_of: Callable[[], FarConnection | None] = lambda: None
+    def handle_event(
+        self, event: bytes, count: int, connection_of: Callable[[], RemoteConnection | None] = lambda: None
     ) -> bytes | None:
         """Handle a subscription event.
 
@@ -79,7 +79,7 @@ class Subscriptions:
         is_wanted, subscription = event[:1] == b"\1", event[1:]
         hello = parse_hello(subscription)
         if hello is None:
-            if not self._handle_answer(subscription, is_wanted=is_wanted):
+            if not self._handle_reply(subscription, is_wanted=is_wanted):
                 self._update_filters(subscription, is_wanted=is_wanted)
             return None
         if hello.topic != self._name:
@@ -92,16 +92,16 @@ class Subscriptions:
         self._remove_subscriber(hello.subscriber)
         return None
 
-    def _handle_answer(self, subscription: bytes, *, is_wanted: bool) -> bool:
+    def _handle_reply(self, subscription: bytes, *, is_wanted: bool) -> bool:
         # Handles acknowledgements and replies to offers. Returns True for these.
-        read, shares = parse_read(subscription), parse_shares(subscription)
+        read, shares = parse_acknowledgement(subscription), parse_acceptance(subscription)
         if read is not None:
             if is_wanted and read.publisher == self._id and read.subscriber in self.windows:
                 self.windows[read.subscriber].acknowledge(read.seq, read.bound_bytes)
         elif shares is not None:
             own = is_wanted and shares.publisher == self._id and shares.subscriber in self.windows
             if own and self.shared is not None:
-                self.shared.note(shares)
+                self.shared.confirm(shares)
         return read is not None or shares is not None
 
     def _add_subscriber(self, hello: Hello, subscription: bytes, count: int) -> bytes | None:
@@ -116,27 +116,27 @@ class Subscriptions:
         self.hellos[hello.subscriber] = subscription
         self.windows.pop(hello.subscriber, None)
         if self.shared is not None:
-            self.shared.forget(hello.subscriber)
+            self.shared.discard(hello.subscriber)
         self._without_batches.discard(hello.subscriber)
         if not hello.batches:
             self._without_batches.add(hello.subscriber)
-        if hello.tells:
+        if hello.acknowledges:
             self.windows[hello.subscriber] = SendWindow()  # a new connection: nothing is in flight
         return subscription
 
-    def _update_connection(self, subscriber: int, connection: FarConnection | None) -> None:
+    def _update_connection(self, subscriber: int, connection: RemoteConnection | None) -> None:
         # A hello over a new connection means that the previous connection is abandoned.
         before = self._far.pop(subscriber, None)
         if connection is not None:
             self._far[subscriber] = connection
             if before is not None and before != connection:
-                before.end()
+                before.close()
 
-    def end_silent(self) -> None:
+    def close_silent(self) -> None:
         """Close connections to computers that have vanished; their subscribers are then removed."""
         for connection in self._far.values():
             if connection.is_silent():
-                connection.end()
+                connection.close()
 
     def _remove_subscriber(self, subscriber: int) -> None:
         self.seen.pop(subscriber, None)
@@ -145,7 +145,7 @@ class Subscriptions:
         self._far.pop(subscriber, None)
         self._without_batches.discard(subscriber)
         if self.shared is not None:
-            self.shared.forget(subscriber)
+            self.shared.discard(subscriber)
 
     def _update_filters(self, subscription: bytes, *, is_wanted: bool) -> None:
         # XPUB_VERBOSE reports every subscribe, but only the last unsubscribe.

@@ -13,7 +13,7 @@ from weakref import WeakSet
 import zmq
 
 from nep.backends.base import (
-    HANDSHAKE_S,
+    HANDSHAKE_TIMEOUT_S,
     PublisherSpec,
     PublisherTransport,
     SubscriberSpec,
@@ -41,16 +41,16 @@ from nep.backends.zeromq.subscriber import NativeReadable, NativeSubscriber, Rea
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.graph_view import GraphView
-from nep.protocol.requests import Expected, NodeRecord, PublisherRecord, SubscriberRecord
+from nep.protocol.requests import ExpectedSubscriber, NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import SUBSCRIPTION_MAX_BYTES
-from nep.system.descriptors import check_room
-from nep.system.forks import give_up, watch
+from nep.system.descriptors import check_free_descriptors
+from nep.system.forks import close_in_child, watch
 from nep.system.wakeup import Waker
 
 DIRECT_WAIT_S = 0.3
 """Time in seconds to wait for a peer of a direct connection, which may not exist."""
-_LEAVE_S = 0.3
-_THREAD_FILES = 4
+_LEAVE_TIMEOUT_S = 0.3
+_FDS_PER_THREAD = 4
 _MAX_IDLE_SESSIONS = 8
 """Maximum number of sessions that are kept without registrations."""
 _Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber | PatternSubscriber
@@ -61,7 +61,7 @@ class OwnedPublisher(PublisherTransport, Pollable, Protocol):
 
     spec: PublisherSpec
 
-    def say_bye(self) -> None:
+    def send_bye(self) -> None:
         """Send the bye and stop accepting messages."""
 
     def finish(self, deadline: float) -> None:
@@ -71,13 +71,13 @@ class OwnedPublisher(PublisherTransport, Pollable, Protocol):
         """Release the socket. The I/O thread must have stopped serving it."""
 
 
-class MasteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
+class RegisteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
     """Publisher registered at a master."""
 
-    def expect(self, expected: Iterable[Expected]) -> None:
+    def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
         """Add registered subscribers that will connect."""
 
-    def wait_for(self, expected: Iterable[Expected], timeout_s: float) -> tuple[int, ...]:
+    def wait_for(self, expected: Iterable[ExpectedSubscriber], timeout_s: float) -> tuple[int, ...]:
         """Wait for the hellos of these subscribers; return the ids of those that are still missing."""
 
 
@@ -94,13 +94,13 @@ class ThreadWait:
     def wait(self, fds: list[int], timeout_s: float) -> None:
         """Wait until one of `fds` is readable or the waker is woken."""
         if fds != self._fds:
-            self._poll, self._fds = _poll_of((*fds, self.waker.fd)), fds
+            self._poll, self._fds = _poll_function((*fds, self.waker.fd)), fds
         for fd, _events in self._poll(int(timeout_s * 1000) + 1):
             if fd == self.waker.fd:
                 self.waker.clear()
 
 
-def _poll_of(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, int]]]:
+def _poll_function(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, int]]]:
     # Negative descriptors are ignored.
     fds = tuple(fd for fd in fds if fd >= 0)
     if not hasattr(select, "poll"):  # Windows
@@ -140,20 +140,20 @@ class ZeromqTransport:
 
     # ---- publishers
 
-    def publisher(self, spec: PublisherSpec) -> PublisherTransport:
+    def create_publisher(self, spec: PublisherSpec) -> PublisherTransport:
         """Create a publisher. See `Transport.publisher`."""
-        with self._opening():
+        with self._hold_context():
             if isinstance(spec.configuration, Direct):
-                return self._direct_publisher(spec, spec.configuration)
-            return self._native_publisher(spec, spec.configuration)
+                return self._create_direct_publisher(spec, spec.configuration)
+            return self._create_native_publisher(spec, spec.configuration)
 
-    def _native_publisher(self, spec: PublisherSpec, configuration: Hybrid) -> MasteredPublisher:
+    def _create_native_publisher(self, spec: PublisherSpec, configuration: Hybrid) -> RegisteredPublisher:
         session = self._session(configuration.master)
-        session.wait_for_name(spec.wait_s)
+        session.wait_for_address(spec.wait_s)
         closer = self._publisher_closer(lambda: session.remove_publisher(spec.id, publisher.count))
         # before bind, because socket options apply only to connections of later binds
-        publisher = self._mastered_publisher(spec, closer)
-        with closed_on_error(publisher.release):
+        publisher = self._new_publisher(spec, closer)
+        with close_on_error(publisher.release):
             endpoints = publisher.move(session.hosts)
             self._add_publisher(publisher)
         record = PublisherRecord(
@@ -170,7 +170,7 @@ class ZeromqTransport:
         try:
             reply = session.add_publisher(record, publisher, spec.wait_s)
             publisher.expect((*reply.expected, *reply.hung))
-            absent = publisher.wait_for(reply.expected, HANDSHAKE_S)
+            absent = publisher.wait_for(reply.expected, HANDSHAKE_TIMEOUT_S)
             if absent:
                 session.report_missing(spec.id, absent)
         except BaseException:  # also Ctrl+C: the caller has no object to close yet
@@ -178,21 +178,21 @@ class ZeromqTransport:
             raise
         return publisher
 
-    def _mastered_publisher(
+    def _new_publisher(
         self, spec: PublisherSpec, closer: Callable[[OwnedPublisher, float], None]
-    ) -> MasteredPublisher:
-        return NativePublisher(self._xpub(spec), spec, closer, self._io.serve_soon)
+    ) -> RegisteredPublisher:
+        return NativePublisher(self._new_xpub_socket(spec), spec, closer, self._io.serve_soon)
 
-    def _direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
+    def _create_direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:
         closer = self._publisher_closer(lambda: None)
         publisher: NativePublisher | OriginalPublisher
         if direct.wire == "native":
-            socket = self._xpub(spec)
+            socket = self._new_xpub_socket(spec)
             publisher = NativePublisher(socket, spec, closer, self._io.serve_soon)
         else:
             socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
             publisher = OriginalPublisher(socket, spec, direct, closer)
-        with closed_on_error(publisher.release):
+        with close_on_error(publisher.release):
             self._attached[spec.id] = attach(socket, direct, is_publisher=True)
             self._add_publisher(publisher)
         try:
@@ -202,7 +202,7 @@ class ZeromqTransport:
             raise
         return publisher
 
-    def _xpub(self, spec: PublisherSpec) -> Socket:
+    def _new_xpub_socket(self, spec: PublisherSpec) -> Socket:
         socket = self._shared.socket(zmq.XPUB, f"a publisher of '{spec.topic}'")
         socket.setsockopt(zmq.XPUB_VERBOSE, 1)  # a reconnecting subscriber repeats its hello
         socket.setsockopt(zmq.MAXMSGSIZE, SUBSCRIPTION_MAX_BYTES)  # applies to received messages
@@ -220,7 +220,7 @@ class ZeromqTransport:
                 self._publishers.pop(publisher.spec.id, None)
                 self._attached.pop(publisher.spec.id, None)
             unregister()
-            publisher.say_bye()
+            publisher.send_bye()
             publisher.finish(time.monotonic() + timeout_s)
             self._io.remove(publisher)
             publisher.release()
@@ -229,32 +229,32 @@ class ZeromqTransport:
 
     # ---- subscribers
 
-    def subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
+    def create_subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
         """Create a subscriber. See `Transport.subscriber`."""
-        with self._opening():
+        with self._hold_context():
             if isinstance(spec.configuration, Direct):
-                return self._direct_subscriber(spec, spec.configuration)
-            return self._native_subscriber(spec, spec.configuration)
+                return self._create_direct_subscriber(spec, spec.configuration)
+            return self._create_native_subscriber(spec, spec.configuration)
 
-    def _native_subscriber(
+    def _create_native_subscriber(
         self, spec: SubscriberSpec, configuration: Hybrid
     ) -> NativeSubscriber | PatternSubscriber:
         session = self._session(configuration.master)
-        session.wait_for_name(spec.wait_s)
+        session.wait_for_address(spec.wait_s)
 
-        def forget(subscriber: int) -> None:
-            self._forget_subscriber(subscriber)
+        def unregister(subscriber: int) -> None:
+            self._discard_subscriber(subscriber)
             session.remove_subscriber(subscriber)
 
         io = self._io_for(spec)
         subscriber: NativeSubscriber | PatternSubscriber
         if spec.is_pattern:
-            subscriber = PatternSubscriber(self._mastered_readable, io, spec, forget)
+            subscriber = PatternSubscriber(self._new_readable, io, spec, unregister)
             self._add_subscriber(subscriber)
         else:
-            readable = self._mastered_readable(spec)
-            subscriber = NativeSubscriber(readable, io, spec, forget)
-            with closed_on_error(readable.close):
+            readable = self._new_readable(spec)
+            subscriber = NativeSubscriber(readable, io, spec, unregister)
+            with close_on_error(readable.close):
                 self._add_subscriber(subscriber)
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type, spec.number, spec.is_pattern)
         try:
@@ -265,29 +265,31 @@ class ZeromqTransport:
                         address=session.address
                     )
                 )
-            subscriber.begin(reply.publishers)
+            subscriber.connect_listed(reply.publishers)
             if isinstance(subscriber, NativeSubscriber):
                 self._serve(io, subscriber)
             with self._waker() as waker:
-                subscriber.wait_for((each.publisher.id for each in reply.publishers), HANDSHAKE_S, waker)
+                subscriber.wait_for(
+                    (each.publisher.id for each in reply.publishers), HANDSHAKE_TIMEOUT_S, waker
+                )
         except BaseException:
             subscriber.close()
             raise
         return subscriber
 
-    def _mastered_readable(self, spec: SubscriberSpec) -> NativeReadable:
+    def _new_readable(self, spec: SubscriberSpec) -> NativeReadable:
         kind = CheckedSubSocket if spec.msg_type in CHECKED_TYPES else SubSocket
-        return kind(self._sub(spec), spec)
+        return kind(self._new_sub_socket(spec), spec)
 
-    def _direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
+    def _create_direct_subscriber(self, spec: SubscriberSpec, direct: Direct) -> SubscriberTransport:
         io = self._io_for(spec)
-        socket = self._sub(spec)
+        socket = self._new_sub_socket(spec)
         subscriber: _Subscriber
         if direct.wire == "native":
-            subscriber = NativeSubscriber(SubSocket(socket, spec), io, spec, self._forget_subscriber)
+            subscriber = NativeSubscriber(SubSocket(socket, spec), io, spec, self._discard_subscriber)
         else:
-            subscriber = SocketSubscriber(OriginalSubSocket(socket, spec), io, spec, self._forget_subscriber)
-        with closed_on_error(socket.close):
+            subscriber = SocketSubscriber(OriginalSubSocket(socket, spec), io, spec, self._discard_subscriber)
+        with close_on_error(socket.close):
             self._attached[spec.id] = attach(socket, direct, is_publisher=False)
             self._add_subscriber(subscriber)
         try:
@@ -306,7 +308,7 @@ class ZeromqTransport:
         with self._lock:
             self._check_open_locked()
             if self._sinks is None:
-                check_room(_THREAD_FILES, f"a subscriber of '{spec.topic}'")
+                check_free_descriptors(_FDS_PER_THREAD, f"a subscriber of '{spec.topic}'")
                 self._sinks = IoThread(f"nep-sinks-{self._node.name}")
                 self._sinks.start()
             return self._sinks
@@ -324,48 +326,48 @@ class ZeromqTransport:
             io.add(subscriber)  # before `close` can remove the subscriber, which acquires this lock first
 
     @contextmanager
-    def _opening(self) -> Iterator[None]:
+    def _hold_context(self) -> Iterator[None]:
         # Keeps the context while sockets are opened, also if `close` ends the last node meanwhile. Raises
         # `ClosedError`.
         with self._lock:
             self._check_open_locked()
-            self._shared.join()
+            self._shared.acquire()
         try:
             yield
         finally:
-            self._shared.leave()
+            self._shared.release()
 
     def _check_open_locked(self) -> None:
         if self._is_closed:
             raise ClosedError(f"node '{self._node.name}'")
 
-    def _sub(self, spec: SubscriberSpec) -> Socket:
+    def _new_sub_socket(self, spec: SubscriberSpec) -> Socket:
         socket = self._shared.socket(zmq.SUB, f"a subscriber of '{spec.topic}'")
         socket.setsockopt(zmq.RECONNECT_IVL, 50)
         socket.setsockopt(zmq.RECONNECT_IVL_MAX, 1000)
         return socket
 
-    def _forget_subscriber(self, subscriber: int) -> None:
+    def _discard_subscriber(self, subscriber: int) -> None:
         with self._lock:
             self._subscribers.pop(subscriber, None)
             self._attached.pop(subscriber, None)
 
     # ---- services
 
-    def server(self, spec: ServerSpec) -> ServerTransport:
+    def create_server(self, spec: ServerSpec) -> ServerTransport:
         """Create a server. See `ServiceTransport.server`."""
-        with self._opening():
-            return self._services.server(spec)
+        with self._hold_context():
+            return self._services.create_server(spec)
 
-    def client(self, spec: ClientSpec) -> ClientTransport:
+    def create_client(self, spec: ClientSpec) -> ClientTransport:
         """Create a client. See `ServiceTransport.client`."""
-        with self._opening():
-            return self._services.client(spec)
+        with self._hold_context():
+            return self._services.create_client(spec)
 
-    def survey(self, spec: ClientSpec) -> SurveyTransport:
+    def create_surveyor(self, spec: ClientSpec) -> SurveyTransport:
         """Create a surveyor. See `ServiceTransport.survey`."""
-        with self._opening():
-            return self._services.survey(spec)
+        with self._hold_context():
+            return self._services.create_surveyor(spec)
 
     # ---- waiting
 
@@ -429,7 +431,7 @@ class ZeromqTransport:
 
     @contextmanager
     def _waker(self) -> Iterator[Waker]:
-        waker = self._shared.take_waker()
+        waker = self._shared.acquire_waker()
         with self._lock:
             self._busy_wakers.append(waker)
         try:
@@ -437,7 +439,7 @@ class ZeromqTransport:
         finally:
             with self._lock:
                 self._busy_wakers.remove(waker)
-            self._shared.give_waker(waker)
+            self._shared.release_waker(waker)
 
     # ---- master and closing
 
@@ -447,7 +449,7 @@ class ZeromqTransport:
             raise NepError(
                 _("a direct connection has no master, so there is no graph; use a node with a master")
             )
-        with self._opening():
+        with self._hold_context():
             return self._session(configuration.master).query_graph(timeout_s)
 
     def begin_close(self) -> None:
@@ -462,7 +464,7 @@ class ZeromqTransport:
             session.begin_leave()
         self._services.begin_close()
         for publisher in publishers:
-            publisher.say_bye()
+            publisher.send_bye()
 
     def close(self, timeout_s: float) -> None:
         """Close all sockets, sessions and threads. See `Transport.close`."""
@@ -483,7 +485,7 @@ class ZeromqTransport:
                 self._io.remove(publisher)
                 publisher.flush(deadline)
         for session in sessions:
-            session.leave(min(_LEAVE_S, timeout_s))
+            session.leave(min(_LEAVE_TIMEOUT_S, timeout_s))
         for subscriber in subscribers:
             subscriber.close()
         self._services.close(max(0.0, deadline - time.monotonic()))
@@ -494,8 +496,8 @@ class ZeromqTransport:
         for session in sessions:
             session.close()
         if sinks is not None:
-            sinks.close(max(_LEAVE_S, deadline - time.monotonic()))
-        self._shared.leave()
+            sinks.close(max(_LEAVE_TIMEOUT_S, deadline - time.monotonic()))
+        self._shared.release()
 
     def _close_idle_sessions_locked(self) -> None:
         # Closes idle sessions when there are many.
@@ -509,13 +511,13 @@ class ZeromqTransport:
 
     def forked(self) -> None:
         """Close the descriptors of the parent's sockets in a forked child process. See `nep.system.forks`."""
-        give_up(*self._attached.values())
+        close_in_child(*self._attached.values())
         self._services.forked()
         for session in self._sessions.values():
-            give_up(session.endpoint)
+            close_in_child(session.endpoint)
         for each in (*self._publishers.values(), *self._subscribers.values()):
             if isinstance(each, NativePublisher | NativeSubscriber | PatternSubscriber):
-                give_up(*each.endpoints)
+                close_in_child(*each.endpoints)
 
     def _session(self, address: str) -> MasterSession:
         with self._lock:
@@ -524,7 +526,7 @@ class ZeromqTransport:
             if session is None:
                 self._close_idle_sessions_locked()
                 socket = self._shared.socket(zmq.DEALER, f"a connection to the master at '{address}'")
-                with closed_on_error(socket.close):
+                with close_on_error(socket.close):
                     session = MasterSession(socket, self._io, self._node, address)
                 self._sessions[address] = session
                 self._io.add(session)
@@ -532,7 +534,7 @@ class ZeromqTransport:
 
 
 @contextmanager
-def closed_on_error(close: Callable[[], object]) -> Iterator[None]:
+def close_on_error(close: Callable[[], object]) -> Iterator[None]:
     """Call `close` if the body raises: a socket left open would block the end of the program."""
     try:
         yield

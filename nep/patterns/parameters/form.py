@@ -33,7 +33,7 @@ class ParameterForm:
         self.plain_kind = kinds.pop() if kinds else "dict"
         """Type name of the plain values, as in `NodeParameter.kind`."""
 
-    def plain(self, value: object) -> object:
+    def to_plain(self, value: object) -> object:
         """Return the plain value of an instance, or a validated copy of a plain value.
 
         Raises `ValueError` with the field path if the value doesn't match the class.
@@ -43,7 +43,7 @@ class ParameterForm:
                 value = self._shape.write(value)
             plain = self._shape.write(self._shape.read(value))
         except shapes.ShapeMismatch as mismatch:
-            raise ValueError(mismatch.sentence) from mismatch
+            raise ValueError(mismatch.message) from mismatch
         except RecursionError:
             raise ValueError(_("it has too many levels")) from None
         where = find_nan(plain)

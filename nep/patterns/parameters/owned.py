@@ -9,7 +9,7 @@ from typing import Protocol
 
 from nep.errors import ClosedError, ParameterError, did_you_mean
 from nep.i18n import _
-from nep.patterns.parameters.parameter import NodeParameter, declared, short_repr
+from nep.patterns.parameters.parameter import NodeParameter, new_parameter, short_repr
 from nep.text import bounded_str, escaped
 
 MSG_TYPE = "nep/patterns/parameters"
@@ -37,7 +37,7 @@ class ParameterHost(Protocol):
         """Serve `answer` as the service `place` if the back end has services, and open the topic `place`."""
 
 
-def place_of(node_id: str) -> str:
+def parameters_topic(node_id: str) -> str:
     """Return the name shared by the service and the topic of a node's parameters."""
     return f"/nep/parameters/{node_id}"
 
@@ -92,7 +92,7 @@ class Parameters:
             NepError: The topic of the parameters can't be opened, as in `Node.new_pub` (first parameter
                 only).
         """
-        parameter = declared(
+        parameter = new_parameter(
             name,
             default,
             kind=type,
@@ -112,7 +112,9 @@ class Parameters:
                     _("a node can have at most {most} parameters").format(most=_MAX_PARAMETERS),
                 )
             if self._topic is None:
-                self._topic = self._host.open_parameters(place_of(self._host.id), self._handle_request)
+                self._topic = self._host.open_parameters(
+                    parameters_topic(self._host.id), self._handle_request
+                )
             self._known = {**self._known, name: parameter}
             self._publish()
         return parameter.typed_value

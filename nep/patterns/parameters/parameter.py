@@ -10,7 +10,7 @@ from typing import cast
 import orjson
 
 from nep.errors import ParameterError
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 from nep.patterns.parameters.form import ParameterForm, form_of
 from nep.protocol.wire import check_topic
 from nep.text import escaped, shortened
@@ -68,32 +68,32 @@ class NodeParameter:
         return replace(self, value=self._validate(value))
 
     def _validate(self, value: object) -> object:
-        found = self._convert(value if self.form is None else self._plain(self.form, value))
+        found = self._convert(value if self.form is None else self._form_to_plain(self.form, value))
         if isinstance(found, int | float) and not isinstance(found, bool):
             if self.minimum is not None and found < self.minimum:
                 raise self._error(value, _("the minimum is {least}").format(least=self.minimum))
             if self.maximum is not None and found > self.maximum:
                 raise self._error(value, _("the maximum is {most}").format(most=self.maximum))
         if self.choices and found not in self.choices:
-            names = listed([short_repr(each) for each in self.choices], "or")
+            names = format_list([short_repr(each) for each in self.choices], "or")
             raise self._error(value, _("use {choices}").format(choices=names))
         return found
 
-    def _plain(self, form: ParameterForm, value: object) -> object:
+    def _form_to_plain(self, form: ParameterForm, value: object) -> object:
         try:
-            return form.plain(value)
+            return form.to_plain(value)
         except ValueError as error:
             raise self._error(value, str(error)) from error
 
     def _convert(self, value: object) -> object:
         # ints are accepted as floats, and 2.0 as an int
         if isinstance(value, int | float) and not isinstance(value, bool) and self.kind in {"int", "float"}:
-            return self._number(value)
+            return self._convert_number(value)
         if type(value) is not KINDS[self.kind]:
             raise self._error(value, _("it must be of type '{kind}'").format(kind=self.kind))
         return self._json_copy(value)
 
-    def _number(self, value: float) -> float:
+    def _convert_number(self, value: float) -> float:
         if not _is_finite(value):
             raise self._error(value, _("it must be a finite number"))
         if self.kind == "float":
@@ -135,7 +135,7 @@ class NodeParameter:
         }
 
 
-def declared(
+def new_parameter(
     name: str,
     default: object,
     *,
@@ -158,7 +158,7 @@ def declared(
         raise ParameterError(
             check_topic(name),
             short_repr(default),
-            _("its type must be {kinds}").format(kinds=listed([f"'{each}'" for each in KINDS], "or")),
+            _("its type must be {kinds}").format(kinds=format_list([f"'{each}'" for each in KINDS], "or")),
         )
     for each in (minimum, maximum):
         if each is not None and (word not in {"int", "float"} or not _is_finite(each)):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nep.errors import NepError, RequestRefusedError, did_you_mean
 from nep.i18n import _
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from nep.patterns.services.client import Client
 from nep.protocol.graph_view import GraphView
 from nep.text import bounded_str, escaped
@@ -84,7 +84,9 @@ def node_with_parameters(graph: GraphView, name: str) -> str:
 
     Raises `NepError` if no node or more than one node matches.
     """
-    able = {each.id: each.name for each in graph.nodes.values() if place_of(each.id) in graph.services}
+    able = {
+        each.id: each.name for each in graph.nodes.values() if parameters_topic(each.id) in graph.services
+    }
     found = [id_ for id_, known in able.items() if name in {id_, known}]
     if len(found) == 1:
         return found[0]

@@ -20,23 +20,23 @@ from nep.errors import (
     ServiceError,
 )
 from nep.i18n import _
-from nep.messages.codecs import Codec, codec_numbered
+from nep.messages.codecs import Codec, codec_by_number
 from nep.patterns.services.typed import UNTYPED, CallTypes
-from nep.protocol.service_wire import CallKind, read_failure
-from nep.system.arguments import seconds
+from nep.protocol.service_wire import CallKind, read_error_reply
+from nep.system.arguments import check_optional_time_limit
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-Limit = float | Literal["default"] | None
+TimeLimit = float | Literal["default"] | None
 """Time limit of a call in seconds; None for no limit, "default" for the client's time limit."""
 
-SLICE_S = 0.1
+WAIT_SLICE_S = 0.1
 """Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
-_SERVICE_QUERY_S = 0.5
+_SERVICE_QUERY_TIMEOUT_S = 0.5
 """Time limit for querying the existing services after a service was not found."""
-_JOIN_S = 2.0
+_JOIN_TIMEOUT_S = 2.0
 
 
 class Client:
@@ -89,7 +89,7 @@ class Client:
 
     # ---- calling
 
-    def call(self, request: object, timeout_s: Limit = "default") -> object:
+    def call(self, request: object, timeout_s: TimeLimit = "default") -> object:
         """Call the service and return its reply.
 
         Args:
@@ -112,19 +112,19 @@ class Client:
         try:
             while True:
                 with contextlib.suppress(queue.Empty):
-                    outcome = outcomes.get(timeout=SLICE_S)
+                    outcome = outcomes.get(timeout=WAIT_SLICE_S)
                     break
                 if self._is_forked:
                     raise self._closed_error()
         except BaseException:  # also KeyboardInterrupt
-            self._transport.forget(call)
+            self._transport.cancel(call)
             raise
         try:
             return self._result(outcome)
         except NoServerError as error:
-            raise self._with_known(error) from None
+            raise self._with_known_services(error) from None
 
-    def call_async(self, request: object, timeout_s: Limit = "default") -> Future[object]:
+    def call_async(self, request: object, timeout_s: TimeLimit = "default") -> Future[object]:
         """Call the service and return a future of the reply.
 
         The future can be cancelled. Its callbacks run in a thread of the client. Raises `EncodeError` or
@@ -141,28 +141,28 @@ class Client:
             self._resolve_timeout(timeout_s),
             lambda outcome: ends.add(lambda: self._settle(future, outcome)),
         )
-        future.add_done_callback(lambda ended: self._transport.forget(call) if ended.cancelled() else None)
+        future.add_done_callback(lambda ended: self._transport.cancel(call) if ended.cancelled() else None)
         return future
 
-    async def acall(self, request: object, timeout_s: Limit = "default") -> object:
+    async def acall(self, request: object, timeout_s: TimeLimit = "default") -> object:
         """Call the service from a coroutine. Arguments and errors are those of `call`."""
         loop = asyncio.get_running_loop()
         future: asyncio.Future[Outcome] = loop.create_future()
 
-        def then(outcome: Outcome) -> None:
+        def on_outcome(outcome: Outcome) -> None:
             with contextlib.suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(_set_result, future, outcome)
 
-        call = self._start_call(request, self._resolve_timeout(timeout_s), then)
+        call = self._start_call(request, self._resolve_timeout(timeout_s), on_outcome)
         try:
             outcome = await future
         except BaseException:  # cancelled
-            self._transport.forget(call)
+            self._transport.cancel(call)
             raise
         try:
             return self._result(outcome)
         except NoServerError as error:
-            raise await loop.run_in_executor(None, self._with_known, error) from None
+            raise await loop.run_in_executor(None, self._with_known_services, error) from None
 
     # ---- API of the original NEP
 
@@ -182,7 +182,7 @@ class Client:
             raise NepError(_("no request was sent; call 'send_info' first"))
         done = threading.Event()
         sent.add_done_callback(lambda _ended: done.set())
-        while not done.wait(SLICE_S):
+        while not done.wait(WAIT_SLICE_S):
             if self._is_forked:
                 raise self._closed_error()
         return sent.result()
@@ -194,21 +194,21 @@ class Client:
     ) -> OpenCall:
         if self._transport.is_closed:
             raise self._closed_error()
-        return self._transport.begin(self._codec.encode(request).data, timeout_s, then)
+        return self._transport.start_call(self._codec.encode(request).data, timeout_s, then)
 
-    def _resolve_timeout(self, timeout_s: Limit) -> float | None:
-        return self.timeout_s if timeout_s == "default" else seconds("timeout_s", timeout_s)
+    def _resolve_timeout(self, timeout_s: TimeLimit) -> float | None:
+        return self.timeout_s if timeout_s == "default" else check_optional_time_limit("timeout_s", timeout_s)
 
     def _result(self, outcome: Outcome) -> object:
         if isinstance(outcome, NepError):
             raise outcome
         if outcome.kind == CallKind.ANSWER:
-            codec = codec_numbered(outcome.codec)
+            codec = codec_by_number(outcome.codec)
             if codec is None:
                 reason = _("this version does not know the codec of the reply; update nep")
                 raise DecodeError(str(outcome.codec), len(outcome.data), reason)
-            return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
-        name, reason = read_failure(outcome.data)
+            return self._types.reply.read(codec.decode(outcome.data, {}), len(outcome.data))
+        name, reason = read_error_reply(outcome.data)
         if outcome.kind == CallKind.ERROR:
             raise ServiceError(self.service, name, reason)
         raise RequestRefusedError(
@@ -217,11 +217,13 @@ class Client:
             )
         )
 
-    def _with_known(self, error: NoServerError) -> NoServerError:
+    def _with_known_services(self, error: NoServerError) -> NoServerError:
         # Adds the existing services to the error.
         if error.address:
             return error
-        return NoServerError(error.service, error.timeout_s, self._transport.service_names(_SERVICE_QUERY_S))
+        return NoServerError(
+            error.service, error.timeout_s, self._transport.service_names(_SERVICE_QUERY_TIMEOUT_S)
+        )
 
     def _settle(self, future: Future[object], outcome: Outcome) -> None:
         if not future.set_running_or_notify_cancel():
@@ -288,7 +290,7 @@ class _FutureThread:
     def close(self) -> None:
         self._jobs.put(None)
         if self._thread is not threading.current_thread():
-            self._thread.join(_JOIN_S)
+            self._thread.join(_JOIN_TIMEOUT_S)
 
 
 def _set_result(future: asyncio.Future[Outcome], outcome: Outcome) -> None:

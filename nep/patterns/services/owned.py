@@ -12,13 +12,18 @@ from nep.backends.connection import Configuration
 from nep.backends.services import CallQueue, ClientSpec, ServerSpec, ServiceTransport
 from nep.errors import ClosedError, NepError
 from nep.i18n import _
-from nep.messages.codecs import Codec, codec_numbered
+from nep.messages.codecs import Codec, codec_by_number
 from nep.patterns.services.client import Client
 from nep.patterns.services.server import Callback, Server
 from nep.patterns.services.survey import Respondent, Surveyor
 from nep.patterns.services.typed import CallTypes
 from nep.protocol.service_wire import check_service, check_survey
-from nep.system.arguments import at_least, plain_function, seconds, text
+from nep.system.arguments import (
+    check_at_least,
+    check_optional_time_limit,
+    check_plain_function,
+    check_type_name,
+)
 
 S = TypeVar("S", bound=Server)
 
@@ -60,7 +65,7 @@ class ServiceRegistry:
         A plain attribute, because a spinning node reads it for every message.
         """
 
-    def server(
+    def new_server(
         self,
         service: str,
         callback: Callback | None,
@@ -70,12 +75,12 @@ class ServiceRegistry:
         types: CallTypes,
     ) -> Server:
         """Create a server. See `Node.new_server`. Raises `NepError` if the back end has no services."""
-        text("msg_type", msg_type)
-        return self._serve(
+        check_type_name("msg_type", msg_type)
+        return self._create_server(
             Server, check_service(service), callback, configuration, threads, types, msg_type=msg_type
         )
 
-    def respondent(
+    def new_respondent(
         self,
         survey: str,
         callback: Callback | None,
@@ -85,9 +90,9 @@ class ServiceRegistry:
     ) -> Respondent:
         """Create a respondent. See `Node.new_respondent`."""
         self._survey_transport()
-        return self._serve(Respondent, check_survey(survey), callback, configuration, threads, types)
+        return self._create_server(Respondent, check_survey(survey), callback, configuration, threads, types)
 
-    def _serve(
+    def _create_server(
         self,
         kind: type[S],
         service: str,
@@ -99,14 +104,14 @@ class ServiceRegistry:
         msg_type: str = "json",
     ) -> S:
         if callback is not None:
-            plain_function("callback", callback)
-        at_least("threads", threads, 0)
+            check_plain_function("callback", callback)
+        check_at_least("threads", threads, 0)
         if threads and callback is None:
             raise ValueError(_("'threads' requires a callback"))
         transport = self._service_transport()
         id_, number = self._new_id()
         spec = ServerSpec(id_, service, configuration, self._wait_s, number, msg_type)
-        server = kind(transport.server(spec), service, callback, threads, self._remove, types)
+        server = kind(transport.create_server(spec), service, callback, threads, self._remove, types)
         with self._lock:
             self._servers = (*self._servers, server)
             self.has_servers = True
@@ -114,7 +119,7 @@ class ServiceRegistry:
         self._wake()  # a spinning thread serves its calls from now on
         return server
 
-    def client(
+    def new_client(
         self,
         service: str,
         configuration: Configuration,
@@ -124,16 +129,16 @@ class ServiceRegistry:
     ) -> Client:
         """Create a client. See `Node.new_client`."""
         spec = self._client_spec(check_service(service), configuration, msg_type)
-        limit_s = seconds("timeout_s", timeout_s)
+        limit_s = check_optional_time_limit("timeout_s", timeout_s)
         client = Client(
-            self._service_transport().client(spec), service, spec.codec, limit_s, self._remove, types
+            self._service_transport().create_client(spec), service, spec.codec, limit_s, self._remove, types
         )
         with self._lock:
             self._clients = (*self._clients, client)
         self._close_if_late(client)
         return client
 
-    def surveyor(
+    def new_surveyor(
         self,
         survey: str,
         configuration: Configuration,
@@ -143,9 +148,11 @@ class ServiceRegistry:
     ) -> Surveyor:
         """Create a surveyor. See `Node.new_surveyor`."""
         spec = self._client_spec(check_survey(survey), configuration, msg_type)
-        limit_s = seconds("timeout", timeout_s)
+        limit_s = check_optional_time_limit("timeout", timeout_s)
         transport = self._survey_transport()
-        surveyor = Surveyor(transport.survey(spec), spec.service, spec.codec, limit_s, self._remove, types)
+        surveyor = Surveyor(
+            transport.create_surveyor(spec), spec.service, spec.codec, limit_s, self._remove, types
+        )
         with self._lock:
             self._clients = (*self._clients, surveyor)
         self._close_if_late(surveyor)
@@ -160,12 +167,12 @@ class ServiceRegistry:
 
     def _client_spec(self, service: str, configuration: Configuration, msg_type: str) -> ClientSpec:
         codec_of = self._backend.codec_of_calls or self._backend.codec_for
-        codec = codec_checked(codec_of(text("msg_type", msg_type)))
+        codec = check_call_codec(codec_of(check_type_name("msg_type", msg_type)))
         id_, number = self._new_id()
         return ClientSpec(id_, service, codec, configuration, self._wait_s, number, msg_type)
 
     def _service_transport(self) -> ServiceTransport:
-        if not hasattr(self._transport, "server"):
+        if not hasattr(self._transport, "create_server"):
             raise NepError(
                 _("the back end '{backend}' does not support services; use 'zeromq'").format(
                     backend=self._backend.name
@@ -175,7 +182,7 @@ class ServiceRegistry:
 
     def _survey_transport(self) -> ServiceTransport:
         transport = self._service_transport()
-        if not hasattr(transport, "survey"):
+        if not hasattr(transport, "create_surveyor"):
             raise NepError(
                 _("the back end '{backend}' does not support surveys; use 'zeromq'").format(
                     backend=self._backend.name
@@ -219,7 +226,7 @@ class ServiceRegistry:
         for server in self._servers:
             server.join(max(0.0, deadline - time.monotonic()))
 
-    def end(self, timeout_s: float) -> None:
+    def stop_threads(self, timeout_s: float) -> None:
         """Stop all threads of servers and clients. Call after the transport closed its sockets."""
         deadline = time.monotonic() + timeout_s
         with self._lock:
@@ -242,10 +249,10 @@ class ServiceRegistry:
         self._servers = self._clients = ()
 
 
-def codec_checked(codec: Codec) -> Codec:
+def check_call_codec(codec: Codec) -> Codec:
     """Return the codec if calls can use it; raise `NepError` otherwise."""
     if codec.name == "image":
         raise NepError(_("a call can't contain an image; publish it on a topic"))
-    if codec_numbered(codec.number) is not codec:  # a back end's codec without a number
+    if codec_by_number(codec.number) is not codec:  # a back end's codec without a number
         raise NepError(_("'{name}' can't be used for calls; use 'json' or 'msgpack'").format(name=codec.name))
     return codec

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from nep.backends.services import CallQueue, IncomingCall, ServerTransport
 from nep.errors import ClosedError, DecodeError, EncodeError, NepError
 from nep.i18n import _
-from nep.messages.codecs import codec_numbered
+from nep.messages.codecs import codec_by_number
 from nep.patterns.services.typed import UNTYPED, CallTypes
-from nep.protocol.service_wire import CallKind, Reply, failure
-from nep.system.arguments import limit, seconds
+from nep.protocol.service_wire import CallKind, Reply, error_reply
+from nep.system.arguments import check_optional_time_limit, check_time_limit
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _logger = logging.getLogger("nep.patterns.services")
 
-SLICE_S = 0.1
+WAIT_SLICE_S = 0.1
 """Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
 _CLOSE_TIMEOUT_S = 2.0
 
@@ -121,7 +121,7 @@ class Server:
 
     def _run_thread(self) -> None:
         while not self._transport.calls.is_closed:
-            call = self._transport.calls.pop(SLICE_S)
+            call = self._transport.calls.pop(WAIT_SLICE_S)
             if call is None:
                 continue
             try:
@@ -134,12 +134,12 @@ class Server:
 
     def _execute(self, call: IncomingCall) -> None:
         if call.is_late:
-            call.answer(failure(CallKind.REFUSED, "", _("the client no longer waits for the reply")))
+            call.reply(error_reply(CallKind.REFUSED, "", _("the client no longer waits for the reply")))
             return
         try:
             request = self._decode_request(call)
         except DecodeError as error:
-            call.answer(failure(CallKind.REFUSED, "", str(error)))
+            call.reply(error_reply(CallKind.REFUSED, "", str(error)))
             return
         try:
             answer = self._callback(request) if self._callback is not None else None
@@ -150,16 +150,16 @@ class Server:
         except Exception as error:  # noqa: BLE001 - sent to the client
             reply = self._log_failure(error)
         except BaseException as error:  # KeyboardInterrupt: reply, then let it propagate out of `spin`
-            call.answer(_error_reply(error))
+            call.reply(_error_reply(error))
             raise
-        call.answer(reply)
+        call.reply(reply)
 
     def _reply_when_done(self, call: IncomingCall, done: Future[object]) -> None:
         try:
             reply = self._encode_reply(done.result(), call.codec)
         except BaseException as error:  # noqa: BLE001 - includes CancelledError
             reply = self._log_failure(error)
-        call.answer(reply)
+        call.reply(reply)
 
     def _log_failure(self, error: BaseException) -> Reply:
         # Logged at increasing intervals.
@@ -171,18 +171,18 @@ class Server:
         return _error_reply(error)
 
     def _decode_request(self, call: IncomingCall) -> object:
-        codec = codec_numbered(call.codec)
+        codec = codec_by_number(call.codec)
         if codec is None:
             reason = _("this version does not know the codec of the reply; update nep")
             raise DecodeError(str(call.codec), len(call.data), reason)
         return self._types.request.read(codec.decode(call.data, {}), len(call.data))
 
     def _encode_reply(self, answer: object, number: int) -> Reply:
-        codec = codec_numbered(number)
+        codec = codec_by_number(number)
         if codec is None:
             reason = _("this version does not know the codec of the reply; update nep")
             raise EncodeError(str(number), type(answer).__name__, reason)
-        answer_type = self._types.answer
+        answer_type = self._types.reply
         value = {} if answer is None and answer_type.is_any else answer
         return Reply(CallKind.ANSWER, answer_type.codec(codec).encode(value).data, number)
 
@@ -198,7 +198,7 @@ class Server:
             ClosedError: The server is closed.
             NepError: The server has a callback, or the last request is not answered yet.
         """
-        seconds("timeout_s", timeout_s)
+        check_optional_time_limit("timeout_s", timeout_s)
         if self._callback is not None:
             raise NepError(
                 _(
@@ -210,7 +210,7 @@ class Server:
             raise NepError(_("the previous request has no reply yet; call 'send_info' first"))
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while not self._transport.calls.is_closed:
-            left = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+            left = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
             call = self._transport.calls.pop(max(0.0, left))
             if call is None:
                 if left <= 0.0:
@@ -219,7 +219,7 @@ class Server:
             try:
                 request = self._decode_request(call)
             except DecodeError as error:
-                call.answer(failure(CallKind.REFUSED, "", str(error)))
+                call.reply(error_reply(CallKind.REFUSED, "", str(error)))
                 continue
             with self._open_request_lock:
                 self._open_request = call
@@ -242,7 +242,7 @@ class Server:
                 raise NepError(_("no request to reply to; call 'listen_info' first"))
             reply = self._encode_reply(answer, call.codec)
             self._open_request = None
-        call.answer(reply)
+        call.reply(reply)
 
     # ---- closing
 
@@ -252,7 +252,7 @@ class Server:
         Args:
             timeout_s: Time limit in seconds for callbacks running in the server's own threads.
         """
-        limit("timeout_s", timeout_s)
+        check_time_limit("timeout_s", timeout_s)
         if self._is_forked:
             return
         deadline = time.monotonic() + timeout_s
@@ -298,4 +298,4 @@ def _error_reply(error: BaseException) -> Reply:
         reason = str(error)
     except Exception:  # noqa: BLE001 - `str` of an exception may raise, and the client must still get a reply
         reason = ""
-    return failure(CallKind.ERROR, type(error).__name__, reason)
+    return error_reply(CallKind.ERROR, type(error).__name__, reason)

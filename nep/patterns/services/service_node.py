@@ -11,7 +11,7 @@ from nep.patterns.services.owned import ServiceRegistry
 from nep.patterns.services.server import Callback, Server
 from nep.patterns.services.survey import Respondent, Surveyor
 from nep.patterns.services.typed import call_types
-from nep.system.arguments import seconds
+from nep.system.arguments import check_optional_time_limit
 
 
 class ServiceNode(ABC):
@@ -63,7 +63,7 @@ class ServiceNode(ABC):
         self._open_transport()
         types = call_types(request=request, answer=answer)
         configured = self._resolve_configuration(configuration)
-        return self._services.server(service, callback, configured, threads, msg_type, types)
+        return self._services.new_server(service, callback, configured, threads, msg_type, types)
 
     def new_client(
         self,
@@ -95,7 +95,7 @@ class ServiceNode(ABC):
         """
         self._open_transport()
         types = call_types(request=request, answer=answer)
-        return self._services.client(
+        return self._services.new_client(
             service, self._resolve_configuration(configuration), msg_type, timeout_s, types
         )
 
@@ -126,7 +126,7 @@ class ServiceNode(ABC):
         """
         self._open_transport()
         types = call_types(question=question, answer=answer)
-        return self._services.respondent(
+        return self._services.new_respondent(
             survey, callback, self._resolve_configuration(configuration), threads, types
         )
 
@@ -160,8 +160,8 @@ class ServiceNode(ABC):
         """
         self._open_transport()
         types = call_types(question=question, answer=answer)
-        timeout_s = seconds("timeout", timeout)
+        timeout_s = check_optional_time_limit("timeout", timeout)
         timeout_s = None if timeout_s is None else timeout_s / 1000
-        return self._services.surveyor(
+        return self._services.new_surveyor(
             survey, self._resolve_configuration(configuration), msg_type, timeout_s, types
         )

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 from nep.backends.services import OpenCall, Outcome, SurveyTransport
 from nep.errors import ClosedError, NepError, WaitTimeoutError
 from nep.i18n import _
-from nep.messages.codecs import Codec, codec_numbered
-from nep.patterns.services.client import SLICE_S, Limit
+from nep.messages.codecs import Codec, codec_by_number
+from nep.patterns.services.client import WAIT_SLICE_S, TimeLimit
 from nep.patterns.services.server import Server
 from nep.patterns.services.typed import UNTYPED, CallTypes
-from nep.protocol.service_wire import SURVEY, CallKind, read_failure
-from nep.system.arguments import at_least, seconds
+from nep.protocol.service_wire import SURVEY_PREFIX, CallKind, read_error_reply
+from nep.system.arguments import check_at_least, check_optional_time_limit
 from nep.system.log_rarely import is_logged
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Surveyor:
     ) -> None:
         self._transport = transport
         self._types = types
-        self.survey = survey.removeprefix(SURVEY)
+        self.survey = survey.removeprefix(SURVEY_PREFIX)
         self.timeout_s = timeout_s
         self._codec = types.request.codec(codec)
         self._on_close = on_close
@@ -77,7 +77,7 @@ class Surveyor:
         return self._transport.is_closed
 
     def ask(
-        self, question: object, timeout_s: Limit = "default", *, expect: int | None = None
+        self, question: object, timeout_s: TimeLimit = "default", *, expect: int | None = None
     ) -> list[object]:
         """Send a question and return the answers in the order of their arrival.
 
@@ -94,20 +94,22 @@ class Surveyor:
         return list(self.answers(question, timeout_s, expect=expect))
 
     def answers(
-        self, question: object, timeout_s: Limit = "default", *, expect: int | None = None
+        self, question: object, timeout_s: TimeLimit = "default", *, expect: int | None = None
     ) -> Iterator[object]:
         """Send a question and iterate over the answers as they arrive. See `ask`.
 
         The question is sent before this method returns.
         """
-        limit_s = self.timeout_s if timeout_s == "default" else seconds("timeout_s", timeout_s)
+        limit_s = (
+            self.timeout_s if timeout_s == "default" else check_optional_time_limit("timeout_s", timeout_s)
+        )
         if expect is not None:
-            at_least("expect", expect, 1)
+            check_at_least("expect", expect, 1)
         if self._transport.is_closed:
             raise self._closed_error()
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         deadline = None if limit_s is None else time.monotonic() + limit_s
-        calls = self._transport.begin_all(self._codec.encode(question).data, limit_s, outcomes.put)
+        calls = self._transport.start_survey(self._codec.encode(question).data, limit_s, outcomes.put)
         return self._collect(calls, outcomes, deadline, expect)
 
     def _collect(
@@ -120,7 +122,7 @@ class Surveyor:
         pending, remaining = len(calls), len(calls) if expect is None else expect
         try:
             while pending and remaining:
-                wait_s = SLICE_S if deadline is None else min(SLICE_S, deadline - time.monotonic())
+                wait_s = WAIT_SLICE_S if deadline is None else min(WAIT_SLICE_S, deadline - time.monotonic())
                 outcome = None
                 with contextlib.suppress(queue.Empty):
                     outcome = outcomes.get(timeout=wait_s) if wait_s > 0.0 else outcomes.get_nowait()
@@ -138,7 +140,7 @@ class Surveyor:
                     remaining -= 1
                     yield answer
         finally:
-            self._transport.forget_all(calls)
+            self._transport.cancel_all(calls)
 
     def _decode_answer(self, outcome: Outcome) -> object:
         # Raises `NepError` for a failure.
@@ -146,12 +148,12 @@ class Surveyor:
             if isinstance(outcome, NepError):
                 raise outcome
             if outcome.kind != CallKind.ANSWER:
-                name, reason = read_failure(outcome.data)
+                name, reason = read_error_reply(outcome.data)
                 raise NepError(f"{name}: {reason}" if name else reason)
-            codec = codec_numbered(outcome.codec)
+            codec = codec_by_number(outcome.codec)
             if codec is None:
                 raise NepError(_("this version does not know the codec of the reply; update nep"))
-            return self._types.answer.read(codec.decode(outcome.data, {}), len(outcome.data))
+            return self._types.reply.read(codec.decode(outcome.data, {}), len(outcome.data))
         except WaitTimeoutError:  # slow, but not a failure
             raise
         except NepError as error:
@@ -219,7 +221,7 @@ class Respondent(Server):
     @property
     def survey(self) -> str:
         """Name of the survey."""
-        return self.service.removeprefix(SURVEY)
+        return self.service.removeprefix(SURVEY_PREFIX)
 
     def listen_json(self, block_mode: bool = False) -> tuple[bool, object]:
         """Return (True, next question), or (False, {}) if no question is waiting. Reply with `send_json`.

@@ -51,7 +51,7 @@ class PayloadType:
         try:
             return self._declared.shape.read(plain)
         except shapes.ShapeMismatch as mismatch:
-            reason = mismatch.sentence
+            reason = mismatch.message
         except RecursionError:
             reason = _("it has too many levels")
         raise DecodeError(self._declared.name, size_bytes, reason)
@@ -62,7 +62,7 @@ class CallTypes:
     """Declared types of a service's requests and replies."""
 
     request: PayloadType
-    answer: PayloadType
+    reply: PayloadType
 
 
 UNTYPED = CallTypes(PayloadType(None), PayloadType(None))

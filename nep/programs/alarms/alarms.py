@@ -11,17 +11,17 @@ from functools import partial
 
 from nep.i18n import _
 from nep.programs.alarms.evaluator import AlarmEvaluator, AlarmEvent
-from nep.programs.alarms.history import AlarmDeed, AlarmHistory, AlarmRecord
+from nep.programs.alarms.history import ActionResult, AlarmHistory, AlarmRecord
 from nep.programs.alarms.rule import AlarmAction, AlarmRule
-from nep.programs.alarms.sentences import what_words
+from nep.programs.alarms.sentences import event_text
 
-RETRY_S = 30.0
+RETRY_DELAY_S = 30.0
 MAX_TRIES = 20
-_MAX_DEEDS = 1_000
+_MAX_ACTION_RESULTS = 1_000
 
-Done = Callable[[bool, str], None]
+DoneCallback = Callable[[bool, str], None]
 """Completion callback of an action: (success, result as text). Called once, from any thread."""
-Carrier = Callable[[AlarmEvent, AlarmAction, Done], None]
+ActionStarter = Callable[[AlarmEvent, AlarmAction, DoneCallback], None]
 """Function that starts an action of one kind without blocking, and calls `Done` when it has ended."""
 
 
@@ -43,7 +43,7 @@ class Alarms:
         self,
         rules: Sequence[AlarmRule] = (),
         history: AlarmHistory | None = None,
-        carriers: Mapping[str, Carrier] | None = None,
+        carriers: Mapping[str, ActionStarter] | None = None,
         *,
         clock: Callable[[], float] = time.monotonic,
         clock_s: Callable[[], float] = time.time,
@@ -64,7 +64,7 @@ class Alarms:
         self._clock, self._clock_s = clock, clock_s
         self._results: queue.SimpleQueue[tuple[AlarmEvent, AlarmAction, int, bool, str]] = queue.SimpleQueue()
         self._retries: dict[tuple[str, str], _Retry] = {}
-        self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MAX_DEEDS)
+        self._deeds: deque[tuple[AlarmRule, str, float]] = deque(maxlen=_MAX_ACTION_RESULTS)
         self._running_count = 0
         self.revision = 0
         """Number of changes to the rules so far."""
@@ -83,7 +83,7 @@ class Alarms:
         """Return the rule with this id, or None."""
         return next((rule for rule in self.rules if rule.id == rule_id), None)
 
-    def put(self, rule: AlarmRule) -> None:
+    def set_rule(self, rule: AlarmRule) -> None:
         """Replace the rule with the same id, or insert a new one at the front."""
         if self.rule(rule.id) is None:
             self.set_rules([rule, *self.rules])
@@ -98,7 +98,7 @@ class Alarms:
         """Run no actions of a rule until `until_s` (seconds since 1970; 0 ends the snooze)."""
         rule = self.rule(rule_id)
         if rule is not None:
-            self.put(replace(rule, snoozed_until_s=until_s))
+            self.set_rule(replace(rule, snoozed_until_s=until_s))
 
     def retry_in_s(self, rule_id: str) -> float | None:
         """Return the seconds until a failed action of a rule is retried, or None if no retry is pending."""
@@ -110,7 +110,7 @@ class Alarms:
         """True while an action is running."""
         return self._running_count > 0
 
-    def take_deeds(self) -> list[tuple[AlarmRule, str, float]]:
+    def take_action_results(self) -> list[tuple[AlarmRule, str, float]]:
         """Return and clear the completed actions: (rule, result as text, time in seconds since 1970)."""
         deeds = list(self._deeds)
         self._deeds.clear()
@@ -128,13 +128,17 @@ class Alarms:
     def _handle_event(self, event: AlarmEvent) -> None:
         rule = event.rule
         if event.kind == "on":
-            words = what_words(rule.condition, event.seen)
+            words = event_text(rule.condition, event.value)
             record = AlarmRecord(rule.id, words, event.at_s, is_on=True, was_snoozed=event.is_snoozed)
             self.history.add(record)
         if event.kind == "off":
             record_now = self.history.current(rule.id)
             if record_now is not None:
-                record_now.is_on, record_now.lasted_s, record_now.count = False, event.lasted_s, event.count
+                record_now.is_on, record_now.duration_s, record_now.count = (
+                    False,
+                    event.duration_s,
+                    event.count,
+                )
                 self.history.revision += 1
             self._retries = {key: each for key, each in self._retries.items() if key[0] != rule.id}
         elif not event.is_snoozed:
@@ -147,13 +151,13 @@ class Alarms:
         if carrier is None:
             self._results.put((event, action, MAX_TRIES, False, _("this action is not available here")))
             return
-        done = partial(self._action_done, event, action, tries)
+        done = partial(self._on_action_done, event, action, tries)
         try:
             carrier(event, action, done)
         except Exception as error:  # noqa: BLE001  a failing action must not block the next
             done(False, str(error) or type(error).__name__)
 
-    def _action_done(
+    def _on_action_done(
         self, event: AlarmEvent, action: AlarmAction, tries: int, is_ok: bool, words: str
     ) -> None:
         self._results.put((event, action, tries, is_ok, words))
@@ -167,10 +171,10 @@ class Alarms:
             if record is None:
                 continue
             if words:
-                record.add(AlarmDeed(action.kind, words))
+                record.add(ActionResult(action.kind, words))
                 self.history.revision += 1
             if not is_ok and action.kind == "call" and record.is_on and tries < MAX_TRIES:
-                retry = _Retry(event, action, tries + 1, self._clock() + RETRY_S)
+                retry = _Retry(event, action, tries + 1, self._clock() + RETRY_DELAY_S)
                 self._retries[event.rule.id, action.name] = retry
 
     def _run_retries(self) -> None:

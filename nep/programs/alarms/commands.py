@@ -11,10 +11,10 @@ from nep.i18n import _, number
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.patterns.services.client import Client
-from nep.programs.alarms.alarms import Done
+from nep.programs.alarms.alarms import DoneCallback
 from nep.programs.alarms.rule import AlarmAction
 
-CALL_S = 5.0
+CALL_TIMEOUT_S = 5.0
 """Time limit of a service call in seconds."""
 _MAX_CACHED = 50
 
@@ -33,7 +33,7 @@ class AlarmCommands:
         self._publishers: dict[tuple[str, str], Publisher] = {}
         self._node: Node | None = None
 
-    def carry(self, node: Node, action: AlarmAction, done: Done) -> None:
+    def start_action(self, node: Node, action: AlarmAction, done: DoneCallback) -> None:
         """Start an action. Waits for the handshake of a new publisher, but not for replies. Never raises."""
         try:
             with self._lock:
@@ -68,12 +68,12 @@ class AlarmCommands:
             self._clients.clear()
             self._publishers.clear()
 
-    def _call(self, node: Node, action: AlarmAction, done: Done) -> None:
+    def _call(self, node: Node, action: AlarmAction, done: DoneCallback) -> None:
         client = self._clients.get(action.name)
         if client is None:
             if len(self._clients) >= _MAX_CACHED:
                 self._clients.pop(next(iter(self._clients))).close()
-            client = self._clients[action.name] = node.new_client(action.name, timeout_s=CALL_S)
+            client = self._clients[action.name] = node.new_client(action.name, timeout_s=CALL_TIMEOUT_S)
         client.call_async(action.payload).add_done_callback(_reply_handler(action.name, done))
 
     def _publisher(self, node: Node, action: AlarmAction) -> Publisher:
@@ -86,14 +86,14 @@ class AlarmCommands:
         return publisher
 
 
-def _reply_handler(service: str, done: Done) -> Callable[[Future[object]], None]:
+def _reply_handler(service: str, done: DoneCallback) -> Callable[[Future[object]], None]:
     def on_reply(ended: Future[object]) -> None:
         error = None if ended.cancelled() else ended.exception()
         if isinstance(error, NoServerError):
             done(False, _("{service} has no server").format(service=service))
         elif isinstance(error, WaitTimeoutError):
             template = _("{service} did not reply within {seconds} s")
-            done(False, template.format(service=service, seconds=number(CALL_S)))
+            done(False, template.format(service=service, seconds=number(CALL_TIMEOUT_S)))
         elif error is not None or ended.cancelled():
             done(False, _("{service}: {reason}").format(service=service, reason=str(error or "")))
         else:

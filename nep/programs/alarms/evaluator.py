@@ -17,11 +17,11 @@ from nep.errors import DecodeError
 from nep.messages.message import Message
 from nep.programs.alarms.losses import TopicLosses
 from nep.programs.alarms.rule import MAX_CHARACTERS, AlarmRule, Scalar, problem_of, topics_of
-from nep.programs.alarms.track import AlarmTrack, Turn
+from nep.programs.alarms.track import AlarmTrack, Transition
 from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_pattern import matches
 
-LARGE_BYTES = 256 * 1024
+LARGE_MESSAGE_BYTES = 256 * 1024
 """Size above which a message is decoded only if it is the newest of its batch."""
 MAX_EVENTS = 1_000
 MASTER_GRACE_S = 3.0
@@ -50,8 +50,8 @@ class AlarmEvent:
     kind: Literal["on", "off", "still"]
     rule: AlarmRule
     at_s: float
-    seen: Scalar = None
-    lasted_s: float = 0.0
+    value: Scalar = None
+    duration_s: float = 0.0
     count: int = 1
     is_snoozed: bool = False
 
@@ -71,10 +71,10 @@ class AlarmState:
     """
 
     phase: AlarmPhase
-    seen: Scalar = None
+    value: Scalar = None
     on_for_s: float = 0.0
     count: int = 0
-    trouble: str = ""
+    problem: str = ""
 
 
 @dataclass(slots=True, eq=False)
@@ -82,10 +82,10 @@ class _SubscribedTopic:
     """Subscribed topic: message count, time of the last message, and the rules that read its values."""
 
     readers: list[AlarmTrack] = field(default_factory=list)
-    there_since: float | None = None
+    present_since: float | None = None
     last: float | None = None
     count: int = 0
-    unreadable: bool = False
+    is_undecodable: bool = False
     samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_MAX_SAMPLES))
 
     def rate_hz(self, window_s: float, now: float) -> float | None:
@@ -144,7 +144,7 @@ class AlarmEvaluator:
         with self._lock:
             before, self._tracks = self._tracks, {}
             for rule in rules:
-                if not rule.is_on or problem_of(rule) is not None:
+                if not rule.is_enabled or problem_of(rule) is not None:
                     continue
                 known = before.get(rule.id)
                 if known is not None and _is_same_condition(known.rule, rule):
@@ -154,7 +154,7 @@ class AlarmEvaluator:
                 else:
                     self._tracks[rule.id] = AlarmTrack(rule)
             for id, track in before.items():
-                turn = track.end(now)
+                turn = track.turn_off(now)
                 if turn is not None:
                     self._emit(track, turn)
                 self._snoozed_on.discard(id)
@@ -186,15 +186,15 @@ class AlarmEvaluator:
         subscription = self._subscribed.get(topic)
         if subscription is None or not messages:
             return
-        payloads, unreadable, skipped = _payloads(messages) if subscription.readers else ([], False, 0)
+        payloads, unreadable, skipped = _decode_payloads(messages) if subscription.readers else ([], False, 0)
         now, is_news = self._clock(), False
         with self._lock:
             subscription.last = now
             subscription.count += len(messages)
-            subscription.unreadable = unreadable
+            subscription.is_undecodable = unreadable
             self.skipped += skipped
-            if subscription.there_since is None:
-                subscription.there_since = now
+            if subscription.present_since is None:
+                subscription.present_since = now
             for track in subscription.readers:
                 for payload in payloads:
                     turn = track.read(payload, now)
@@ -204,7 +204,7 @@ class AlarmEvaluator:
         if is_news:
             self.came.set()
 
-    def see(self, view: GraphView | None) -> None:
+    def update_graph(self, view: GraphView | None) -> None:
         """Process a new graph. Pass None while no master replies, so that no node counts as disconnected."""
         now = self._clock()
         with self._lock:
@@ -219,8 +219,8 @@ class AlarmEvaluator:
             is_settled = before is not None and now - self._epoch_at >= MASTER_GRACE_S
             self._nodes, self._topics = nodes, topics
             for name, subscription in self._subscribed.items():
-                if subscription.there_since is None and name in topics:
-                    subscription.there_since = now
+                if subscription.present_since is None and name in topics:
+                    subscription.present_since = now
             for name, losses in self._losses.items():
                 losses.add(view.topics.get(name), now)
             for track in self._tracks.values():
@@ -236,7 +236,7 @@ class AlarmEvaluator:
         is_settled: bool,
     ) -> None:
         kind, name = track.rule.condition.kind, track.rule.condition.name
-        turn: Turn | None = None
+        turn: Transition | None = None
         if kind == "leaves":
             is_there = name in self._nodes
             if is_there or (track.was_seen and now - self._epoch_at >= MASTER_GRACE_S):
@@ -244,13 +244,13 @@ class AlarmEvaluator:
         elif kind == "comes":
             track.was_seen = track.was_seen or name in self._nodes
             if is_settled and name in nodes:
-                turn = track.happened(now)
+                turn = track.trigger(now)
         elif kind == "appears":
             found = sorted(topic for topic in topics if matches(name, topic))
             track.was_seen = True
             if is_settled and found:
                 track.seen = found[0][:MAX_CHARACTERS]
-                turn = track.happened(now)
+                turn = track.trigger(now)
         if turn is not None:
             self._emit(track, turn)
 
@@ -265,7 +265,7 @@ class AlarmEvaluator:
             if now - self._sampled_at >= _SAMPLE_PERIOD_S:
                 self._sampled_at = now
                 for subscription in self._subscribed.values():
-                    if subscription.there_since is not None:
+                    if subscription.present_since is not None:
                         subscription.samples.append((now, subscription.count))
             for track in self._tracks.values():
                 turn = self._evaluate_time(track, now)
@@ -281,11 +281,11 @@ class AlarmEvaluator:
             self._events.clear()
         return events
 
-    def _evaluate_time(self, track: AlarmTrack, now: float) -> Turn | None:
+    def _evaluate_time(self, track: AlarmTrack, now: float) -> Transition | None:
         condition = track.rule.condition
         subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
-        if condition.kind == "silent" and subscription is not None and subscription.there_since is not None:
-            silent_s = now - max(subscription.there_since, subscription.last or subscription.there_since)
+        if condition.kind == "silent" and subscription is not None and subscription.present_since is not None:
+            silent_s = now - max(subscription.present_since, subscription.last or subscription.present_since)
             return track.observe(silent_s >= condition.for_s, silent_s, now)
         if condition.kind in {"rate_below", "rate_above"} and subscription is not None:
             rate_hz = subscription.rate_hz(_window_s(condition.number), now)
@@ -299,7 +299,7 @@ class AlarmEvaluator:
             return None  # without a master it is unknown which nodes exist
         return track.advance(now)
 
-    def _emit(self, track: AlarmTrack, turn: Turn) -> None:
+    def _emit(self, track: AlarmTrack, turn: Transition) -> None:
         rule, now_s = track.rule, self._clock_s()
         is_snoozed = rule.is_snoozed(now_s)
         if turn.is_on and is_snoozed:
@@ -308,7 +308,13 @@ class AlarmEvaluator:
             self._snoozed_on.discard(rule.id)
         self._events.append(
             AlarmEvent(
-                "on" if turn.is_on else "off", rule, now_s, turn.seen, turn.lasted_s, turn.times, is_snoozed
+                "on" if turn.is_on else "off",
+                rule,
+                now_s,
+                turn.value,
+                turn.duration_s,
+                turn.occurrences,
+                is_snoozed,
             )
         )
 
@@ -323,16 +329,16 @@ class AlarmEvaluator:
                 return AlarmState("off" if problem_of(rule) is None else "faulty")
             condition = track.rule.condition
             subscription = self._subscribed.get(condition.name) if condition.needs_topic else None
-            was_seen = track.was_seen or (subscription is not None and subscription.there_since is not None)
+            was_seen = track.was_seen or (subscription is not None and subscription.present_since is not None)
             if condition.is_about_value:
                 was_seen = subscription is not None and subscription.last is not None
             trouble = track.trouble or (
-                "unreadable" if subscription is not None and subscription.unreadable else ""
+                "unreadable" if subscription is not None and subscription.is_undecodable else ""
             )
             if track.on_since is not None:
                 return AlarmState("on", track.seen, now - track.on_since, track.count, trouble)
             phase: AlarmPhase = "pending" if track.is_pending else "well" if was_seen else "waits"
-            return AlarmState(phase, track.seen, trouble=trouble)
+            return AlarmState(phase, track.seen, problem=trouble)
 
     @property
     def states(self) -> Mapping[str, AlarmState]:
@@ -348,11 +354,11 @@ def _window_s(limit_hz: float) -> float:
     return min(MAX_RATE_WINDOW_S, max(RATE_WINDOW_S, 3.0 / limit_hz))
 
 
-def _payloads(messages: Sequence[Message]) -> tuple[list[object], bool, int]:
+def _decode_payloads(messages: Sequence[Message]) -> tuple[list[object], bool, int]:
     payloads: list[object] = []
     unreadable, skipped, newest = False, 0, messages[-1]
     for message in messages:
-        if message.size_bytes > LARGE_BYTES and message is not newest:
+        if message.size_bytes > LARGE_MESSAGE_BYTES and message is not newest:
             skipped += 1
             continue
         try:

@@ -10,17 +10,17 @@ from typing import NamedTuple
 from nep.text import shortened
 
 MAX_RECORDS = 500
-_MAX_DEEDS = 20
+_MAX_ACTION_RESULTS = 20
 _MAX_CHARACTERS = 300
 _MAX_TIME_S = 3e10
 """Maximum time stamp (the year 2920). Later times are invalid: some systems can't convert them to a date."""
 
 
-class AlarmDeed(NamedTuple):
+class ActionResult(NamedTuple):
     """Completed action: its kind, and its result as text."""
 
     kind: str
-    words: str
+    text: str
 
 
 @dataclass(slots=True, eq=False)
@@ -39,18 +39,18 @@ class AlarmRecord:
     """
 
     rule_id: str
-    words: str
+    cause: str
     at_s: float
-    lasted_s: float | None = None
+    duration_s: float | None = None
     is_on: bool = False
     count: int = 1
     was_snoozed: bool = False
-    deeds: list[AlarmDeed] = field(default_factory=list)
+    action_results: list[ActionResult] = field(default_factory=list)
 
-    def add(self, deed: AlarmDeed) -> None:
+    def add(self, deed: ActionResult) -> None:
         """Add a completed action; it replaces an earlier one of the same kind."""
-        kept = [each for each in self.deeds if each.kind != deed.kind]
-        self.deeds = [*kept, deed][-_MAX_DEEDS:]
+        kept = [each for each in self.action_results if each.kind != deed.kind]
+        self.action_results = [*kept, deed][-_MAX_ACTION_RESULTS:]
 
 
 class AlarmHistory:
@@ -79,7 +79,7 @@ class AlarmHistory:
         """Return the newest record of an alarm, or None."""
         return next((each for each in self if each.rule_id == rule_id), None)
 
-    def since(self, rule_id: str, at_s: float) -> int:
+    def count_since(self, rule_id: str, at_s: float) -> int:
         """Return the number of times an alarm has turned on since `at_s` (seconds since 1970)."""
         return sum(each.rule_id == rule_id and each.at_s >= at_s for each in self.records)
 
@@ -89,21 +89,21 @@ class AlarmHistory:
         self.revision += 1
 
 
-def record_plain(record: AlarmRecord) -> dict[str, object]:
+def record_to_plain(record: AlarmRecord) -> dict[str, object]:
     """Convert a record to a JSON-serializable dict."""
-    plain: dict[str, object] = {"alarm": record.rule_id, "words": record.words, "at_s": round(record.at_s, 3)}
-    if record.lasted_s is not None:
-        plain["lasted_s"] = round(record.lasted_s, 3)
+    plain: dict[str, object] = {"alarm": record.rule_id, "words": record.cause, "at_s": round(record.at_s, 3)}
+    if record.duration_s is not None:
+        plain["lasted_s"] = round(record.duration_s, 3)
     if record.count != 1:
         plain["count"] = record.count
     if record.was_snoozed:
         plain["snoozed"] = True
-    if record.deeds:
-        plain["did"] = [[deed.kind, deed.words] for deed in record.deeds]
+    if record.action_results:
+        plain["did"] = [[deed.kind, deed.text] for deed in record.action_results]
     return plain
 
 
-def record_from(plain: object) -> AlarmRecord | None:
+def record_from_plain(plain: object) -> AlarmRecord | None:
     """Convert a decoded JSON value to a record, or return None if it is invalid.
 
     The record is never on, because the end of its period was not observed.
@@ -111,25 +111,25 @@ def record_from(plain: object) -> AlarmRecord | None:
     if not isinstance(plain, Mapping):
         return None
     rule_id, words, at_s = plain.get("alarm"), plain.get("words"), plain.get("at_s")
-    if not isinstance(rule_id, str) or not isinstance(words, str) or not _is_number(at_s):
+    if not isinstance(rule_id, str) or not isinstance(words, str) or not _is_valid_time(at_s):
         return None
     lasted_s, count, did = plain.get("lasted_s"), plain.get("count", 1), plain.get("did")
     deeds = [
-        AlarmDeed(str(each[0]), shortened(str(each[1]), _MAX_CHARACTERS))
-        for each in (did if isinstance(did, list) else [])[:_MAX_DEEDS]
+        ActionResult(str(each[0]), shortened(str(each[1]), _MAX_CHARACTERS))
+        for each in (did if isinstance(did, list) else [])[:_MAX_ACTION_RESULTS]
         if isinstance(each, list) and len(each) == 2
     ]
     return AlarmRecord(
         rule_id,
         shortened(words, _MAX_CHARACTERS),
         float(at_s),  # type: ignore[arg-type]
-        float(lasted_s) if _is_number(lasted_s) else None,  # type: ignore[arg-type]
+        float(lasted_s) if _is_valid_time(lasted_s) else None,  # type: ignore[arg-type]
         count=count if isinstance(count, int) and not isinstance(count, bool) and count > 0 else 1,
         was_snoozed=plain.get("snoozed") is True,
-        deeds=deeds,
+        action_results=deeds,
     )
 
 
-def _is_number(value: object) -> bool:
+def _is_valid_time(value: object) -> bool:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return is_number and 0 <= value <= _MAX_TIME_S  # type: ignore[operator]

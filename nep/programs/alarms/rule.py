@@ -22,8 +22,8 @@ TOPIC_KINDS = ("silent", "rate_below", "rate_above", "loses", "appears")
 VALUE_KINDS = ("below", "above", "equals", "is_not", "changes")
 NODE_KINDS = ("leaves", "comes")
 KINDS = (*TOPIC_KINDS, *VALUE_KINDS, *NODE_KINDS)
-NEEDS_LIMIT = frozenset({"rate_below", "rate_above", "loses", "below", "above", "equals", "is_not"})
-NUMBER_KINDS = NEEDS_LIMIT - {"equals", "is_not"}
+KINDS_WITH_LIMIT = frozenset({"rate_below", "rate_above", "loses", "below", "above", "equals", "is_not"})
+NUMBER_KINDS = KINDS_WITH_LIMIT - {"equals", "is_not"}
 EVENT_KINDS = frozenset({"changes", "appears", "comes"})
 """Kinds of conditions that describe a momentary event instead of a lasting state."""
 ACTION_KINDS = ("banner", "sound", "keep", "run", "call", "send", "stop", "console")
@@ -32,8 +32,8 @@ NAMED_ACTIONS = frozenset({"run", "call", "send"})
 MIN_S, MAX_S = 0.1, 86_400.0
 MIN_CALM_S, MAX_CALM_S = 0.5, 3_600.0
 MAX_WINDOW_S = 600.0
-CALM_S = 2.0
-KEEP_S = 60.0
+DEFAULT_CALM_S = 2.0
+DEFAULT_RECORDING_S = 60.0
 MAX_ACTIONS = 10
 MAX_CHARACTERS = 300
 _MAX_NUMBER = 1e300
@@ -74,7 +74,7 @@ class AlarmCondition:
     def number(self) -> float:
         """Limit as a float; NaN if the kind has no numeric limit."""
         is_number = isinstance(self.limit, int | float) and not isinstance(self.limit, bool)
-        return float_of(self.limit) if is_number else math.nan  # type: ignore[arg-type]
+        return to_float(self.limit) if is_number else math.nan  # type: ignore[arg-type]
 
     @property
     def needs_topic(self) -> bool:
@@ -98,7 +98,7 @@ class AlarmAction:
     name: str = ""
     payload: object = None
     msg_type: str = "json"
-    seconds: float = KEEP_S
+    seconds: float = DEFAULT_RECORDING_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +119,8 @@ class AlarmRule:
     id: str
     condition: AlarmCondition
     actions: tuple[AlarmAction, ...] = ()
-    is_on: bool = True
-    calm_s: float = CALM_S
+    is_enabled: bool = True
+    calm_s: float = DEFAULT_CALM_S
     snoozed_until_s: float = 0.0
 
     def is_snoozed(self, now_s: float) -> bool:
@@ -132,28 +132,28 @@ class RuleProblem(NamedTuple):
     """Problem of a rule: its key in the alarm file, and a sentence without full stop."""
 
     key: str
-    sentence: str
+    message: str
 
 
 @dataclass(slots=True)
-class _Check:
-    found: list[RuleProblem] = field(default_factory=list)
+class _RuleChecker:
+    problems: list[RuleProblem] = field(default_factory=list)
 
     def number(self, key: str, value: object, minimum: float, maximum: float) -> None:
         if isinstance(value, bool) or not isinstance(value, int | float) or not minimum <= value <= maximum:
             template = _("it must be a number from {least:g} to {most:g}")
-            self.found.append(RuleProblem(key, template.format(least=minimum, most=maximum)))
+            self.problems.append(RuleProblem(key, template.format(least=minimum, most=maximum)))
 
-    def named(self, key: str, check: object, name: str) -> None:
+    def check_name(self, key: str, check: object, name: str) -> None:
         try:
             check(name)  # type: ignore[operator]
         except (BadTopicError, BadNameError) as error:
-            self.found.append(RuleProblem(key, error.reason))
+            self.problems.append(RuleProblem(key, error.reason))
         except NepError as error:
-            self.found.append(RuleProblem(key, str(error)))
+            self.problems.append(RuleProblem(key, str(error)))
 
 
-def float_of(number: float) -> float:
+def to_float(number: float) -> float:
     """Convert a number to a float; an integer that is too large becomes infinity."""
     try:
         return float(number)
@@ -168,40 +168,40 @@ def new_id() -> str:
 
 def problem_of(rule: AlarmRule) -> RuleProblem | None:
     """Return the first problem of a rule, or None if it is valid."""
-    check = _Check()
+    check = _RuleChecker()
     _check_condition(rule.condition, check)
     check.number("calm_s", rule.calm_s, MIN_CALM_S, MAX_CALM_S)
     if len(rule.actions) > MAX_ACTIONS:
         template = _("it has more than {most} actions; split it into two alarms")
-        check.found.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
+        check.problems.append(RuleProblem("do", template.format(most=MAX_ACTIONS)))
     for action in rule.actions:
         _check_action(action, check)
-    return check.found[0] if check.found else None
+    return check.problems[0] if check.problems else None
 
 
-def _check_condition(condition: AlarmCondition, check: _Check) -> None:
+def _check_condition(condition: AlarmCondition, check: _RuleChecker) -> None:
     if not condition.name:
         key, template = (
             ("node", _("the node name is missing"))
             if condition.is_about_node
             else ("topic", _("the topic name is missing"))
         )
-        check.found.append(RuleProblem(key, template))
+        check.problems.append(RuleProblem(key, template))
         return
     if condition.is_about_node:
-        check.named("node", check_node_name, condition.name)
+        check.check_name("node", check_node_name, condition.name)
     else:
-        check.named("topic", check_topic, condition.name)
+        check.check_name("topic", check_topic, condition.name)
         if is_pattern(condition.name) and condition.kind != "appears":
             template = _("it has wildcards, which only 'appears' allows; use the name of a topic")
-            check.found.append(RuleProblem("topic", template))
+            check.problems.append(RuleProblem("topic", template))
     if condition.is_about_value:
-        check.named("value", parse_path, condition.path)
+        check.check_name("value", parse_path, condition.path)
     _check_limit(condition, check)
     _check_time(condition, check)
 
 
-def _check_limit(condition: AlarmCondition, check: _Check) -> None:
+def _check_limit(condition: AlarmCondition, check: _RuleChecker) -> None:
     limit = condition.limit
     if condition.kind in {"rate_below", "rate_above"}:
         check.number("than", limit, 0.001, 1e6)
@@ -209,12 +209,12 @@ def _check_limit(condition: AlarmCondition, check: _Check) -> None:
         check.number("than", limit, 0, 100)
     elif condition.kind in NUMBER_KINDS:
         check.number("than", limit, -_MAX_NUMBER, _MAX_NUMBER)
-    elif condition.kind in NEEDS_LIMIT and not _is_scalar(limit):
-        check.found.append(RuleProblem("than", _("it must be a number, a string, true, false or null")))
+    elif condition.kind in KINDS_WITH_LIMIT and not _is_scalar(limit):
+        check.problems.append(RuleProblem("than", _("it must be a number, a string, true, false or null")))
     check.number("margin", condition.margin, 0, _MAX_NUMBER)
 
 
-def _check_time(condition: AlarmCondition, check: _Check) -> None:
+def _check_time(condition: AlarmCondition, check: _RuleChecker) -> None:
     if condition.kind == "silent":
         check.number("for_s", condition.for_s, MIN_S, MAX_S)
     elif condition.kind == "loses":
@@ -223,13 +223,13 @@ def _check_time(condition: AlarmCondition, check: _Check) -> None:
         check.number("for_s", condition.for_s, 0, MAX_S)
 
 
-def _check_action(action: AlarmAction, check: _Check) -> None:
+def _check_action(action: AlarmAction, check: _RuleChecker) -> None:
     if action.kind in NAMED_ACTIONS and not action.name:
-        check.found.append(RuleProblem(action.kind, _("the name is missing")))
+        check.problems.append(RuleProblem(action.kind, _("the name is missing")))
     elif action.kind == "call":
-        check.named("call", check_service, action.name)
+        check.check_name("call", check_service, action.name)
     elif action.kind == "send":
-        check.named("send", check_topic, action.name)
+        check.check_name("send", check_topic, action.name)
     elif action.kind == "keep":
         check.number("keep_s", action.seconds, 1, MAX_WINDOW_S)
 

@@ -21,12 +21,12 @@ from typing import NoReturn
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
 from nep.messages.json_fault import find_json_fault
-from nep.programs.alarms.history import AlarmHistory, record_from, record_plain
+from nep.programs.alarms.history import AlarmHistory, record_from_plain, record_to_plain
 from nep.programs.alarms.rule import (
     ACTION_KINDS,
-    CALM_S,
+    DEFAULT_CALM_S,
     KINDS,
-    NEEDS_LIMIT,
+    KINDS_WITH_LIMIT,
     NODE_KINDS,
     VALUE_KINDS,
     AlarmAction,
@@ -38,7 +38,7 @@ from nep.programs.alarms.rule import (
 )
 from nep.text import escaped, quotable
 
-FORMAT = 1
+FORMAT_VERSION = 1
 MAX_ALARMS = 200
 _MAX_BYTES = 4_000_000
 _MAX_TIME_S = 3e10  # the year 2920: some systems have no later dates
@@ -82,7 +82,7 @@ _ACTION_KEYS: Mapping[str, tuple[str, ...]] = {
     "call": ("with",),
     "send": ("message", "type"),
 }
-_DEFAULT_FOR: Mapping[str, float] = {"silent": 2.0, "loses": 30.0}
+_DEFAULT_FOR_S: Mapping[str, float] = {"silent": 2.0, "loses": 30.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,10 +105,10 @@ def read_alarms(path: Path) -> AlarmFile:
         raise NepError(
             template.format(path=escaped(str(path)), reason=reason[:1].lower() + reason[1:])
         ) from error
-    return read_text(data, str(path))
+    return parse_alarms(data, str(path))
 
 
-def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
+def parse_alarms(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
     """Parse the bytes of an alarm file.
 
     Args:
@@ -139,38 +139,42 @@ def read_text(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
     return _Reader(path, text, lenient=lenient).file(json.loads(text))
 
 
-def alarms_text(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
+def encode_alarms(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
     """Encode rules and history as the bytes of an alarm file."""
-    records = [record_plain(record) for record in history.records] if history is not None else []
-    value: dict[str, object] = {"format": FORMAT, "alarms": [_rule_plain(rule) for rule in rules]}
+    records = [record_to_plain(record) for record in history.records] if history is not None else []
+    value: dict[str, object] = {"format": FORMAT_VERSION, "alarms": [_rule_to_plain(rule) for rule in rules]}
     if records:
         value["history"] = records
     text = json.dumps(value, indent=1, ensure_ascii=False) + "\n"
     return text.encode("utf-8", "backslashreplace")
 
 
-def _rule_plain(rule: AlarmRule) -> dict[str, object]:
+def _rule_to_plain(rule: AlarmRule) -> dict[str, object]:
     condition = rule.condition
     when: dict[str, object] = {"node" if condition.is_about_node else "topic": condition.name}
     if condition.is_about_value:
         when["value"] = condition.path
     when["is"] = condition.kind
-    if condition.kind in NEEDS_LIMIT:
+    if condition.kind in KINDS_WITH_LIMIT:
         when["than"] = condition.limit
     if condition.for_s:
         when["for_s"] = condition.for_s
     if condition.margin:
         when["margin"] = condition.margin
     plain: dict[str, object] = {"id": rule.id}
-    if not rule.is_on:
+    if not rule.is_enabled:
         plain["on"] = False
-    plain |= {"when": when, "do": [_action_plain(action) for action in rule.actions], "calm_s": rule.calm_s}
+    plain |= {
+        "when": when,
+        "do": [_action_to_plain(action) for action in rule.actions],
+        "calm_s": rule.calm_s,
+    }
     if rule.snoozed_until_s:
         plain["snoozed_until_s"] = rule.snoozed_until_s
     return plain
 
 
-def _action_plain(action: AlarmAction) -> object:
+def _action_to_plain(action: AlarmAction) -> object:
     match action.kind:
         case "keep":
             return {"keep_s": action.seconds}
@@ -228,15 +232,15 @@ class _Reader:
     def _root(self, value: object) -> list[object]:
         if not isinstance(value, dict):
             self._fail("", _('it is not an alarm file; it must begin with {"format": 1, "alarms": ['))
-        version = value.get("format", FORMAT)
+        version = value.get("format", FORMAT_VERSION)
         if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-            self._fail("format", _("it must be {format}").format(format=FORMAT))
-        if version > FORMAT:
+            self._fail("format", _("it must be {format}").format(format=FORMAT_VERSION))
+        if version > FORMAT_VERSION:
             template = _(
                 "'{path}' was written by a newer version of nep (format {found}; this version reads "
                 "{format}); update nep"
             )
-            raise NewerAlarmsError(template.format(path=self._path, found=version, format=FORMAT))
+            raise NewerAlarmsError(template.format(path=self._path, found=version, format=FORMAT_VERSION))
         self._check_keys(value, _ROOT_KEYS, None)
         alarms = value.get("alarms")
         if not isinstance(alarms, list):
@@ -247,7 +251,7 @@ class _Reader:
 
     def _history(self, value: object) -> AlarmHistory:
         records = value.get("history") if isinstance(value, dict) else None
-        found = [record_from(each) for each in records] if isinstance(records, list) else []
+        found = [record_from_plain(each) for each in records] if isinstance(records, list) else []
         return AlarmHistory([record for record in found if record is not None])
 
     def _rule(self, entry: object, index: int) -> AlarmRule:
@@ -271,12 +275,12 @@ class _Reader:
             self._condition(when, index),
             tuple(self._action(each, index) for each in do),
             is_on,
-            self._number(entry, "calm_s", CALM_S, index),
+            self._number(entry, "calm_s", DEFAULT_CALM_S, index),
             min(self._number(entry, "snoozed_until_s", 0.0, index), _MAX_TIME_S),
         )
         problem = problem_of(rule)
         if problem is not None:
-            self._fail(problem.key, problem.sentence, index)
+            self._fail(problem.key, problem.message, index)
         return rule
 
     def _condition(self, when: dict[str, object], index: int) -> AlarmCondition:
@@ -298,14 +302,14 @@ class _Reader:
             self._fail(subject if not isinstance(name, str) else "value", _("it must be a string"), index)
         if path and kind not in VALUE_KINDS:
             self._fail("value", _("'{kind}' does not take a value; remove it").format(kind=kind), index)
-        if kind in NEEDS_LIMIT and "than" not in when:
+        if kind in KINDS_WITH_LIMIT and "than" not in when:
             self._fail("is", _('the limit is missing; write "than": ...'), index)
         return AlarmCondition(
             kind,
             name,
             path,
             self._scalar(when.get("than"), index),
-            self._number(when, "for_s", _DEFAULT_FOR.get(kind, 0.0), index),
+            self._number(when, "for_s", _DEFAULT_FOR_S.get(kind, 0.0), index),
             self._number(when, "margin", 0.0, index),
         )
 

@@ -5,12 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from nep.i18n import _, lazy, listed, number
-from nep.programs.alarms.rule import KEEP_S, AlarmAction, AlarmCondition, AlarmRule, Scalar, float_of
+from nep.i18n import _, format_list, lazy, number
+from nep.programs.alarms.rule import (
+    DEFAULT_RECORDING_S,
+    AlarmAction,
+    AlarmCondition,
+    AlarmRule,
+    Scalar,
+    to_float,
+)
 from nep.text import quotable, shortened
 
 _MAX_SHOWN_CHARACTERS = 40
-_DO_NOTHING = lazy("add it to the alarm list")
+_NO_ACTION = lazy("add it to the alarm list")
 
 _CONDITIONS: Mapping[str, str] = {
     "silent": lazy("{subject} is silent for {time}"),
@@ -61,7 +68,7 @@ _ACTIONS: Mapping[str, str] = {
 }
 
 
-def time_words(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Format a duration: 0.5 s, 60 s, 10 min, 3 h."""
     for unit, size in ((_("{count} h"), 3600.0), (_("{count} min"), 60.0)):
         if seconds > size and math.isclose(seconds % size, 0.0, abs_tol=1e-9):
@@ -69,12 +76,12 @@ def time_words(seconds: float) -> str:
     return _("{count} s").format(count=number(round(seconds, 3)))
 
 
-def value_words(value: object) -> str:
+def value_text(value: object) -> str:
     """Format the value of a field. Long texts are shortened; lists and maps are shown as their kind."""
     if isinstance(value, bool) or value is None:
         return {True: _("true"), False: _("false"), None: _("null")}[value]
     if isinstance(value, int):
-        return number(value, "d") if abs(value) < 10**15 else number(float_of(value), ".6g")
+        return number(value, "d") if abs(value) < 10**15 else number(to_float(value), ".6g")
     if isinstance(value, float):
         return number(value, ".6g")
     if isinstance(value, str):
@@ -82,16 +89,16 @@ def value_words(value: object) -> str:
     return _("a list") if isinstance(value, list | tuple) else _("an object")
 
 
-def limit_words(condition: AlarmCondition, value: Scalar) -> str:
+def limit_text(condition: AlarmCondition, value: Scalar) -> str:
     """Format a limit or a value with the unit that the condition implies."""
     if condition.kind in {"rate_below", "rate_above"} and isinstance(value, int | float):
         return _("{count} messages per second").format(count=number(value, ".4g"))
     if condition.kind == "loses" and isinstance(value, int | float):
         return _("{count} %").format(count=number(value, ".3g"))
-    return value_words(value)
+    return value_text(value)
 
 
-def subject_words(condition: AlarmCondition) -> str:
+def subject_text(condition: AlarmCondition) -> str:
     """Format the subject of a condition: a topic, a node, or "range of /distance"."""
     if not condition.name:
         return _("a node") if condition.is_about_node else _("a topic")
@@ -101,52 +108,52 @@ def subject_words(condition: AlarmCondition) -> str:
     return name
 
 
-def condition_words(condition: AlarmCondition) -> str:
+def condition_text(condition: AlarmCondition) -> str:
     """Format a condition: "/robot/camera is silent for 2 s"."""
     words = _CONDITIONS[condition.kind]
     if condition.for_s > 0:
         words = _LASTING_CONDITIONS.get(condition.kind, words)
     return _(words).format(
-        subject=subject_words(condition),
-        limit=limit_words(condition, condition.limit),
-        time=time_words(condition.for_s),
+        subject=subject_text(condition),
+        limit=limit_text(condition, condition.limit),
+        time=duration_text(condition.for_s),
     )
 
 
-def action_words(action: AlarmAction) -> str:
+def action_text(action: AlarmAction) -> str:
     """Format an action: "show a banner", "call restart_lidar"."""
     return _(_ACTIONS[action.kind]).format(
-        name=quotable(action.name), time=time_words(action.seconds or KEEP_S)
+        name=quotable(action.name), time=duration_text(action.seconds or DEFAULT_RECORDING_S)
     )
 
 
-def rule_words(rule: AlarmRule) -> str:
+def rule_text(rule: AlarmRule) -> str:
     """Format a rule as one sentence without full stop."""
-    actions = [action_words(action) for action in rule.actions]
+    actions = [action_text(action) for action in rule.actions]
     return _("When {condition}: {actions}").format(
-        condition=condition_words(rule.condition), actions=listed(actions) if actions else _(_DO_NOTHING)
+        condition=condition_text(rule.condition), actions=format_list(actions) if actions else _(_NO_ACTION)
     )
 
 
-def what_words(condition: AlarmCondition, seen: Scalar) -> str:
+def event_text(condition: AlarmCondition, seen: Scalar) -> str:
     """Format an event for the history: "/distance: range is 0.36, below 0.4"; no full stop."""
     return _(_EVENTS[condition.kind]).format(
-        subject=subject_words(condition),
-        limit=limit_words(condition, condition.limit),
+        subject=subject_text(condition),
+        limit=limit_text(condition, condition.limit),
         seen=quotable(seen)
         if condition.kind == "appears" and isinstance(seen, str)
-        else limit_words(condition, seen),
+        else limit_text(condition, seen),
     )
 
 
-def seen_words(condition: AlarmCondition, seen: Scalar) -> str:
+def current_value_text(condition: AlarmCondition, seen: Scalar) -> str:
     """Format the current value: "0.82 now", "silent for 4 s"; "" if there is none."""
     if condition.kind == "silent":
         if not isinstance(seen, int | float) or seen < 1:
             return ""
-        return _("silent for {time}").format(time=time_words(round(seen)))
+        return _("silent for {time}").format(time=duration_text(round(seen)))
     if seen is None and condition.kind not in {"equals", "is_not"}:
         return ""
     if condition.kind in {"leaves", "comes", "appears"}:
         return ""
-    return _("{value} now").format(value=limit_words(condition, seen))
+    return _("{value} now").format(value=limit_text(condition, seen))

@@ -11,16 +11,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from nep.messages.fields import MISSING, Path, parse_path, pick
-from nep.programs.alarms.rule import EVENT_KINDS, MAX_CHARACTERS, AlarmRule, Scalar, float_of
+from nep.messages.fields import MISSING, Path, parse_path, value_at
+from nep.programs.alarms.rule import EVENT_KINDS, MAX_CHARACTERS, AlarmRule, Scalar, to_float
 
-EVENT_SHOWN_S = 5.0
+MIN_EVENT_DURATION_S = 5.0
 """Minimum time that an alarm caused by a momentary event stays on, in seconds."""
 
-Trouble = Literal["", "missing", "no_number"]
+ValueProblem = Literal["", "missing", "no_number"]
 
 
-class Turn(NamedTuple):
+class Transition(NamedTuple):
     """Transition of an alarm.
 
     Attributes:
@@ -31,9 +31,9 @@ class Turn(NamedTuple):
     """
 
     is_on: bool
-    seen: Scalar
-    lasted_s: float
-    times: int
+    value: Scalar
+    duration_s: float
+    occurrences: int
 
 
 @dataclass(slots=True)
@@ -54,7 +54,9 @@ class AlarmTrack:
         self.rule = rule
         condition = rule.condition
         self._for_s = 0.0 if condition.kind in {"silent", "loses"} else condition.for_s
-        self._calm_s = max(rule.calm_s, EVENT_SHOWN_S) if condition.kind in EVENT_KINDS else rule.calm_s
+        self._calm_s = (
+            max(rule.calm_s, MIN_EVENT_DURATION_S) if condition.kind in EVENT_KINDS else rule.calm_s
+        )
         self._value = _Value(parse_path(condition.path) if condition.is_about_value else ())
         self._is_below = condition.kind == "below"
         self._bound = condition.number if condition.kind in {"below", "above"} else None
@@ -65,7 +67,7 @@ class AlarmTrack:
         self.seen: Scalar = None
         self.was_seen = False
         """True if the alarm's topic or node has ever existed."""
-        self.trouble: Trouble = ""
+        self.trouble: ValueProblem = ""
         """Reason why the last value can't be compared; "" if it can."""
 
     @property
@@ -78,10 +80,10 @@ class AlarmTrack:
         """True if the condition holds, but not long enough yet."""
         return self._true_since is not None and not self.is_on
 
-    def read(self, payload: object, now: float) -> Turn | None:
+    def read(self, payload: object, now: float) -> Transition | None:
         """Process a payload of the alarm's topic; `now` is the monotonic time in seconds."""
-        value = pick(payload, self._value.path)
-        if self._is_false_fast(value):
+        value = value_at(payload, self._value.path)
+        if self._is_clearly_false(value):
             self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
             return None
         self.was_seen = True
@@ -93,10 +95,10 @@ class AlarmTrack:
         if kind == "changes":
             self.seen = scalar_of(value)
             self.trouble = ""
-            return self.happened(now) if before is not MISSING and not _same(before, value) else None
+            return self.trigger(now) if before is not MISSING and not _are_equal(before, value) else None
         if kind in {"equals", "is_not"}:
             self.trouble = ""
-            same = _same(value, self.rule.condition.limit)
+            same = _are_equal(value, self.rule.condition.limit)
             return self.observe(same is (kind == "equals"), scalar_of(value), now)
         number = _number(value)
         self.trouble = "no_number" if number is None else ""
@@ -105,14 +107,14 @@ class AlarmTrack:
         seen = scalar_of(value) if math.isfinite(number) else number
         return self.compare(number, now, is_below=kind == "below", seen=seen)
 
-    def _is_false_fast(self, value: object) -> bool:
+    def _is_clearly_false(self, value: object) -> bool:
         if self._bound is None or self.on_since is not None or self._true_since is not None:
             return False
         if type(value) is not float and type(value) is not int:
             return False
         return value >= self._bound if self._is_below else value <= self._bound
 
-    def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Turn | None:
+    def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Transition | None:
         """Compare a number with the limit, with hysteresis.
 
         Args:
@@ -128,13 +130,13 @@ class AlarmTrack:
             is_so = number < limit if is_below else number > limit
         return self.observe(is_so, number if seen is None else seen, now)
 
-    def happened(self, now: float) -> Turn | None:
+    def trigger(self, now: float) -> Transition | None:
         """Process a momentary event: turn the alarm on, and let it turn off after `EVENT_SHOWN_S`."""
         turn = self.observe(True, self.seen, now)
         self.observe(False, self.seen, now)
         return turn
 
-    def observe(self, is_so: bool, seen: Scalar, now: float) -> Turn | None:
+    def observe(self, is_so: bool, seen: Scalar, now: float) -> Transition | None:
         """Process the current truth of the condition (`is_so`) and the value that was seen."""
         turn = self.advance(now)
         self.was_seen = True
@@ -151,26 +153,26 @@ class AlarmTrack:
                 self._false_since = now
         return turn or self.advance(now)
 
-    def advance(self, now: float) -> Turn | None:
+    def advance(self, now: float) -> Transition | None:
         """Update the state for the time that has passed since the last call."""
         since, false_since = self._true_since, self._false_since
         if self.on_since is None:
             if since is None or now - since < self._for_s:
                 return None
             self.on_since, self.count, self._false_since = now, 1, None
-            return Turn(True, self.seen, 0.0, 1)
+            return Transition(True, self.seen, 0.0, 1)
         if false_since is None or now - false_since < self._calm_s:
             return None
-        turn = Turn(False, self.seen, max(0.0, false_since - self.on_since), self.count)
+        turn = Transition(False, self.seen, max(0.0, false_since - self.on_since), self.count)
         self.on_since = self._false_since = None
         return turn
 
-    def end(self, now: float) -> Turn | None:
+    def turn_off(self, now: float) -> Transition | None:
         """Turn the alarm off because its rule is no longer evaluated."""
         if self.on_since is None:
             return None
         end = now if self._false_since is None else self._false_since
-        turn = Turn(False, self.seen, max(0.0, end - self.on_since), self.count)
+        turn = Transition(False, self.seen, max(0.0, end - self.on_since), self.count)
         self.on_since = self._true_since = self._false_since = None
         return turn
 
@@ -183,7 +185,7 @@ def scalar_of(value: object) -> Scalar:
     if isinstance(value, str):
         return value[:MAX_CHARACTERS]
     if isinstance(value, bool | int | float):
-        return value if -(1 << 63) <= value < 1 << 64 else float_of(value)
+        return value if -(1 << 63) <= value < 1 << 64 else to_float(value)
     return (
         f"{{{len(value)}}}"
         if isinstance(value, Mapping)
@@ -196,10 +198,10 @@ def scalar_of(value: object) -> Scalar:
 def _number(value: object) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or (value != value):  # noqa: PLR0124  NaN
         return None
-    return float_of(value)
+    return to_float(value)
 
 
-def _same(one: object, other: object) -> bool:
+def _are_equal(one: object, other: object) -> bool:
     if isinstance(one, bool) is not isinstance(other, bool):
         return False
     return one == other or (one != one and other != other)  # noqa: PLR0124

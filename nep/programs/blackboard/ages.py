@@ -10,18 +10,18 @@ from __future__ import annotations
 from nep.messages.message import Message
 from nep.programs.blackboard.entries import AgeBy
 
-AHEAD_S = 0.1
+MAX_AHEAD_S = 0.1
 """Maximum time that a stamp may be in the future, in seconds; beyond, the publisher's clock is wrong."""
-BEHIND_S = 10.0
+MAX_BEHIND_S = 10.0
 """Maximum age of a stamp at arrival in seconds, unless the message is latched; beyond, the clock is wrong."""
-_NS = 1e9
+_NS_PER_S = 1e9
 
 
-def beginning_of(message: Message, now: float, wall_ns: int) -> tuple[float, AgeBy]:
+def age_start(message: Message, now: float, wall_ns: int) -> tuple[float, AgeBy]:
     """Return the start of a message's age (on the clock of `now`), and its source: "stamp" or "arrival"."""
     if message.stamp_ns is None:
         return now, "arrival"
-    on_the_way_s = (wall_ns - message.stamp_ns) / _NS
-    if on_the_way_s < -AHEAD_S or (on_the_way_s > BEHIND_S and not message.is_latched):
+    on_the_way_s = (wall_ns - message.stamp_ns) / _NS_PER_S
+    if on_the_way_s < -MAX_AHEAD_S or (on_the_way_s > MAX_BEHIND_S and not message.is_latched):
         return now, "arrival"
     return now - max(0.0, on_the_way_s), "stamp"

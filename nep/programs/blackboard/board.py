@@ -18,15 +18,21 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.timer import Timer
-from nep.programs.blackboard.ages import beginning_of
+from nep.programs.blackboard.ages import age_start
 from nep.programs.blackboard.entries import AgeBy, Cause, Entries, EntryChange, StoredEntry
 from nep.programs.blackboard.keys import Key, key_matches, key_text, parse_key
-from nep.programs.blackboard.values import copied, leaves
-from nep.programs.blackboard.watch import BlackboardWatch, MessageReading, PerceivedValue
+from nep.programs.blackboard.values import deep_copy, leaves
+from nep.programs.blackboard.watch import BlackboardWatch, MessageMapping, PerceivedValue
 from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_topic
 from nep.system import forks
-from nep.system.arguments import at_least, function, period, plain_function, seconds
+from nep.system.arguments import (
+    check_at_least,
+    check_function,
+    check_optional_time_limit,
+    check_period,
+    check_plain_function,
+)
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -37,7 +43,7 @@ MAX_BYTES = 256 * 2**20
 _MAX_CHANGES = 10_000
 _WAIT_SLICE_S = 0.1
 """Maximum duration of a single wait, to notice a closed node, and for Ctrl+C on Windows."""
-_IMMEDIATE_S = 1e-6
+_IMMEDIATE_DELAY_S = 1e-6
 _MIN_TIMER_S = 0.001
 _MAX_SUGGESTIONS = 1_000
 _MISSING = object()
@@ -138,10 +144,10 @@ class Blackboard:
         wall_clock_ns: Callable[[], int] = time.time_ns,
     ) -> None:
         self._node = node
-        self._clock = function("clock", clock)
-        self._wall_clock_ns = function("wall_clock_ns", wall_clock_ns)
-        self._max_bytes = at_least("max_bytes", max_bytes, 1)
-        self._entries = Entries(at_least("max_keys", max_keys, 1), self._max_bytes)
+        self._clock = check_function("clock", clock)
+        self._wall_clock_ns = check_function("wall_clock_ns", wall_clock_ns)
+        self._max_bytes = check_at_least("max_bytes", max_bytes, 1)
+        self._entries = Entries(check_at_least("max_keys", max_keys, 1), self._max_bytes)
         self._lock = threading.Lock()
         self._updated = threading.Condition(self._lock)
         self._version = 0
@@ -194,7 +200,7 @@ class Blackboard:
         lives = _lifetime(lives_s)
         watch = BlackboardWatch(
             topic,
-            MessageReading(key, fields, each),
+            MessageMapping(key, fields, each),
             lambda message, found: self._store_message(message, found, lives),
             is_pattern=is_pattern(check_topic(topic)),
         )
@@ -230,8 +236,7 @@ class Blackboard:
         with self._updated:
             now = self._clock()
             entries = [
-                self._entry(each, leaf, now, lives)
-                for each, leaf in leaves(_copied_value(names, value), names)
+                self._entry(each, leaf, now, lives) for each, leaf in leaves(_copy_value(names, value), names)
             ]
         self._store(entries)
 
@@ -242,13 +247,13 @@ class Blackboard:
             self._expire_locked()
             removed = self._entries.remove(names)
             self._queue_changes_locked(removed)
-        self._schedule()
+        self._schedule_delivery()
         return len(removed)
 
     def _store_message(self, message: Message, found: Sequence[PerceivedValue], lives: float) -> None:
         if message.publisher in self._ignored:
             return
-        since, age_by = beginning_of(message, self._clock(), self._wall_clock_ns())
+        since, age_by = age_start(message, self._clock(), self._wall_clock_ns())
         problem: NepError | None = None
         entries: list[StoredEntry] = []
         for each in found:
@@ -257,7 +262,7 @@ class Blackboard:
                 entries.append(
                     StoredEntry(
                         key,
-                        _copied_value(key, each.value),
+                        _copy_value(key, each.value),
                         since,
                         age_by,
                         since + lives,
@@ -274,7 +279,7 @@ class Blackboard:
             raise problem
 
     def _entry(self, key: Key, value: object, now: float, lives: float) -> StoredEntry:
-        return StoredEntry(parse_key(key), value, now, expires=now + lives)
+        return StoredEntry(parse_key(key), value, now, expires_at=now + lives)
 
     def _store(self, entries: Sequence[StoredEntry]) -> None:
         problem: BadValueError | None = None
@@ -285,12 +290,12 @@ class Blackboard:
                 if is_empty and self._entries.has_below(entry.key):
                     continue  # an empty map doesn't replace keys below it
                 try:
-                    self._queue_changes_locked(self._entries.put(entry, now))
+                    self._queue_changes_locked(self._entries.store(entry, now))
                 except BadValueError as error:
                     problem = error
             self._version += 1
             self._updated.notify_all()
-        self._schedule()
+        self._schedule_delivery()
         if problem is not None:
             raise problem
 
@@ -306,7 +311,7 @@ class Blackboard:
             default: Returned if there is no value, or if all values are older than `max_age_s`.
             max_age_s: Maximum age in seconds; None for no limit.
         """
-        found = self._value_of(parse_key(key), seconds("max_age_s", max_age_s))
+        found = self._value_of(parse_key(key), check_optional_time_limit("max_age_s", max_age_s))
         return default if found is _MISSING else found
 
     def __getitem__(self, key: str | tuple[str, ...]) -> object:
@@ -315,7 +320,8 @@ class Blackboard:
         if found is _MISSING:
             with self._updated:
                 known = [
-                    key_text(each.key) for each in islice(self._entries.matching(("**",)), _MAX_SUGGESTIONS)
+                    key_text(each.key)
+                    for each in islice(self._entries.entries_matching(("**",)), _MAX_SUGGESTIONS)
                 ]
             raise NoValueError(key_text(names), known)
         return found
@@ -336,7 +342,7 @@ class Blackboard:
         names = parse_key(key)
         with self._updated:
             now = self._expire_locked()
-            return min((each.age_s(now) for each in self._entries.below(names)), default=math.inf)
+            return min((each.age_s(now) for each in self._entries.entries_below(names)), default=math.inf)
 
     def entry(self, key: str | tuple[str, ...]) -> BlackboardEntry | None:
         """Return the entry of the key itself, ignoring keys below, or None."""
@@ -344,7 +350,7 @@ class Blackboard:
         with self._updated:
             now = self._expire_locked()
             found = self._entries.get(names)
-        return None if found is None else _public(found, now)
+        return None if found is None else _public_entry(found, now)
 
     def keys(self, pattern: str = "**") -> list[str]:
         """Return the sorted keys that match a pattern.
@@ -354,7 +360,7 @@ class Blackboard:
         names = parse_key(pattern)
         with self._updated:
             self._expire_locked()
-            found = list(self._entries.matching(names))
+            found = list(self._entries.entries_matching(names))
         return sorted(key_text(each.key) for each in found)
 
     def snapshot(self, pattern: str = "**") -> dict[str, BlackboardEntry]:
@@ -362,19 +368,20 @@ class Blackboard:
         names = parse_key(pattern)
         with self._updated:
             now = self._expire_locked()
-            found = list(self._entries.matching(names))
+            found = list(self._entries.entries_matching(names))
         return {
-            each.key: each for each in sorted((_public(each, now) for each in found), key=lambda e: e.key)
+            each.key: each
+            for each in sorted((_public_entry(each, now) for each in found), key=lambda e: e.key)
         }
 
     def _value_of(self, key: Key, max_age_s: float | None) -> object:
         limit_s = math.inf if max_age_s is None else max_age_s
         with self._updated:
             now = self._expire_locked()
-            found = [each for each in self._entries.below(key) if each.age_s(now) <= limit_s]
+            found = [each for each in self._entries.entries_below(key) if each.age_s(now) <= limit_s]
         if not found:
             return _MISSING
-        return _composed(found, key)
+        return _compose(found, key)
 
     @property
     def bytes(self) -> int:
@@ -411,9 +418,9 @@ class Blackboard:
             WaitTimeoutError: The time limit has passed.
             ClosedError: The blackboard or its node was closed.
         """
-        names, limit_s = parse_key(key), seconds("timeout_s", timeout_s)
+        names, limit_s = parse_key(key), check_optional_time_limit("timeout_s", timeout_s)
         if condition is not None:
-            function("condition", condition)
+            check_function("condition", condition)
         deadline = math.inf if limit_s is None else time.monotonic() + limit_s
         while True:
             version = self._version
@@ -442,16 +449,16 @@ class Blackboard:
         Returns:
             A function that removes the callback.
         """
-        observer = _Observer(parse_key(pattern), plain_function("callback", callback))
+        observer = _Observer(parse_key(pattern), check_plain_function("callback", callback))
         with self._updated:
             self._observers = (*self._observers, observer)
 
-        def end() -> None:
+        def remove_observer() -> None:
             with self._updated:
                 self._observers = tuple(each for each in self._observers if each is not observer)
 
-        self._schedule()
-        return end
+        self._schedule_delivery()
+        return remove_observer
 
     def deliver(self) -> int:
         """Call the callbacks for pending changes in this thread, as `Node.spin` does.
@@ -474,15 +481,15 @@ class Blackboard:
                     now = self._clock()
                 calls += 1
                 if is_there:
-                    observer.callback(BlackboardChange(_public(change.entry, now), change.cause))
+                    observer.callback(BlackboardChange(_public_entry(change.entry, now), change.cause))
         finally:
-            self._schedule()
+            self._schedule_delivery()
         return calls
 
     def _expire_locked(self) -> float:
         # Call with the lock held. Returns the current time.
         now = self._clock()
-        if self._entries.next_end <= now:
+        if self._entries.next_expiry <= now:
             removed = self._entries.expire(now)
             if removed:
                 self._queue_changes_locked(removed)
@@ -500,17 +507,17 @@ class Blackboard:
                 self._pending_bytes -= oldest.entry.bytes
                 self.changes_dropped += 1
 
-    def _schedule(self) -> None:
+    def _schedule_delivery(self) -> None:
         node = self._node
         with self._updated:
             if node is None or not self._observers or self._is_closed:
                 return
             now = self._clock()
-            due = now if self._pending else self._entries.next_end
+            due = now if self._pending else self._entries.next_expiry
             if math.isinf(due) or self._timer_at <= due:
                 return
             self._timer_at = due
-            wait_s = _IMMEDIATE_S if self._pending else max(_MIN_TIMER_S, due - now)
+            wait_s = _IMMEDIATE_DELAY_S if self._pending else max(_MIN_TIMER_S, due - now)
         timers: list[Timer] = []
 
         def call() -> None:
@@ -547,7 +554,7 @@ class Blackboard:
         """Reset locks and close watches in a forked child process; values stay. See `nep.system.forks`."""
         self._is_closed = self._is_forked = True
         if self._lock.locked():  # held by a thread of the parent: the tree may be half-updated
-            self._entries = self._entries.rebuilt()
+            self._entries = self._entries.rebuilt_copy()
         self._lock = threading.Lock()
         self._updated = threading.Condition(self._lock)
         self._observers = ()
@@ -566,33 +573,33 @@ class Blackboard:
 
 
 def _lifetime(lives_s: object) -> float:
-    found = seconds("lives_s", lives_s)
-    return math.inf if found is None else period("lives_s", found)
+    found = check_optional_time_limit("lives_s", lives_s)
+    return math.inf if found is None else check_period("lives_s", found)
 
 
-def _copied_value(key: Key, value: object) -> object:
+def _copy_value(key: Key, value: object) -> object:
     try:
-        return copied(value)
+        return deep_copy(value)
     except (ValueError, RecursionError) as error:
         raise BadValueError(key_text(key), _("it contains itself, or has too many levels")) from error
 
 
-def _public(entry: StoredEntry, now: float) -> BlackboardEntry:
+def _public_entry(entry: StoredEntry, now: float) -> BlackboardEntry:
     return BlackboardEntry(
         key_text(entry.key),
-        copied(entry.value),
+        deep_copy(entry.value),
         entry.age_s(now),
         entry.age_by,
         entry.source,
         entry.robot,
         entry.stamp_ns,
-        max(0.0, entry.expires - now),
+        max(0.0, entry.expires_at - now),
     )
 
 
-def _composed(found: Sequence[StoredEntry], key: Key) -> object:
+def _compose(found: Sequence[StoredEntry], key: Key) -> object:
     if found[0].key == key:
-        return copied(found[0].value)
+        return deep_copy(found[0].value)
     whole: dict[str, object] = {}
     for entry in found:
         *names, last = entry.key[len(key) :]
@@ -601,5 +608,5 @@ def _composed(found: Sequence[StoredEntry], key: Key) -> object:
             after = at.setdefault(name, {})
             if isinstance(after, dict):  # always true: no value is stored above another
                 at = after
-        at[last] = copied(entry.value)
+        at[last] = deep_copy(entry.value)
     return whole

@@ -22,7 +22,7 @@ AgeBy = Literal["stamp", "arrival"]
 Cause = Literal["new", "changed", "replaced", "removed", "expired", "dropped"]
 _ENTRY_BYTES = 600
 _NAME_BYTES = 100
-_MAX_STALE_ENDS = 1_000
+_MAX_STALE_EXPIRIES = 1_000
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class StoredEntry:
 
     key: Key
     value: object
-    since: float
+    age_start: float
     age_by: AgeBy = "arrival"
-    expires: float = math.inf
+    expires_at: float = math.inf
     stamp_ns: int | None = None
     publisher: int | None = None
     source: str = ""
@@ -59,7 +59,7 @@ class StoredEntry:
 
     def age_s(self, now: float) -> float:
         """Return the age at `now`; 0 if the start is in the future because a clock was set back."""
-        return max(0.0, now - self.since)
+        return max(0.0, now - self.age_start)
 
 
 class EntryChange(NamedTuple):
@@ -94,15 +94,15 @@ class Entries:
         return len(self._by_age)
 
     @property
-    def next_end(self) -> float:
+    def next_expiry(self) -> float:
         """Time at which `expire` must be called next; infinite if no entry expires."""
         return self._expiry_heap[0][0] if self._expiry_heap else math.inf
 
-    def rebuilt(self) -> Entries:
+    def rebuilt_copy(self) -> Entries:
         """Return a new store built from the entries, for a fork that interrupted an update of the tree."""
         copy = Entries(self._max_keys, self._max_bytes)
         for entry in list(self._by_age.values()):
-            copy.put(entry, -math.inf)
+            copy.store(entry, -math.inf)
         copy.dropped, copy.outdated = self.dropped, self.outdated
         return copy
 
@@ -112,23 +112,23 @@ class Entries:
         """Return the entry of the key itself, or None."""
         return self._by_age.get(key)
 
-    def below(self, key: Key) -> Iterator[StoredEntry]:
+    def entries_below(self, key: Key) -> Iterator[StoredEntry]:
         """Yield the entry of a key, or the entries of all keys below."""
-        found = self._at(key)
+        found = self._find(key)
         if isinstance(found, StoredEntry):
             yield found
         elif found is not None:
-            yield from _all_of(found)
+            yield from _entries_in(found)
 
-    def matching(self, pattern: Key) -> Iterator[StoredEntry]:
+    def entries_matching(self, pattern: Key) -> Iterator[StoredEntry]:
         """Yield the entries whose keys match a pattern, in tree order."""
         beginning = literal_levels(pattern)
-        found = self.below(beginning)
+        found = self.entries_below(beginning)
         if pattern == (*beginning, "**"):
             return found
         return (each for each in found if key_matches(pattern, each.key))
 
-    def _at(self, key: Key) -> StoredEntry | _Tree | None:
+    def _find(self, key: Key) -> StoredEntry | _Tree | None:
         found: StoredEntry | _Tree | None = self._tree
         for name in key:
             if not isinstance(found, _Tree):
@@ -138,7 +138,7 @@ class Entries:
 
     # ---- changing
 
-    def put(self, entry: StoredEntry, now: float) -> list[EntryChange]:
+    def store(self, entry: StoredEntry, now: float) -> list[EntryChange]:
         """Store an entry unless another publisher's newer entry exists; return the changes.
 
         Entries of keys above and below are replaced. Raises `BadValueError` if the entry exceeds the memory
@@ -148,12 +148,12 @@ class Entries:
             template = _("it needs {size} bytes, but at most {most} are allowed")
             raise BadValueError(key_text(entry.key), template.format(size=entry.bytes, most=self._max_bytes))
         before = self.get(entry.key)
-        if entry.expires <= now or (before is not None and _is_newer(before, entry, now)):
+        if entry.expires_at <= now or (before is not None and _is_newer(before, entry, now)):
             self.outdated += 1
             return []
         changes: list[EntryChange] = []
         if before is None:
-            for each in self._conflicting(entry.key):
+            for each in self._conflicting_entries(entry.key):
                 self._pop(each.key)
                 changes.append(EntryChange(each, "replaced"))
             changes.append(EntryChange(entry, "new"))
@@ -169,11 +169,11 @@ class Entries:
 
     def has_below(self, key: Key) -> bool:
         """Return True if there are entries below a key."""
-        return isinstance(self._at(key), _Tree)
+        return isinstance(self._find(key), _Tree)
 
     def remove(self, key: Key) -> list[EntryChange]:
         """Remove the entries of a key and of all keys below; return the changes."""
-        return [EntryChange(self._pop(each.key), "removed") for each in list(self.below(key))]
+        return [EntryChange(self._pop(each.key), "removed") for each in list(self.entries_below(key))]
 
     def expire(self, now: float) -> list[EntryChange]:
         """Remove expired entries; return the changes."""
@@ -184,15 +184,15 @@ class Entries:
                 continue
             del self._expiry_of[key]
             entry = self.get(key)
-            if entry is None or math.isinf(entry.expires):
+            if entry is None or math.isinf(entry.expires_at):
                 continue
-            if entry.expires > now:  # it was updated since
+            if entry.expires_at > now:  # it was updated since
                 self._add_expiry(entry)
             else:
                 changes.append(EntryChange(self._pop(key), "expired"))
         return changes
 
-    def _conflicting(self, key: Key) -> list[StoredEntry]:
+    def _conflicting_entries(self, key: Key) -> list[StoredEntry]:
         found: StoredEntry | _Tree = self._tree
         for name in key:
             if isinstance(found, StoredEntry):
@@ -201,7 +201,7 @@ class Entries:
             if after is None:
                 return []
             found = after
-        return [found] if isinstance(found, StoredEntry) else list(_all_of(found))
+        return [found] if isinstance(found, StoredEntry) else list(_entries_in(found))
 
     def _insert(self, entry: StoredEntry) -> None:
         at = self._tree
@@ -214,24 +214,24 @@ class Entries:
         self._by_age[entry.key] = entry
         self._by_age.move_to_end(entry.key)
         self.bytes += entry.bytes
-        if not math.isinf(entry.expires):
+        if not math.isinf(entry.expires_at):
             self._add_expiry(entry)
 
     def _add_expiry(self, entry: StoredEntry) -> None:
-        if entry.expires >= self._expiry_of.get(entry.key, math.inf):
+        if entry.expires_at >= self._expiry_of.get(entry.key, math.inf):
             return
         if (
-            len(self._expiry_heap) > 2 * len(self._by_age) + _MAX_STALE_ENDS
+            len(self._expiry_heap) > 2 * len(self._by_age) + _MAX_STALE_EXPIRIES
         ):  # drop stale heap entries of deleted keys
             self._expiry_of = {
-                each.key: each.expires for each in self._by_age.values() if each.expires < math.inf
+                each.key: each.expires_at for each in self._by_age.values() if each.expires_at < math.inf
             }
             self._expiry_heap = [(end, key) for key, end in self._expiry_of.items()]
             heapq.heapify(self._expiry_heap)
             if entry.key in self._expiry_of:
                 return
-        self._expiry_of[entry.key] = entry.expires
-        heapq.heappush(self._expiry_heap, (entry.expires, entry.key))
+        self._expiry_of[entry.key] = entry.expires_at
+        heapq.heappush(self._expiry_heap, (entry.expires_at, entry.key))
 
     def _pop(self, key: Key) -> StoredEntry:
         entry = self._by_age.pop(key)
@@ -254,13 +254,13 @@ def _is_newer(before: StoredEntry, entry: StoredEntry, now: float) -> bool:
     # publisher arrive in order, whatever its clock does; `before` may be in the future if our clock was set
     # back.
     return entry.age_by == before.age_by == "stamp" and (
-        entry.publisher != before.publisher and entry.since < before.since <= now
+        entry.publisher != before.publisher and entry.age_start < before.age_start <= now
     )
 
 
-def _all_of(tree: _Tree) -> Iterator[StoredEntry]:
+def _entries_in(tree: _Tree) -> Iterator[StoredEntry]:
     for each in tree.values():
         if isinstance(each, StoredEntry):
             yield each
         else:
-            yield from _all_of(each)
+            yield from _entries_in(each)

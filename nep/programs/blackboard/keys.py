@@ -15,20 +15,20 @@ from nep.protocol.topic_pattern import levels_match
 Key = tuple[str, ...]
 MAX_LEVELS = 32
 _MAX_CHARACTERS = 1_000
-_MAX_WRITTEN_LENGTH = 2 * _MAX_CHARACTERS + MAX_LEVELS
+_MAX_KEY_TEXT_LENGTH = 2 * _MAX_CHARACTERS + MAX_LEVELS
 """Length of the longest written key: every character escaped, plus dots."""
 _SPECIAL = re.compile(r"([.\\])")
 _NAME = re.compile(r"((?:[^.\\]|\\.|\\$)*)(?:\.|$)", re.DOTALL)
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
-_WILD = frozenset({"*", "**"})
+_WILDCARDS = frozenset({"*", "**"})
 
 
 def parse_key(key: str | Sequence[str]) -> Key:
     """Split a key into its names; a tuple is returned unchanged. Raises `BadKeyError`."""
     if isinstance(key, str):
-        if len(key) > _MAX_WRITTEN_LENGTH:  # splitting it would take long
-            raise _too_long(key)
-        names = tuple(key.split(".")) if "\\" not in key else _names(key)
+        if len(key) > _MAX_KEY_TEXT_LENGTH:  # splitting it would take long
+            raise _too_long_error(key)
+        names = tuple(key.split(".")) if "\\" not in key else _split_names(key)
     elif isinstance(key, tuple) and all(isinstance(each, str) for each in key):
         names = key
     else:
@@ -38,7 +38,7 @@ def parse_key(key: str | Sequence[str]) -> Key:
     if len(names) > MAX_LEVELS:
         raise BadKeyError(key_text(names), _("use at most {most} names").format(most=MAX_LEVELS))
     if sum(map(len, names)) > _MAX_CHARACTERS:
-        raise _too_long(key_text(names))
+        raise _too_long_error(key_text(names))
     try:
         "".join(names).encode()
     except UnicodeEncodeError:
@@ -46,11 +46,11 @@ def parse_key(key: str | Sequence[str]) -> Key:
     return names
 
 
-def _too_long(key: str) -> BadKeyError:
+def _too_long_error(key: str) -> BadKeyError:
     return BadKeyError(key, _("use at most {most} characters").format(most=_MAX_CHARACTERS))
 
 
-def _names(text: str) -> Key:
+def _split_names(text: str) -> Key:
     found, at = [], 0
     while True:
         match = _NAME.match(text, at)
@@ -80,6 +80,6 @@ def key_matches(pattern: Key, key: Key) -> bool:
 def literal_levels(pattern: Key) -> Key:
     """Return the names of a pattern before its first wildcard."""
     for number, name in enumerate(pattern):
-        if name in _WILD:
+        if name in _WILDCARDS:
             return pattern[:number]
     return pattern

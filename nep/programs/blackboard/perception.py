@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from nep.errors import DecodeError
 from nep.messages.codecs import JSON
-from nep.messages.message import NOTHING
+from nep.messages.message import NO_EXTENSION
 
 _QUOTES = "'\""
 
@@ -32,11 +32,11 @@ class Perception(NamedTuple):
     robot: str
 
 
-def perception_in(payload: object) -> Perception | None:
+def parse_perception(payload: object) -> Perception | None:
     """Parse a payload as a perception; return None for other messages."""
     if isinstance(payload, Mapping) and len(payload) == 1 and isinstance(payload.get("data"), str):
         try:
-            payload = JSON.decode(payload["data"].encode("utf-8", "surrogatepass"), NOTHING)
+            payload = JSON.decode(payload["data"].encode("utf-8", "surrogatepass"), NO_EXTENSION)
         except DecodeError:
             return None
     if not isinstance(payload, Mapping):
@@ -48,11 +48,11 @@ def perception_in(payload: object) -> Perception | None:
         given = {given: 1}
     if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
         return None
-    values = {name.strip(_QUOTES): _parsed_number(value) for name, value in given.items()}
+    values = {name.strip(_QUOTES): _parse_number(value) for name, value in given.items()}
     return Perception(primitive, values, robot if isinstance(robot, str) else "")
 
 
-def _parsed_number(value: object) -> object:
+def _parse_number(value: object) -> object:
     if not isinstance(value, str):
         return value
     try:

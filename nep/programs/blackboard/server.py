@@ -24,7 +24,7 @@ from nep.i18n import _
 from nep.messages.codecs import numpy_option
 from nep.nodes.node import Node
 from nep.programs.blackboard.board import Blackboard, BlackboardChange, BlackboardEntry
-from nep.system.arguments import seconds
+from nep.system.arguments import check_optional_time_limit
 from nep.text import bounded_str
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ MAX_ENTRIES = 10_000
 _MAX_REPLY_BYTES = 32 * 2**20
 
 
-def service_of(name: str, what: str) -> str:
+def service_name(name: str, what: str) -> str:
     """Return the name of a blackboard's service; `what` is "get", "set" or "keys"."""
     return f"{name}/{what}"
 
@@ -55,20 +55,20 @@ class BlackboardServer:
         self._changes = node.new_pub(f"/{name.lstrip('/')}/changes", "json")
         board.ignore(self._changes.id)
         self._servers = [
-            node.new_server(service_of(name, what), answer)
+            node.new_server(service_name(name, what), answer)
             for what, answer in (("get", self._get), ("set", self._set), ("keys", self._keys))
         ]
         self._end = board.on_change("**", self._publish_change)
 
     def _publish_change(self, change: BlackboardChange) -> None:
-        change_map = {"blackboard": self._name, "cause": change.cause, **_as_map(change.entry)}
+        change_map = {"blackboard": self._name, "cause": change.cause, **_entry_map(change.entry)}
         if change.is_gone:
             change_map["value"] = None
         self._changes.publish(change_map)
 
     def _get(self, request: object) -> object:
-        fields = _request(request)
-        max_age_s = seconds("max_age_s", fields.get("max_age_s"))
+        fields = _checked_request(request)
+        max_age_s = check_optional_time_limit("max_age_s", fields.get("max_age_s"))
         if "key" not in fields:
             return self._entries(_text(fields, "pattern", "**"), math.inf if max_age_s is None else max_age_s)
         key = _text(fields, "key")
@@ -76,14 +76,14 @@ class BlackboardServer:
         value = self._board.get(key, missing, max_age_s=max_age_s)
         if value is missing:
             return {"found": False, "value": fields.get("default"), "age_s": None}
-        return {"found": True, "value": _sendable(value), "age_s": _finite(self._board.age_s(key))}
+        return {"found": True, "value": _to_sendable(value), "age_s": _finite_or_none(self._board.age_s(key))}
 
     def _entries(self, pattern: str, max_age_s: float) -> object:
         young = [each for each in self._board.snapshot(pattern).values() if each.age_s <= max_age_s]
         entries: list[object] = []
         room = _MAX_REPLY_BYTES
         for each in young[:MAX_ENTRIES]:
-            entry = _as_map(each)
+            entry = _entry_map(each)
             room -= len(orjson.dumps(entry, option=orjson.OPT_NON_STR_KEYS | numpy_option()))
             if room < 0 and entries:
                 break
@@ -91,8 +91,8 @@ class BlackboardServer:
         return {"entries": entries, "more": len(young) - len(entries)}
 
     def _set(self, request: object) -> object:
-        fields = _request(request)
-        lives_s = seconds("lives_s", fields.get("lives_s"))
+        fields = _checked_request(request)
+        lives_s = check_optional_time_limit("lives_s", fields.get("lives_s"))
         if "key" in fields and "value" in fields:
             values: Mapping[object, object] = {_text(fields, "key"): fields["value"]}
         else:
@@ -105,7 +105,7 @@ class BlackboardServer:
         return {"set": len(values)}
 
     def _keys(self, request: object) -> object:
-        found = self._board.keys(_text(_request(request), "pattern", "**"))
+        found = self._board.keys(_text(_checked_request(request), "pattern", "**"))
         return {"keys": found[:MAX_ENTRIES], "more": max(0, len(found) - MAX_ENTRIES)}
 
     def close(self) -> None:
@@ -122,7 +122,7 @@ class BlackboardServer:
         self.close()
 
 
-def _request(request: object) -> Mapping[object, object]:
+def _checked_request(request: object) -> Mapping[object, object]:
     if not isinstance(request, Mapping):
         raise NepError(
             _("a request to a blackboard must be a map, such as {example}").format(
@@ -139,19 +139,19 @@ def _text(fields: Mapping[object, object], field: str, default: str | None = Non
     return value
 
 
-def _as_map(entry: BlackboardEntry) -> dict[str, object]:
+def _entry_map(entry: BlackboardEntry) -> dict[str, object]:
     return {
         "key": entry.key,
-        "value": _sendable(entry.value),
+        "value": _to_sendable(entry.value),
         "age_s": entry.age_s,
         "age_by": entry.age_by,
         "source": entry.source,
         "robot": entry.robot,
-        "left_s": _finite(entry.left_s),
+        "left_s": _finite_or_none(entry.left_s),
     }
 
 
-def _sendable(value: object) -> object:
+def _to_sendable(value: object) -> object:
     # Falls back to Python's notation for values that JSON lacks, so that one value doesn't hide the others.
     try:
         orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS | numpy_option())
@@ -163,5 +163,5 @@ def _sendable(value: object) -> object:
     return value
 
 
-def _finite(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping
 from nep.programs.blackboard.keys import MAX_LEVELS, Key
 
 _MAX_DEPTH = 100
-_PLAIN = frozenset({int, float, bool, type(None)})
+_SCALAR_TYPES = frozenset({int, float, bool, type(None)})
 _NUMBER_BYTES = 40
 _ITEM_BYTES = 8
 
 
-def copied(value: object, depth: int = _MAX_DEPTH) -> object:
+def deep_copy(value: object, depth: int = _MAX_DEPTH) -> object:
     """Return a deep copy of lists and maps.
 
     Raises `ValueError` if the value is too deep or contains itself.
@@ -22,20 +22,20 @@ def copied(value: object, depth: int = _MAX_DEPTH) -> object:
     if isinstance(value, list | tuple):
         if _has_only_numbers(value):
             return list(value)
-        return [copied(each, _below(depth)) for each in value]
+        return [deep_copy(each, _decrement_depth(depth)) for each in value]
     if isinstance(value, Mapping):
-        return {key: copied(each, _below(depth)) for key, each in value.items()}
+        return {key: deep_copy(each, _decrement_depth(depth)) for key, each in value.items()}
     return bytes(value) if isinstance(value, bytearray | memoryview) else value
 
 
-def _below(depth: int) -> int:
+def _decrement_depth(depth: int) -> int:
     if depth <= 0:
         raise ValueError(f"{_MAX_DEPTH}")
     return depth - 1
 
 
 def _has_only_numbers(value: list[object] | tuple[object, ...]) -> bool:
-    return _PLAIN.issuperset(map(type, value))
+    return _SCALAR_TYPES.issuperset(map(type, value))
 
 
 def size_of(value: object) -> int:

@@ -13,7 +13,7 @@ from nep.i18n import _
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
 from nep.programs.blackboard.keys import Key, key_of_topic, key_text, parse_key
-from nep.programs.blackboard.perception import perception_in
+from nep.programs.blackboard.perception import parse_perception
 from nep.programs.blackboard.values import leaves
 from nep.system.log_rarely import is_logged
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 _logger = logging.getLogger("nep.programs.blackboard")
-_HOLE = re.compile(r"\{([^{}]+)\}")
+_PLACEHOLDER = re.compile(r"\{([^{}]+)\}")
 _MISSING = object()
 
 
@@ -34,7 +34,7 @@ class PerceivedValue(NamedTuple):
     robot: str
 
 
-class MessageReading:
+class MessageMapping:
     """Conversion of a topic's messages to keys and values. Performs no input or output.
 
     Args:
@@ -50,7 +50,7 @@ class MessageReading:
         each: str = "",
     ) -> None:
         self._key = None if key is None else parse_key(key)
-        self._has_holes = any(_HOLE.search(name) for name in self._key or ())
+        self._has_holes = any(_PLACEHOLDER.search(name) for name in self._key or ())
         self._each = parse_key(each) if each else ()
         if isinstance(fields, str):
             raise WrongTypeError(_("'fields' must be a list of names, not a string"))
@@ -63,15 +63,15 @@ class MessageReading:
         Raises `NepError` if the field `each` isn't a list.
         """
         if self._each:
-            found = _field(payload, self._each)
+            found = _field_value(payload, self._each)
             if not isinstance(found, list | tuple):
                 raise NepError(_("it has no list in the field '{field}'").format(field=key_text(self._each)))
             return found
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
 
-    def findings(self, topic: str, item: object) -> Iterator[PerceivedValue]:
+    def perceived_values(self, topic: str, item: object) -> Iterator[PerceivedValue]:
         """Yield the values of an item with their keys. Raises `NepError` if a key can't be formed."""
-        seen = None if self._fields is not None else perception_in(item)
+        seen = None if self._fields is not None else parse_perception(item)
         if seen is not None:
             beginning = () if self._key is None else self._key_for(item)
             for key, value in leaves(seen.values, (*beginning, *parse_key(seen.primitive))):
@@ -80,26 +80,28 @@ class MessageReading:
         beginning = key_of_topic(topic) if self._key is None else self._key_for(item)
         robot = item.get("robot") if isinstance(item, Mapping) else None
         robot_name = robot if isinstance(robot, str) else ""
-        for at, value in self._chosen(item):
+        for at, value in self._selected_fields(item):
             for key, leaf in leaves(value, (*beginning, *at)):
                 yield PerceivedValue(key, leaf, robot_name)
 
-    def _chosen(self, item: object) -> Iterator[tuple[Key, object]]:
+    def _selected_fields(self, item: object) -> Iterator[tuple[Key, object]]:
         if self._fields is None:
             yield (), item
             return
         for field, name in self._fields:
-            value = _field(item, field)
+            value = _field_value(item, field)
             if value is not _MISSING:
                 yield name, value
 
     def _key_for(self, item: object) -> Key:
         if not self._has_holes:
             return self._key or ()
-        return tuple(_HOLE.sub(lambda found: _name_in(item, found[1]), name) for name in self._key or ())
+        return tuple(
+            _PLACEHOLDER.sub(lambda found: _name_from_field(item, found[1]), name) for name in self._key or ()
+        )
 
 
-def _field(item: object, path: Key) -> object:
+def _field_value(item: object, path: Key) -> object:
     for name in path:
         if not isinstance(item, Mapping) or name not in item:
             return _MISSING
@@ -107,7 +109,7 @@ def _field(item: object, path: Key) -> object:
     return item
 
 
-def _name_in(item: object, field: str) -> str:
+def _name_from_field(item: object, field: str) -> str:
     value = item.get(field) if isinstance(item, Mapping) else None
     if isinstance(value, bool) or not isinstance(value, str | int) or value == "":
         raise NepError(_("it has no name or number in the field '{field}'").format(field=field))
@@ -128,7 +130,7 @@ class BlackboardWatch:
     def __init__(
         self,
         topic: str,
-        reading: MessageReading,
+        reading: MessageMapping,
         keep: Callable[[Message, Sequence[PerceivedValue]], None],
         *,
         is_pattern: bool,
@@ -175,7 +177,7 @@ class BlackboardWatch:
         problem: NepError | None = None
         for item in self._reading.items(payload):
             try:
-                self._store(message, tuple(self._reading.findings(message.topic, item)))
+                self._store(message, tuple(self._reading.perceived_values(message.topic, item)))
             except NepError as error:
                 problem = error  # the other items are stored
         if problem is not None:

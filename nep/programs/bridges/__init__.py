@@ -11,8 +11,8 @@ from nep.programs.bridges.configuration import (
     BridgeTopic,
     SideConfiguration,
     TopicEnd,
-    join_line,
-    side_of,
+    configuration_from_arguments,
+    side_configuration,
 )
 from nep.programs.bridges.route import Route, RouteCounts
 from nep.programs.bridges.toml_file import read_configuration
@@ -25,7 +25,7 @@ __all__ = [
     "RouteCounts",
     "SideConfiguration",
     "TopicEnd",
-    "join_line",
+    "configuration_from_arguments",
     "read_configuration",
-    "side_of",
+    "side_configuration",
 ]

@@ -19,13 +19,13 @@ from nep.programs.bridges.configuration import (
     BridgeConfiguration,
     BridgeTopic,
     SideName,
-    checked_topic_names,
+    check_topic_names,
 )
-from nep.programs.bridges.other_bridges import OtherBridges, Way
+from nep.programs.bridges.other_bridges import OtherBridges, RouteKey
 from nep.programs.bridges.pacer import Pacer
 from nep.programs.bridges.route import Route, RouteEnd
 from nep.programs.bridges.side import BridgeSide
-from nep.programs.bridges.topic_types import type_in
+from nep.programs.bridges.topic_types import published_type
 from nep.programs.bridges.trail import LoopGuard
 from nep.protocol.graph_view import GraphView
 
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 MAX_ROUTES = 500
 """Maximum number of routes that patterns create, in both directions."""
-IDLE_S = 60.0
+IDLE_TIMEOUT_S = 60.0
 """Time in seconds after which a pattern's route is removed if its topic has no publisher."""
-_OWN_TOPICS = "/nep/"
+_INTERNAL_PREFIX = "/nep/"
 _WAIT_SLICE_S = 0.05
 _FLUSH_TIMEOUT_S, _JOIN_TIMEOUT_S = 2.0, 0.2
 _logger = logging.getLogger("nep")
@@ -88,7 +88,7 @@ class Bridge:
         for topic in self.configuration.topics:
             if not topic.is_pattern:
                 for origin in topic.origins:
-                    self._add(topic, origin, topic.a.name, topic.b.name)
+                    self._add_route(topic, origin, topic.a.name, topic.b.name)
         for side in self.sides.values():
             side.start(self)
 
@@ -123,7 +123,7 @@ class Bridge:
         Waits at most `timeout_s` seconds until both graphs and the descriptions of their robots are known.
         """
         deadline = time.monotonic() + timeout_s
-        while not all(side.knows_robots for side in self.sides.values()) and time.monotonic() < deadline:
+        while not all(side.is_guard_ready for side in self.sides.values()) and time.monotonic() < deadline:
             self._closed.wait(_WAIT_SLICE_S)
         refusals = (each.refusal for each in self._routes if not each.is_found)
         return tuple(dict.fromkeys(filter(None, refusals)))
@@ -147,7 +147,7 @@ class Bridge:
                 {
                     "from": {"side": each.origin.side, "topic": each.origin.topic},
                     "to": {"side": each.end.side, "topic": each.end.topic},
-                    "trouble": each.trouble,
+                    "trouble": each.connection_problem,
                     "rival": each.rival,
                     **asdict(each.counts()),
                 }
@@ -157,13 +157,13 @@ class Bridge:
 
     # ---- routes
 
-    def _add(self, topic: BridgeTopic, origin: SideName, a: str, b: str) -> None:
+    def _add_route(self, topic: BridgeTopic, origin: SideName, a: str, b: str) -> None:
         with self._lock:
             way = (origin, a, b)
             if way in self._known:
                 return
             self._known.add(way)
-            ends = {"a": self._end(topic, "a", a), "b": self._end(topic, "b", b)}
+            ends = {"a": self._route_end(topic, "a", a), "b": self._route_end(topic, "b", b)}
             end: SideName = "b" if origin == "a" else "a"
             route = Route(
                 ends[origin],
@@ -177,7 +177,7 @@ class Bridge:
             route.is_found = topic.is_pattern
             self._routes = (*self._routes, route)
 
-    def _end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
+    def _route_end(self, topic: BridgeTopic, side: SideName, name: str) -> RouteEnd:
         side_configuration, end = self.configuration.side(side), topic.end(side)
         echoes = self._echoes.setdefault((side, name), LoopGuard())
         guard = self.sides[side].guard
@@ -198,11 +198,15 @@ class Bridge:
         self._close_idle_routes(side, view, time.monotonic())
         named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
         for name in view.topics:
-            if name in named or name.startswith(_OWN_TOPICS) or not type_in(view, name, self.own_nodes):
+            if (
+                name in named
+                or name.startswith(_INTERNAL_PREFIX)
+                or not published_type(view, name, self.own_nodes)
+            ):
                 continue
-            for topic, a, b in self._matches(side.name, name):
+            for topic, a, b in self._matching_topics(side.name, name):
                 if len(self._routes) < MAX_ROUTES:
-                    self._add(topic, side.name, a, b)
+                    self._add_route(topic, side.name, a, b)
                 elif not self._is_full and (side.name, a, b) not in self._known:
                     self._is_full = True
                     _logger.warning(
@@ -216,11 +220,11 @@ class Bridge:
         for route in self._routes:
             if not route.is_found or route.origin.side != side.name:
                 continue
-            if type_in(view, route.origin.topic, self.own_nodes):
+            if published_type(view, route.origin.topic, self.own_nodes):
                 route.idle_since = None
             elif route.idle_since is None:
                 route.idle_since = now
-            elif now - route.idle_since >= IDLE_S:
+            elif now - route.idle_since >= IDLE_TIMEOUT_S:
                 with self._lock:
                     self._routes = tuple(each for each in self._routes if each is not route)
                     a, b = route.origin, route.end
@@ -247,15 +251,15 @@ class Bridge:
         keeps_trails = any(
             side.backend.has_extensions for side in (self.configuration.a, self.configuration.b)
         )
-        others = self._others.between(time.monotonic())
+        others = self._others.parallel_bridges(time.monotonic())
         for route in self._routes:
             origin, end = route.origin, route.end
-            back: Way = (end.side, end.topic, origin.topic)
-            stronger = [each for each in others if each.id < self.id and back in each.ways]
+            back: RouteKey = (end.side, end.topic, origin.topic)
+            stronger = [each for each in others if each.id < self.id and back in each.routes]
             route.rival = stronger[0].name if stronger and not keeps_trails else ""
-            same: Way = (origin.side, origin.topic, end.topic)
+            same: RouteKey = (origin.side, origin.topic, end.topic)
             for each in others:
-                if {same, back} & each.ways and each.id not in self._warned:
+                if {same, back} & each.routes and each.id not in self._warned:
                     self._warned.add(each.id)
                     _logger.warning(
                         "the bridge '%s' also forwards '%s' and '%s': messages arrive twice or loop; "
@@ -265,15 +269,15 @@ class Bridge:
                         end.topic,
                     )
 
-    def _matches(self, side: SideName, name: str) -> Iterator[tuple[BridgeTopic, str, str]]:
+    def _matching_topics(self, side: SideName, name: str) -> Iterator[tuple[BridgeTopic, str, str]]:
         for topic in self.configuration.topics:
             if topic.is_pattern and side in topic.origins:
-                part = topic.end(side).part_in(name)
+                part = topic.end(side).matched_part(name)
                 if not part:
                     continue
                 a, b = topic.a.with_part(part), topic.b.with_part(part)
                 try:
-                    checked_topic_names(a, b)
+                    check_topic_names(a, b)
                 except NepError:
                     continue  # the name would be too long on the other side
                 yield topic, a, b
@@ -290,7 +294,7 @@ class Bridge:
         for side in self.sides.values():
             side.join(_JOIN_TIMEOUT_S)  # a thread waiting for a missing master ends later, with its node
         for route in self._routes:
-            route.end_taking()
+            route.unsubscribe()
         self._pacer.close(max(0.1, timeout_s))
         for side in self.sides.values():
             side.node.close(max(0.0, deadline - time.monotonic()))

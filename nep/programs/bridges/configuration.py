@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from nep.backends.base import Backend, backend_named
+from nep.backends.base import Backend, find_backend
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
 from nep.protocol.wire import check_node_name, check_topic
@@ -65,7 +65,7 @@ class TopicEnd:
         found = _WILDCARD.search(self.name)
         return found.group() if found is not None else ""
 
-    def part_in(self, topic: str) -> str:
+    def matched_part(self, topic: str) -> str:
         """Return the part of `topic` that the wildcard stands for, or "" if the pattern doesn't match."""
         before, wildcard, after = self.name.partition(self.wildcard or "*")
         part = topic.removeprefix(before).removesuffix(after)
@@ -142,7 +142,7 @@ def checked_name(name: str) -> str:
     return name
 
 
-def side_of(backend: str, master: str = "", network: str = "") -> SideConfiguration:
+def side_configuration(backend: str, master: str = "", network: str = "") -> SideConfiguration:
     """Create the configuration of a side. Raises `NepError` for an unknown back end or an invalid address.
 
     Args:
@@ -150,7 +150,7 @@ def side_of(backend: str, master: str = "", network: str = "") -> SideConfigurat
         master: Address of the master (default: the back end's default).
         network: Id of the network (default: derived from the address).
     """
-    found = backend_named(backend)
+    found = find_backend(backend)
     try:
         place = found.master(master or None)
     except ValueError as error:  # also invalid numbers
@@ -159,17 +159,17 @@ def side_of(backend: str, master: str = "", network: str = "") -> SideConfigurat
                 master=master, backend=found.name
             )
         ) from error
-    return SideConfiguration(found, place, network or _network(found, place))
+    return SideConfiguration(found, place, network or _network_id(found, place))
 
 
-def _network(backend: Backend, master: str) -> str:
+def _network_id(backend: Backend, master: str) -> str:
     name = f"{backend.name}:{master}"
     if backend.is_in_process:
         return f"{name}@{platform.node()}/{os.getpid()}"
     return name if _REACHABLE_ADDRESS.search(master) else f"{name}@{platform.node()}"
 
 
-def checked_topic_names(a: str, b: str) -> None:
+def check_topic_names(a: str, b: str) -> None:
     """Raise `NepError` unless these are valid names of a topic or pattern on both sides."""
     wildcards = []
     for name in (check_topic(a), check_topic(b)):
@@ -189,7 +189,7 @@ def checked_topic_names(a: str, b: str) -> None:
         )
 
 
-def direction_named(name: str) -> Direction:
+def parse_direction(name: str) -> Direction:
     """Validate a direction and return it. Raises `NepError`."""
     if name not in DIRECTIONS:
         raise NepError(
@@ -200,7 +200,7 @@ def direction_named(name: str) -> Direction:
     return DIRECTIONS[name]
 
 
-def join_line(
+def configuration_from_arguments(
     a: str, b: str, *, name: str, direction: str = "both", max_rate_hz: float = 0.0
 ) -> BridgeConfiguration:
     """Create the configuration for `nep bridge A B`. Raises `NepError`.
@@ -208,17 +208,17 @@ def join_line(
     `a` and `b` have the form BACKEND:TOPIC or BACKEND@MASTER:TOPIC. A side without a topic (`ros:`) has the
     topic of the other side.
     """
-    (a_side, a_topic), (b_side, b_topic) = _side_and_topic(a), _side_and_topic(b)
+    (a_side, a_topic), (b_side, b_topic) = _parse_side_and_topic(a), _parse_side_and_topic(b)
     a_topic, b_topic = a_topic or b_topic, b_topic or a_topic
     if not a_topic:
         raise NepError(_("the topic name is missing; write it as 'zeromq:/topic ros:/topic'"))
-    checked_topic_names(a_topic, b_topic)
-    check_apart(a_side, b_side)
-    topic = BridgeTopic(TopicEnd(a_topic), TopicEnd(b_topic), direction_named(direction), max_rate_hz)
+    check_topic_names(a_topic, b_topic)
+    check_different_networks(a_side, b_side)
+    topic = BridgeTopic(TopicEnd(a_topic), TopicEnd(b_topic), parse_direction(direction), max_rate_hz)
     return BridgeConfiguration(checked_name(name), a_side, b_side, (topic,))
 
 
-def check_apart(a: SideConfiguration, b: SideConfiguration) -> None:
+def check_different_networks(a: SideConfiguration, b: SideConfiguration) -> None:
     """Raise `NepError` if both sides are the same network, because every message would return."""
     if a.network == b.network:
         raise NepError(
@@ -228,7 +228,7 @@ def check_apart(a: SideConfiguration, b: SideConfiguration) -> None:
         )
 
 
-def _side_and_topic(word: str) -> tuple[SideConfiguration, str]:
+def _parse_side_and_topic(word: str) -> tuple[SideConfiguration, str]:
     backend, at, rest = word.partition("@")
     if at and ":" not in backend:
         master, colon, topic = rest.rpartition(":")
@@ -242,4 +242,4 @@ def _side_and_topic(word: str) -> tuple[SideConfiguration, str]:
                 "'zeromq@HOST:7780:/topic'"
             ).format(word=quotable(word))
         )
-    return side_of(backend, master), topic
+    return side_configuration(backend, master), topic

@@ -22,7 +22,7 @@ _MAX_BRIDGES = 64
 _MAX_ID_LENGTH = 100
 _MAX_ROUTES = 1000
 
-Way = tuple[SideName, str, str]
+RouteKey = tuple[SideName, str, str]
 """Route of a bridge: (side of the origin, topic there, topic on the other side)."""
 
 
@@ -31,7 +31,7 @@ class OtherBridge(NamedTuple):
 
     id: str
     name: str
-    ways: frozenset[Way]
+    routes: frozenset[RouteKey]
 
 
 class _Status(NamedTuple):
@@ -46,8 +46,8 @@ class _Status(NamedTuple):
 
     at: float
     name: str
-    on: str
-    ways: frozenset[tuple[str, str, str]]
+    side: str
+    routes: frozenset[tuple[str, str, str]]
 
 
 class OtherBridges:
@@ -75,27 +75,27 @@ class OtherBridges:
             statuses = self._statuses[side]
             statuses.pop(id_, None)
             statuses[id_] = _Status(
-                now, name[:_MAX_ID_LENGTH], str(on), frozenset(_ways(status.get("routes")))
+                now, name[:_MAX_ID_LENGTH], str(on), frozenset(_parse_routes(status.get("routes")))
             )
             while len(statuses) > _MAX_BRIDGES:
                 statuses.popitem(last=False)
 
-    def between(self, now: float) -> list[OtherBridge]:
+    def parallel_bridges(self, now: float) -> list[OtherBridge]:
         """Return the bridges seen recently on both sides."""
         with self._lock:
             on_a, on_b = ({**self._statuses[side]} for side in SIDES)
         found = []
         for id_, a in on_a.items():
             b = on_b.get(id_)
-            if b is None or a.on == b.on or now - min(a.at, b.at) > _EXPIRY_S:
+            if b is None or a.side == b.side or now - min(a.at, b.at) > _EXPIRY_S:
                 continue
-            sides: dict[str, SideName] = {a.on: "a", b.on: "b"}
-            ways = frozenset((sides[origin], topic, to) for origin, topic, to in a.ways)
+            sides: dict[str, SideName] = {a.side: "a", b.side: "b"}
+            ways = frozenset((sides[origin], topic, to) for origin, topic, to in a.routes)
             found.append(OtherBridge(id_, a.name, ways))
         return found
 
 
-def _ways(routes: object) -> Iterator[tuple[str, str, str]]:
+def _parse_routes(routes: object) -> Iterator[tuple[str, str, str]]:
     for route in routes[:_MAX_ROUTES] if isinstance(routes, list) else ():
         if not isinstance(route, Mapping):
             continue

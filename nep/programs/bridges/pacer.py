@@ -11,7 +11,7 @@ from collections.abc import Callable
 _MAX_CATCH_UP = 0.1
 
 
-class Limit:
+class RateLimit:
     """Rate limit with evenly spaced slots. Delays up to a tenth of the period are caught up.
 
     Args:
@@ -23,7 +23,7 @@ class Limit:
         self.next_at = float("-inf")
         """Time of the next free slot."""
 
-    def has_room(self, now: float) -> bool:
+    def try_acquire(self, now: float) -> bool:
         """Return True and take the next slot if its time has come."""
         if now < self.next_at:
             return False
@@ -67,12 +67,12 @@ class Pacer:
     def _run(self) -> None:
         while True:
             with self._changed:
-                while not self._is_closed and (left := self._left_s()) != 0.0:
+                while not self._is_closed and (left := self._remaining_s()) != 0.0:
                     self._changed.wait(left)
                 if self._is_closed:
                     return
                 call = heapq.heappop(self._due)[2]
             call()
 
-    def _left_s(self) -> float | None:
+    def _remaining_s(self) -> float | None:
         return max(0.0, self._due[0][0] - time.monotonic()) if self._due else None

@@ -16,8 +16,8 @@ from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
 from nep.nodes.subscriber import Subscriber
 from nep.programs.bridges.configuration import SideName
-from nep.programs.bridges.pacer import Limit, Pacer
-from nep.programs.bridges.topic_types import Form, default_type, type_for, type_in
+from nep.programs.bridges.pacer import Pacer, RateLimit
+from nep.programs.bridges.topic_types import TopicFormat, default_type, published_type, type_for
 from nep.programs.bridges.trail import TRAIL_KEY, LoopGuard, Trail, read_trail
 from nep.programs.robots.guard import MotionGuard
 from nep.protocol.graph_view import GraphView
@@ -59,7 +59,7 @@ class RouteEnd:
     topic: str
     msg_type: str = ""
     qos: str = ""
-    echoes: LoopGuard = field(default_factory=LoopGuard)
+    loop_guard: LoopGuard = field(default_factory=LoopGuard)
     guard: MotionGuard | None = field(default=None, compare=False)
     """Guard of the robots on this side; None publishes all messages."""
 
@@ -168,7 +168,7 @@ class Route:
         self._clock = clock
         self._pacer = pacer
         self._subscriber_counts: dict[Publisher, int] = {}
-        self._limit = Limit(max_rate_hz) if max_rate_hz else None
+        self._limit = RateLimit(max_rate_hz) if max_rate_hz else None
         self._pending: Message | None = None
         self._lock = threading.RLock()
         self._backlog = Inbox("all", MAX_BACKLOG_MESSAGES, _MAX_BACKLOG_BYTES)
@@ -179,7 +179,7 @@ class Route:
         self._lost_by_previous: int | None = 0
         self._publishers: dict[tuple[bool, int | None], Publisher] = {}
         self._absent_since: dict[tuple[bool, int | None], float] = {}
-        self._form: Form | None = None
+        self._form: TopicFormat | None = None
         self._supports_extension = end.backend.has_extensions
         self._received = self._sent = self._bytes = 0
         self._thinned = self._failed = self._dropped = self._returned = 0
@@ -187,7 +187,7 @@ class Route:
 
     def counts(self) -> RouteCounts:
         """Return the outcomes of messages so far."""
-        lost = self._lost()  # outside of our lock: the back end may take its own
+        lost = self._lost_count()  # outside of our lock: the back end may take its own
         with self._lock:
             return RouteCounts(
                 self._received,
@@ -202,12 +202,12 @@ class Route:
                 self._problem,
             )
 
-    def _lost(self) -> int | None:
+    def _lost_count(self) -> int | None:
         now = 0 if self._subscriber is None else self._subscriber.lost
         return None if now is None or self._lost_by_previous is None else now + self._lost_by_previous
 
     @property
-    def trouble(self) -> str:
+    def connection_problem(self) -> str:
         """Current reason why the route can't subscribe or publish; "" if it can."""
         return next(iter(self.troubles.copy().values()), "")
 
@@ -247,7 +247,7 @@ class Route:
         If the back end has its own types, the subscription waits until the topic has a publisher. Raises
         `NepError`.
         """
-        known = type_in(view, self.origin.topic, own_nodes)
+        known = published_type(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
             msg_type = self.origin.msg_type or known or default_type(self.origin.backend)
             self._waits_for_type = not msg_type
@@ -258,9 +258,9 @@ class Route:
             with self._lock:
                 self._subscriber, self._sink = subscriber, sink
         elif not self.origin.msg_type and known not in {"", self._subscriber.msg_type}:
-            self._subscribe_again(node, known)
+            self._resubscribe(node, known)
 
-    def _subscribe_again(self, node: Node, msg_type: str) -> None:
+    def _resubscribe(self, node: Node, msg_type: str) -> None:
         # Keeps a subscription that receives messages: not every back end insists on the type.
         old, old_sink = self._subscriber, self._sink
         if old is None or old_sink is None or _has_received(old):
@@ -286,7 +286,7 @@ class Route:
             self.origin.topic, msg_type, sink=sink.receive, qos=self.origin.qos, wildcards=False
         )
 
-    def end_taking(self) -> None:
+    def unsubscribe(self) -> None:
         """Unsubscribe, and forward a message held back by the rate limit at once."""
         with self._lock:
             subscriber, self._limit = self._subscriber, None
@@ -296,7 +296,7 @@ class Route:
 
     def close(self) -> None:
         """Close the route's subscriber and publishers while the bridge keeps running."""
-        self.end_taking()
+        self.unsubscribe()
         with self._lock:
             self._is_closed = True
             publishers, self._publishers = list(self._publishers.values()), {}
@@ -310,23 +310,23 @@ class Route:
             now = self._clock()
             with self._lock:
                 if message.publisher in self._own:
-                    self.origin.echoes.not_needed()
-                elif self._is_returned(message, now):
+                    self.origin.loop_guard.disable()
+                elif self._has_looped(message, now):
                     self._returned += 1
                 else:
                     self._received += 1
                     self._limit_rate(message, now)
 
-    def _is_returned(self, message: Message, now: float) -> bool:
+    def _has_looped(self, message: Message, now: float) -> bool:
         if self.rival:
             return True
         if message.publisher is not None:
-            self.origin.echoes.not_needed()
+            self.origin.loop_guard.disable()
         trail = read_trail(message.extension)
-        if not trail.may_go(self.end.network, self._bridge):
+        if not trail.may_forward(self.end.network, self._bridge):
             return True
         is_nameless = message.publisher is None and not trail.bridges
-        return is_nameless and self.origin.echoes.is_echo(message.raw, now)
+        return is_nameless and self.origin.loop_guard.is_echo(message.raw, now)
 
     def _limit_rate(self, message: Message, now: float) -> None:
         if self._limit is None:
@@ -334,7 +334,7 @@ class Route:
         elif self._pending is not None:
             self._thinned += 1
             self._pending = message
-        elif self._limit.has_room(now):
+        elif self._limit.try_acquire(now):
             self._forward(message)
         else:
             self._pending = message
@@ -345,13 +345,13 @@ class Route:
             message, self._pending = self._pending, None
             if message is not None:
                 if self._limit is not None:
-                    self._limit.has_room(max(self._clock(), self._limit.next_at))
+                    self._limit.try_acquire(max(self._clock(), self._limit.next_at))
                 self._forward(message)
 
     def _forward(self, message: Message) -> None:
         if len(self._backlog):
             self._send_backlog()
-        publisher = self._publishers.get(self._key(message))
+        publisher = self._publishers.get(self._publisher_key(message))
         if publisher is None or len(self._backlog):
             self._dropped += self._backlog.put(message)
             self._wake()
@@ -361,14 +361,14 @@ class Route:
     def _send_backlog(self) -> Message | None:
         while self._backlog.messages:
             message = self._backlog.messages[0]
-            publisher = self._publishers.get(self._key(message))
+            publisher = self._publishers.get(self._publisher_key(message))
             if publisher is None:
                 return message
             self._backlog.pop()
             self._send(publisher, message)
         return None
 
-    def _key(self, message: Message) -> tuple[bool, int | None]:
+    def _publisher_key(self, message: Message) -> tuple[bool, int | None]:
         if not message.is_latched:
             return False, None
         key = (True, message.publisher)
@@ -390,8 +390,8 @@ class Route:
                 message = self._send_backlog()
                 if message is None:
                     return
-                key = self._key(message)
-            form = self._form_for(message, view, own_nodes)
+                key = self._publisher_key(message)
+            form = self._format_for(message, view, own_nodes)
             publisher = node.new_pub(self.end.topic, form.msg_type, latched=key[0], qos=self.end.qos)
             with self._lock:
                 self._own.add(publisher.id)
@@ -402,15 +402,15 @@ class Route:
                 publisher.close()
                 return
 
-    def _form_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> Form:
+    def _format_for(self, message: Message, view: GraphView, own_nodes: Collection[str]) -> TopicFormat:
         if self._form is None:
             msg_type = self.end.msg_type or type_for(
                 message, self.end.backend, view.topics.get(self.end.topic), own_nodes
             )
-            self._form = Form(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
+            self._form = TopicFormat(msg_type, self.end.backend.codec_for(msg_type), self.end.topic)
         return self._form
 
-    def close_departed(self, origin: GraphView, now: float) -> None:
+    def close_stale_publishers(self, origin: GraphView, now: float) -> None:
         """Close the publishers of latched messages whose original publisher has left the graph."""
         there = origin.topics.get(self.origin.topic)
         ids = {each.id for each in there.publishers} if there is not None else set()
@@ -442,19 +442,19 @@ class Route:
                 self._fail(refusal)
                 return
         try:
-            if form.has(message):
+            if form.matches(message):
                 try:
                     self._publish(publisher, message, Encoded(message.raw, message.extension))
                 except EncodeError:  # the other side's codec is stricter: decode and encode again
                     self._publish(publisher, message, form.codec.encode(message.payload))
             else:
-                self._publish(publisher, message, self._converted(publisher, message, form))
+                self._publish(publisher, message, self._convert(publisher, message, form))
         except ClosedError:
             self._dropped += 1
         except Exception as error:  # noqa: BLE001 - payloads and third-party back ends may raise anything
             self._fail(str(error) if isinstance(error, NepError) else f"{type(error).__name__}: {error}")
 
-    def _converted(self, publisher: Publisher, message: Message, form: Form) -> Encoded:
+    def _convert(self, publisher: Publisher, message: Message, form: TopicFormat) -> Encoded:
         subscriber = self._subscriber
         payload = message.payload if subscriber is None else subscriber.decoded(message)
         try:
@@ -465,25 +465,25 @@ class Route:
 
     def _publish(self, publisher: Publisher, message: Message, encoded: Encoded) -> None:
         extension = {key: value for key, value in (encoded.extension or {}).items() if key != TRAIL_KEY}
-        self.end.echoes.sent(encoded.data, self._clock())
+        self.end.loop_guard.record_sent(encoded.data, self._clock())
         refused = publisher.refused
         if self._supports_extension:
             publisher.publish_bytes(encoded.data, {**extension, TRAIL_KEY: self._trail(message).to_plain()})
             if publisher.refused == refused:
-                self._count(message)
+                self._count_sent(message)
                 return
             self._supports_extension = False  # a back end that wrongly claims to support extensions
             refused = publisher.refused
         publisher.publish_bytes(encoded.data, extension or None)
         if publisher.refused == refused:
-            self._count(message)
+            self._count_sent(message)
         else:
             self._fail(publisher.problem)
 
     def _trail(self, message: Message) -> Trail:
-        return read_trail(message.extension).carried(self.origin.network, self.end.network, self._bridge)
+        return read_trail(message.extension).with_hop(self.origin.network, self.end.network, self._bridge)
 
-    def _count(self, message: Message) -> None:
+    def _count_sent(self, message: Message) -> None:
         self._sent += 1
         self._bytes += message.size_bytes
 

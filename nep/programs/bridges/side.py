@@ -28,7 +28,7 @@ _REQUEST_TIMEOUT_S = 1.0
 """Time limit of requests to the master in seconds."""
 
 
-class BridgeOfSide(Protocol):
+class SideOwner(Protocol):
     """Interface of a bridge to its sides."""
 
     own_nodes: frozenset[str]
@@ -84,15 +84,15 @@ class BridgeSide:
         self._bridges_subscriber: Subscriber | None = None
 
     @property
-    def knows_robots(self) -> bool:
+    def is_guard_ready(self) -> bool:
         """True if the descriptions of all current robots have been read, or there is no guard."""
         if self.guard is None or self.guard.is_settled:
             return True
         if self.view is not None:
-            self.guard.see(self.view)  # descriptions may have arrived since the last poll
+            self.guard.update_graph(self.view)  # descriptions may have arrived since the last poll
         return self.guard.is_settled
 
-    def start(self, owner: BridgeOfSide) -> None:
+    def start(self, owner: SideOwner) -> None:
         """Start the thread."""
         run = partial(self._run, owner)
         self._thread = threading.Thread(target=run, name=self.node.name, daemon=True)
@@ -114,7 +114,7 @@ class BridgeSide:
 
     # ---- run in its thread
 
-    def _run(self, owner: BridgeOfSide) -> None:
+    def _run(self, owner: SideOwner) -> None:
         while not self._is_closing:
             self._wake_event.clear()
             now = time.monotonic()
@@ -134,18 +134,18 @@ class BridgeSide:
             poll_at = self._poll_at - (_GRAPH_POLL_S - _EARLY_POLL_S if is_early else 0.0)
             self._wake_event.wait(max(0.0, poll_at - time.monotonic()))
 
-    def _undecided_routes(self, owner: BridgeOfSide) -> list[Route]:
+    def _undecided_routes(self, owner: SideOwner) -> list[Route]:
         # Their type depends on the current publishers, so the graph is polled first.
         routes = (each for each in owner.routes if each.end.side == self.name)
         return [each for each in routes if each.needs_type and self.name not in each.troubles]
 
-    def _poll_graph(self, owner: BridgeOfSide) -> None:
+    def _poll_graph(self, owner: SideOwner) -> None:
         try:
             view = self.node.graph(_REQUEST_TIMEOUT_S)
         except ClosedError:
             return
         except Exception as error:  # noqa: BLE001 - third-party back ends may raise anything
-            reason = _reason(error)
+            reason = _error_text(error)
             if reason != self.problem:
                 self.problem = reason
                 _logger.warning(
@@ -160,16 +160,16 @@ class BridgeSide:
             self.problem = ""
             _logger.warning("side %s of the bridge, %s, is connected", self.name, self.configuration.network)
         if self.guard is not None:
-            self.guard.see(view)
+            self.guard.update_graph(view)
         self.view = view
         self.poll_count += 1
         owner.find(self, view)
         for route in owner.routes:
             if route.origin.side == self.name:
-                route.close_departed(view, time.monotonic())
+                route.close_stale_publishers(view, time.monotonic())
 
     def _update_routes(
-        self, owner: BridgeOfSide, view: GraphView, undecided: Sequence[Route], *, is_due: bool
+        self, owner: SideOwner, view: GraphView, undecided: Sequence[Route], *, is_due: bool
     ) -> None:
         # Failed routes are retried with the next poll. `undecided`: routes whose first message arrived before
         # the last poll; others wait for the next one.
@@ -179,22 +179,22 @@ class BridgeSide:
             if self.name in route.troubles and not is_due:
                 continue
             if route.origin.side == self.name:
-                self._try(route, partial(route.subscribe, self.node, view, owner.own_nodes))
+                self._try_update(route, partial(route.subscribe, self.node, view, owner.own_nodes))
             elif route.needs_publisher and (
-                not route.needs_type or (is_due and self._may_decide(route, undecided))
+                not route.needs_type or (is_due and self._can_decide_type(route, undecided))
             ):
-                self._try(route, partial(route.open_publishers, self.node, view, owner.own_nodes))
+                self._try_update(route, partial(route.open_publishers, self.node, view, owner.own_nodes))
 
-    def _may_decide(self, route: Route, undecided: Sequence[Route]) -> bool:
+    def _can_decide_type(self, route: Route, undecided: Sequence[Route]) -> bool:
         return route in undecided or self.name in route.troubles
 
-    def _try(self, route: Route, make: Callable[[], None]) -> None:
+    def _try_update(self, route: Route, make: Callable[[], None]) -> None:
         try:
             make()
         except ClosedError:
             return
         except Exception as error:  # noqa: BLE001 - see `_poll_graph`
-            reason = _reason(error)
+            reason = _error_text(error)
             if reason != route.troubles.get(self.name):
                 route.troubles[self.name] = reason
                 _logger.warning(
@@ -207,7 +207,7 @@ class BridgeSide:
             return
         route.troubles.pop(self.name, None)
 
-    def _subscribe_to_bridges(self, owner: BridgeOfSide) -> None:
+    def _subscribe_to_bridges(self, owner: SideOwner) -> None:
         def on_messages(messages: Sequence[Message]) -> None:
             for message in messages:
                 owner.on_status(self.name, message)
@@ -227,5 +227,5 @@ class BridgeSide:
             self._published_status, self._published_at = status, now
 
 
-def _reason(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return str(error) if isinstance(error, NepError | ValueError) else f"{type(error).__name__}: {error}"

@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
-from nep.backends.base import Backend, backend_named
+from nep.backends.base import Backend, find_backend
 from nep.errors import NepError, did_you_mean
 from nep.i18n import _
-from nep.nodes.arguments import text as checked_type
+from nep.nodes.arguments import check_type_name as checked_type
 from nep.programs.bridges.configuration import (
     SIDES,
     BridgeConfiguration,
@@ -19,11 +19,11 @@ from nep.programs.bridges.configuration import (
     SideConfiguration,
     SideName,
     TopicEnd,
-    check_apart,
+    check_different_networks,
+    check_topic_names,
     checked_name,
-    checked_topic_names,
-    direction_named,
-    side_of,
+    parse_direction,
+    side_configuration,
 )
 from nep.text import escaped, shortened
 
@@ -109,10 +109,10 @@ def read_configuration(path: Path) -> BridgeConfiguration:
         raise NepError(
             _("line {line} of '{path}' is not UTF-8; save the file as UTF-8").format(line=line, path=shown)
         ) from error
-    return read_text(text, shown, path.stem)
+    return parse_configuration(text, shown, path.stem)
 
 
-def read_text(text: str, path: str, stem: str) -> BridgeConfiguration:
+def parse_configuration(text: str, path: str, stem: str) -> BridgeConfiguration:
     """Parse the text of a bridge file. Raises `NepError`.
 
     Args:
@@ -123,11 +123,11 @@ def read_text(text: str, path: str, stem: str) -> BridgeConfiguration:
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError also for numbers with thousands of digits
-        raise NepError(_toml_sentence(path, text, str(error))) from error
+        raise NepError(_toml_error_message(path, text, str(error))) from error
     return _Reader(path, text).configuration(table, stem)
 
 
-def _toml_sentence(path: str, text: str, said: str) -> str:
+def _toml_error_message(path: str, text: str, said: str) -> str:
     at = _TOML_POSITION.search(said)
     line = int(at.group(1)) if at and at.group(1) else text.count("\n") + 1
     reason = escaped(shortened(_TOML_POSITION.sub("", said).strip(), _MAX_REASON_LENGTH))
@@ -149,10 +149,10 @@ class _Reader:
 
     def configuration(self, table: Mapping[str, Any], stem: str) -> BridgeConfiguration:
         self._check_keys(table, _KEYS, "")
-        name = self._text(table, "name", "", default=_plain(stem))
+        name = self._text(table, "name", "", default=_default_name(stem))
         name = self._checked(lambda: checked_name(name), "name", "")
         a, b = (self._side(table, each) for each in SIDES)
-        self._checked(lambda: check_apart(a, b), "b", "")
+        self._checked(lambda: check_different_networks(a, b), "b", "")
         topics = table.get("topics")
         if not isinstance(topics, list) or not topics or not all(isinstance(each, dict) for each in topics):
             self._fail("topics", "", _('no topics are listed; write [[topics]] and a = "/a/topic" below it'))
@@ -161,7 +161,7 @@ class _Reader:
                 "topics", "", _("there are more than {most} topics; use patterns").format(most=_MAX_TOPICS)
             )
         found = tuple(self._topic(each, number, a, b) for number, each in enumerate(topics))
-        self._check_once(found)
+        self._check_duplicates(found)
         return BridgeConfiguration(name, a, b, found)
 
     def _side(self, table: Mapping[str, Any], side: SideName) -> SideConfiguration:
@@ -178,7 +178,7 @@ class _Reader:
         backend = self._text(section, "backend", side)
         if not backend:
             self._fail("backend", side, _('the back end is missing; write backend = "zeromq"'))
-        self._checked(lambda: backend_named(backend), "backend", side)
+        self._checked(lambda: find_backend(backend), "backend", side)
         master, network = (self._text(section, key, side) for key in ("master", "network"))
         if len(network) > _MAX_NETWORK_LENGTH:
             self._fail(
@@ -186,7 +186,7 @@ class _Reader:
                 side,
                 _("it has more than {most} characters; shorten it").format(most=_MAX_NETWORK_LENGTH),
             )
-        return self._checked(lambda: side_of(backend, master, network), "master", side)
+        return self._checked(lambda: side_configuration(backend, master, network), "master", side)
 
     def _topic(
         self, section: Mapping[str, Any], number: int, a: SideConfiguration, b: SideConfiguration
@@ -197,14 +197,14 @@ class _Reader:
         if not on_a:
             self._fail("a", "topics", _('the topic name is missing; write a = "/a/topic"'), number)
         key = "b" if section.get("b") else "a"
-        self._checked(lambda: checked_topic_names(on_a, on_b), key, "topics", number)
+        self._checked(lambda: check_topic_names(on_a, on_b), key, "topics", number)
         direction = self._text(section, "direction", "topics", number, default="both")
-        way = self._checked(lambda: direction_named(direction), "direction", "topics", number)
+        way = self._checked(lambda: parse_direction(direction), "direction", "topics", number)
         ends = [
             TopicEnd(
                 name,
                 self._type(section, side, number),
-                self._quality(section, f"{side}_qos", number, of.backend),
+                self._qos(section, f"{side}_qos", number, of.backend),
             )
             for name, side, of in ((on_a, "a", a), (on_b, "b", b))
         ]
@@ -217,7 +217,7 @@ class _Reader:
             self._checked(lambda: checked_type(key, name), key, "topics", number)
         return name
 
-    def _quality(self, section: Mapping[str, Any], key: str, number: int, backend: Backend) -> str:
+    def _qos(self, section: Mapping[str, Any], key: str, number: int, backend: Backend) -> str:
         word = self._text(section, key, "topics", number)
         if word and not backend.qos:
             self._fail(
@@ -233,7 +233,7 @@ class _Reader:
                 key,
                 "topics",
                 _("unknown quality of service '{word}'; {did_you_mean}").format(
-                    word=_shown(word), did_you_mean=did_you_mean(word, backend.qos)
+                    word=_printable(word), did_you_mean=did_you_mean(word, backend.qos)
                 ),
                 number,
             )
@@ -253,7 +253,7 @@ class _Reader:
             )
         return float(value)
 
-    def _check_once(self, topics: Sequence[BridgeTopic]) -> None:
+    def _check_duplicates(self, topics: Sequence[BridgeTopic]) -> None:
         # Messages of a topic that is listed twice would arrive twice.
         known: set[tuple[SideName, str, str]] = set()
         for number, topic in enumerate(topics):
@@ -264,7 +264,7 @@ class _Reader:
                         "a",
                         "topics",
                         _("'{topic}' is already forwarded in that direction; remove one of the two").format(
-                            topic=_shown(topic.end(side).name)
+                            topic=_printable(topic.end(side).name)
                         ),
                         number,
                     )
@@ -295,7 +295,7 @@ class _Reader:
             self._fail(key, where, str(error), number)
 
     def _fail(self, key: str, where: str, reason: str, number: int = 0) -> NoReturn:
-        shown = _shown(key)
+        shown = _printable(key)
         if where:
             shown = f"{where}[{number + 1}].{shown}" if where == "topics" else f"{where}.{shown}"
         line = self._line_of(key, where, number)
@@ -324,9 +324,9 @@ class _Reader:
         return table_line
 
 
-def _plain(stem: str) -> str:
+def _default_name(stem: str) -> str:
     return escaped(stem)[:40] or "bridge"
 
 
-def _shown(word: str) -> str:
+def _printable(word: str) -> str:
     return escaped(shortened(word, 80))

@@ -12,12 +12,12 @@ from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, TopicInfo
 
 _DEFAULT_TYPE = "json"
-_NO_MAPS = frozenset({"string", "bytes", "image"})
+_CODECS_WITHOUT_FIELDS = frozenset({"string", "bytes", "image"})
 """Codecs whose payloads have no fields, so that a back end's own types can't represent them."""
-_UNKNOWN = frozenset({"", "*"})
+_UNKNOWN_TYPES = frozenset({"", "*"})
 
 
-class Form:
+class TopicFormat:
     """Message type and codec used on the other side."""
 
     def __init__(self, msg_type: str, codec: Codec, topic: str) -> None:
@@ -27,7 +27,7 @@ class Form:
         if codec is CODECS["json"]:
             self.encode = JsonEncoder(topic).encode
 
-    def has(self, message: Message) -> bool:
+    def matches(self, message: Message) -> bool:
         """Return True if a message already has this codec.
 
         For a back end's own codec, the type must match, too.
@@ -37,12 +37,12 @@ class Form:
         return message.codec in CODECS or message.msg_type == self.msg_type
 
 
-def type_in(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
+def published_type(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
     """Return the type with which nodes other than the bridge publish a topic, or "" if none does."""
     known = view.topics.get(topic)
     if known is None or all(each.node_id in own_nodes for each in known.publishers):
         return ""
-    return "" if known.msg_type in _UNKNOWN else known.msg_type
+    return "" if known.msg_type in _UNKNOWN_TYPES else known.msg_type
 
 
 def default_type(backend: Backend) -> str:
@@ -57,21 +57,21 @@ def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_no
     if the topic is published with the same codec, because a topic must not have two types. Otherwise the
     message keeps its own type.
     """
-    own = _kept_type(message, backend)
-    if known is None or known.msg_type in _UNKNOWN:
+    own = _message_type(message, backend)
+    if known is None or known.msg_type in _UNKNOWN_TYPES:
         return own
     members = {each.node_id for each in known.publishers} | {each.node_id for each in known.subscribers}
     codec = _codec_name(backend, known.msg_type)
     if members <= set(own_nodes) or not codec:
         return own
     if codec not in CODECS:
-        return own if message.codec in _NO_MAPS else known.msg_type
+        return own if message.codec in _CODECS_WITHOUT_FIELDS else known.msg_type
     is_published = any(each.node_id not in own_nodes for each in known.publishers)
     is_same = is_published and codec == _codec_name(backend, own)
     return known.msg_type if is_same else own
 
 
-def _kept_type(message: Message, backend: Backend) -> str:
+def _message_type(message: Message, backend: Backend) -> str:
     # A message keeps its type unless that would change its codec: an image of a ROS type is an `image`
     # elsewhere. A type that the back end should know but doesn't is kept, so that the back end reports it.
     is_kept = message.codec not in CODECS or _codec_name(backend, message.msg_type) in {"", message.codec}

@@ -16,9 +16,9 @@ from typing import NamedTuple
 TRAIL_KEY = "bridge"
 MAX_HOPS = 16
 """Maximum number of bridges that forward a message; longer chains are loops."""
-ECHO_S = 5.0
+ECHO_WINDOW_S = 5.0
 """Time in seconds within which a sent message is recognized when it returns."""
-_MAX_WORD_LENGTH = 400
+_MAX_ID_LENGTH = 400
 _MAX_ECHOES = 4096
 
 
@@ -28,11 +28,11 @@ class Trail(NamedTuple):
     networks: tuple[str, ...] = ()
     bridges: tuple[str, ...] = ()
 
-    def may_go(self, network: str, bridge: str) -> bool:
+    def may_forward(self, network: str, bridge: str) -> bool:
         """Return True if a bridge may forward the message into a network."""
         return network not in self.networks and bridge not in self.bridges and len(self.bridges) < MAX_HOPS
 
-    def carried(self, origin: str, network: str, bridge: str) -> Trail:
+    def with_hop(self, origin: str, network: str, bridge: str) -> Trail:
         """Return the trail of the message after a bridge has forwarded it from `origin` into `network`."""
         been = self.networks if origin in self.networks else (*self.networks, origin)
         return Trail((*been, network), (*self.bridges, bridge))
@@ -47,14 +47,14 @@ def read_trail(extension: Mapping[str, object]) -> Trail:
     found = extension.get(TRAIL_KEY)
     if not isinstance(found, Mapping):
         return Trail()
-    return Trail(_words(found.get("networks")), _words(found.get("bridges")))
+    return Trail(_parse_ids(found.get("networks")), _parse_ids(found.get("bridges")))
 
 
-def _words(found: object) -> tuple[str, ...]:
+def _parse_ids(found: object) -> tuple[str, ...]:
     if not isinstance(found, list | tuple):
         return ()
     return tuple(
-        each for each in found[: MAX_HOPS + 2] if isinstance(each, str) and len(each) <= _MAX_WORD_LENGTH
+        each for each in found[: MAX_HOPS + 2] if isinstance(each, str) and len(each) <= _MAX_ID_LENGTH
     )
 
 
@@ -71,14 +71,14 @@ class LoopGuard:
         self._sent: OrderedDict[bytes, tuple[int, float]] = OrderedDict()
         self._are_needed = True
 
-    def not_needed(self) -> None:
+    def disable(self) -> None:
         """Stop recording messages, because the network identifies publishers."""
         if self._are_needed:
             self._are_needed = False
             with self._lock:
                 self._sent.clear()
 
-    def sent(self, data: bytes | memoryview, now: float) -> None:
+    def record_sent(self, data: bytes | memoryview, now: float) -> None:
         """Record a message that is being sent."""
         if self._are_needed:
             key = _digest(data)
@@ -93,7 +93,7 @@ class LoopGuard:
         key = _digest(data)
         with self._lock:
             count, at = self._sent.pop(key, (0, 0.0))
-            if not count or now - at > ECHO_S:
+            if not count or now - at > ECHO_WINDOW_S:
                 return False
             if count > 1:
                 self._sent[key] = count - 1, at

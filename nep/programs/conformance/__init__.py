@@ -6,7 +6,7 @@ the master and peers of that program.
 
 from nep.programs.conformance import rules as _rules  # noqa: F401 - importing them registers them
 from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterProcess, AdapterStreams
-from nep.programs.conformance.check import Outcome, check, chosen_rules
+from nep.programs.conformance.check import Outcome, check, select_rules
 from nep.programs.conformance.rule import RULES, Rule
 
 __all__ = [
@@ -18,5 +18,5 @@ __all__ = [
     "Outcome",
     "Rule",
     "check",
-    "chosen_rules",
+    "select_rules",
 ]

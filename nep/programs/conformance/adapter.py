@@ -29,13 +29,13 @@ class AdapterError(NepError):
 class AdapterStreams(Protocol):
     """Output and input stream of an adapter."""
 
-    reads: IO[bytes]
-    writes: IO[bytes]
+    output: IO[bytes]
+    input: IO[bytes]
 
     def wait(self, timeout_s: float) -> int | None:
         """Return the exit code, or None if the adapter still runs after `timeout_s` seconds."""
 
-    def end(self) -> None:
+    def stop(self) -> None:
         """Stop the adapter, by force if necessary."""
 
 
@@ -60,8 +60,8 @@ class AdapterProcess:
             raise AdapterError(
                 _("'{command}' has no standard input and output").format(command=" ".join(command))
             )
-        self.reads: IO[bytes] = reads
-        self.writes: IO[bytes] = writes
+        self.output: IO[bytes] = reads
+        self.input: IO[bytes] = writes
 
     def wait(self, timeout_s: float) -> int | None:
         """Return the exit code, or None if the adapter still runs after `timeout_s` seconds."""
@@ -70,14 +70,14 @@ class AdapterProcess:
         except subprocess.TimeoutExpired:
             return None
 
-    def end(self) -> None:
+    def stop(self) -> None:
         """Close the adapter's standard input, and kill the process if it does not exit within 3 s."""
         with suppress(OSError):
-            self.writes.close()
+            self.input.close()
         if self.wait(3.0) is None:
             self._process.kill()
             self._process.wait()
-        self.reads.close()
+        self.output.close()
 
 
 class Adapter:
@@ -96,17 +96,17 @@ class Adapter:
 
     def _read(self) -> None:
         with suppress(OSError, ValueError):  # closed by `end`
-            while line := self.lines.reads.readline(_MAX_LINE_BYTES):
+            while line := self.lines.output.readline(_MAX_LINE_BYTES):
                 self._incoming.append(line)
         self._incoming.append(None)
 
-    def begin(self, do: str, **members: object) -> int:
+    def send_request(self, do: str, **members: object) -> int:
         """Send a request and return its number, to be passed to `reply`."""
         self._count += 1
         line = json.dumps({"id": self._count, "do": do, **members}).encode() + b"\n"
         try:
-            self.lines.writes.write(line)
-            self.lines.writes.flush()
+            self.lines.input.write(line)
+            self.lines.input.flush()
         except (OSError, ValueError) as error:
             raise AdapterError(_("can't write to the adapter: {error}").format(error=error)) from error
         return self._count
@@ -146,7 +146,7 @@ class Adapter:
             elif message.get("event") == "message":
                 self.events.append(message)
 
-    def end(self) -> None:
+    def stop(self) -> None:
         """Stop the adapter and the reading thread."""
-        self.lines.end()
+        self.lines.stop()
         self._reader.join(5.0)

@@ -16,13 +16,13 @@ from nep.programs.conformance.adapter import Adapter, AdapterError, AdapterStrea
 from nep.programs.conformance.other_socket import OtherSocket
 from nep.programs.conformance.peers import ScriptedPublisher, ScriptedSubscriber
 from nep.programs.conformance.scripted_master import RecordedRequest, ScriptedMaster
-from nep.programs.conformance.verdict import broken
-from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherCame
+from nep.programs.conformance.verdict import broken_rule
+from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherAdded
 
-Start = Callable[[str], AdapterStreams]
+AdapterStarter = Callable[[str], AdapterStreams]
 """Function that starts an adapter with the given address of the master."""
 _POLL_MS = 2
-_ANSWER_S = 15.0
+_REPLY_TIMEOUT_S = 15.0
 
 
 class Bench:
@@ -33,11 +33,11 @@ class Bench:
         scale: Factor for the times of the wire; the adapter must use the same.
     """
 
-    def __init__(self, start: Start, scale: float = 1.0) -> None:
+    def __init__(self, start: AdapterStarter, scale: float = 1.0) -> None:
         self.scale = scale
         self._context: zmq.Context[Any] = zmq.Context()
         self._context.linger = 0
-        self.master = ScriptedMaster(self._context, self._pushed)
+        self.master = ScriptedMaster(self._context, self._on_push)
         self.publishers: list[ScriptedPublisher] = []
         self.subscribers: list[ScriptedSubscriber] = []
         self.connect_delay_s: float | None = 0.0
@@ -51,9 +51,9 @@ class Bench:
             self._release()
             raise
         try:
-            self.features = self.ask("features")
+            self.features = self.call("features")
             self.node_name = "conformance"
-            self.ask("node", name=self.node_name)
+            self.call("node", name=self.node_name)
         except BaseException:
             self.close()
             raise
@@ -71,7 +71,7 @@ class Bench:
             due[1].connect(due[2])
         self.adapter.pump()
 
-    def until(self, is_met: Callable[[], bool], timeout_s: float) -> bool:
+    def wait_until(self, is_met: Callable[[], bool], timeout_s: float) -> bool:
         """Pump until the condition is met; return False after `timeout_s` seconds, which are not scaled."""
         deadline = time.monotonic() + timeout_s
         while True:
@@ -92,21 +92,21 @@ class Bench:
 
     def wait(self, seconds: float) -> None:
         """Pump for `seconds` times `scale`."""
-        self.until(lambda: False, seconds * self.scale)
+        self.wait_until(lambda: False, seconds * self.scale)
 
-    def need(self, is_met: Callable[[], bool], what: str, timeout_s: float = 5.0) -> None:
+    def require(self, is_met: Callable[[], bool], what: str, timeout_s: float = 5.0) -> None:
         """Pump until the condition is met.
 
         Raises `BrokenRuleError` naming `what` after the scaled timeout.
         """
-        if not self.until(is_met, max(timeout_s * self.scale, 2.0 if self.scale < 1 else timeout_s)):
-            raise broken(_("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s))
+        if not self.wait_until(is_met, max(timeout_s * self.scale, 2.0 if self.scale < 1 else timeout_s)):
+            raise broken_rule(_("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s))
 
     # ---- the adapter
 
-    def ask(self, do: str, **members: object) -> Mapping[str, Any]:
+    def call(self, do: str, **members: object) -> Mapping[str, Any]:
         """Send a request to the adapter and return its reply. Raises `AdapterError`."""
-        return self.finish(self.adapter.begin(do, **members), do)
+        return self.finish(self.adapter.send_request(do, **members), do)
 
     def finish(self, number: int, do: str) -> Mapping[str, Any]:
         """Wait for the reply to request `number` and return it. Raises `AdapterError`."""
@@ -118,9 +118,11 @@ class Bench:
                 found.append(reply)
             return reply is not None or self.adapter.has_ended
 
-        if not self.until(has_finished, _ANSWER_S):
+        if not self.wait_until(has_finished, _REPLY_TIMEOUT_S):
             raise AdapterError(
-                _("the adapter did not reply to '{do}' within {seconds:g} s").format(do=do, seconds=_ANSWER_S)
+                _("the adapter did not reply to '{do}' within {seconds:g} s").format(
+                    do=do, seconds=_REPLY_TIMEOUT_S
+                )
             )
         if not found:
             raise AdapterError(_("the adapter exited before it replied to '{do}'").format(do=do))
@@ -132,15 +134,15 @@ class Bench:
 
     def new_pub(self, topic: str, msg_type: str = "json", **members: object) -> int:
         """Open a publisher in the adapter and return its number."""
-        reply = self.ask("publisher", topic=topic, type=msg_type, **members)
-        return self._keep("close_publisher", "pub", reply)
+        reply = self.call("publisher", topic=topic, type=msg_type, **members)
+        return self._add_opened("close_publisher", "pub", reply)
 
     def new_sub(self, topic: str, msg_type: str = "json", **members: object) -> int:
         """Open a subscriber in the adapter and return its number."""
-        reply = self.ask("subscriber", topic=topic, type=msg_type, **members)
-        return self._keep("close_subscriber", "sub", reply)
+        reply = self.call("subscriber", topic=topic, type=msg_type, **members)
+        return self._add_opened("close_subscriber", "sub", reply)
 
-    def _keep(self, closes: str, name: str, reply: Mapping[str, Any]) -> int:
+    def _add_opened(self, closes: str, name: str, reply: Mapping[str, Any]) -> int:
         number = reply.get(name)
         if not isinstance(number, int):
             raise AdapterError(_("the adapter's reply has no '{name}'").format(name=name))
@@ -157,7 +159,7 @@ class Bench:
 
     def _close(self, do: str, members: Mapping[str, Any]) -> None:
         self._opened = [each for each in self._opened if each != (do, members)]
-        self.ask(do, **members)
+        self.call(do, **members)
 
     def events(self, sub: int) -> list[Mapping[str, Any]]:
         """Return the messages received by a subscriber of the adapter."""
@@ -165,7 +167,7 @@ class Bench:
 
     def counts(self, sub: int) -> tuple[int, int]:
         """Return the received and lost counts of a subscriber of the adapter."""
-        reply = self.ask("counts", sub=sub)
+        reply = self.call("counts", sub=sub)
         return int(reply.get("received", -1)), int(reply.get("lost", -1))
 
     # ---- requests to the master
@@ -174,31 +176,31 @@ class Bench:
         """Return all requests with this name that the master received."""
         return [each for each in self.master.received if each.do == do]
 
-    def request(self, do: str, field: str, id: object) -> RecordedRequest:
+    def wait_for_request(self, do: str, field: str, id: object) -> RecordedRequest:
         """Wait for the request with this name whose `field` equals `id`, and return it."""
-        self.need(lambda: any(each.what.get(field) == id for each in self.requests(do)), do)
-        return next(each for each in self.requests(do) if each.what.get(field) == id)
+        self.require(lambda: any(each.fields.get(field) == id for each in self.requests(do)), do)
+        return next(each for each in self.requests(do) if each.fields.get(field) == id)
 
     def record(self, kind: str, topic: str) -> Mapping[str, Any]:
         """Return the newest record of the adapter's publisher or subscriber of a topic."""
         for each in reversed(self.requests(f"{kind}+")):
-            record = each.what.get(kind)
+            record = each.fields.get(kind)
             if isinstance(record, dict) and record.get("topic") == topic:
                 return record
-        raise broken(_("no '{what}' was received").format(what=f"{kind}+ {topic}"))
+        raise broken_rule(_("no '{what}' was received").format(what=f"{kind}+ {topic}"))
 
     @property
     def node_id(self) -> str:
         """Id of the adapter's node."""
         for each in reversed(self.master.received):
-            node = each.what.get("node")
+            node = each.fields.get("node")
             if isinstance(node, dict):
                 return str(node.get("id"))
-        raise broken(_("no '{what}' was received").format(what="node"))
+        raise broken_rule(_("no '{what}' was received").format(what="node"))
 
-    def renewal(self, after: int, timeout_s: float = 5.0) -> RecordedRequest:
+    def wait_for_renewal(self, after: int, timeout_s: float = 5.0) -> RecordedRequest:
         """Wait for a renewal, ignoring the first `after` requests, and return it."""
-        self.need(
+        self.require(
             lambda: any(each.do == "renew" for each in self.master.received[after:]), "renew", timeout_s
         )
         return next(each for each in self.master.received[after:] if each.do == "renew")
@@ -219,7 +221,7 @@ class Bench:
             endpoint: Unused endpoint.
         """
         with closing(OtherSocket(endpoint, kind)) as other:
-            self.need(other.has_been_left, "connection", 10.0)
+            self.require(other.has_disconnected, "connection", 10.0)
 
     def publisher(
         self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True
@@ -228,10 +230,10 @@ class Bench:
         created = ScriptedPublisher(self._context, topic, msg_type, echoes=echoes)
         self.publishers.append(created)
         if is_listed:
-            self.list_publisher(created)
+            self.register_publisher(created)
         return created
 
-    def list_publisher(self, created: ScriptedPublisher) -> None:
+    def register_publisher(self, created: ScriptedPublisher) -> None:
         """Register a publisher of the tester at the master."""
         self.master.submit(AddPublisher(created.node, created.record))
 
@@ -251,12 +253,12 @@ class Bench:
         """Create a publisher of the tester and a subscriber of the adapter; wait until they are connected."""
         publisher = self.publisher(topic, msg_type)
         sub = self.new_sub(topic, msg_type)
-        self.need(lambda: bool(publisher.hellos), "hello")
+        self.require(lambda: bool(publisher.hellos), "hello")
         return publisher, sub
 
-    def _pushed(self, each: Outgoing) -> None:
-        if isinstance(each.answer, PublisherCame) and self.connect_delay_s is not None:
-            record = each.answer.publisher.publisher
+    def _on_push(self, each: Outgoing) -> None:
+        if isinstance(each.body, PublisherAdded) and self.connect_delay_s is not None:
+            record = each.body.publisher.publisher
             due = time.monotonic() + self.connect_delay_s * self.scale
             for subscriber in self.subscribers:
                 if subscriber.topic == record.topic and subscriber.node.id == each.to:
@@ -264,7 +266,7 @@ class Bench:
 
     # ---- between rules and at the end
 
-    def forget(self) -> None:
+    def discard_opened(self) -> None:
         """Leave closing the adapter's publishers and subscribers to the rule."""
         self._opened.clear()
 
@@ -278,13 +280,13 @@ class Bench:
                 self.master.submit(Leave(peer.node.id))
         for publisher in self.publishers:
             publisher.pump()
-            publisher.bye()
+            publisher.send_byes()
         for subscriber in self.subscribers:
             subscriber.socket.close(0)
         self.subscribers.clear()
         while self._opened:
             do, members = self._opened.pop()
-            self.ask(do, **members)
+            self.call(do, **members)
         for publisher in self.publishers:
             publisher.socket.close(0)
         self.publishers.clear()
@@ -297,7 +299,7 @@ class Bench:
     def close(self) -> None:
         """Stop the adapter and close all sockets."""
         try:
-            self.adapter.end()
+            self.adapter.stop()
         finally:
             self._release()
 

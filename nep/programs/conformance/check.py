@@ -9,7 +9,7 @@ from typing import Literal
 from nep.errors import NepError
 from nep.i18n import _
 from nep.programs.conformance.adapter import AdapterError
-from nep.programs.conformance.bench import Bench, Start
+from nep.programs.conformance.bench import AdapterStarter, Bench
 from nep.programs.conformance.rule import RULES, Rule
 
 _MODULES = (
@@ -40,7 +40,7 @@ class Outcome:
 
     rule: Rule
     status: Status
-    seen: str = ""
+    observed: str = ""
 
     def to_plain(self) -> dict[str, object]:
         """Return the result as a JSON-serializable dict, for ``--json``."""
@@ -48,12 +48,12 @@ class Outcome:
             "id": self.rule.id,
             "status": self.status,
             "requirement": _(self.rule.requirement),
-            "seen": self.seen,
-            "section": f"docs/{self.rule.place}",
+            "seen": self.observed,
+            "section": f"docs/{self.rule.location}",
         }
 
 
-def chosen_rules(ids: Iterable[str]) -> list[Rule]:
+def select_rules(ids: Iterable[str]) -> list[Rule]:
     """Return the rules with these ids, or all rules if there are none.
 
     Raises `KeyError` for an unknown id.
@@ -63,10 +63,10 @@ def chosen_rules(ids: Iterable[str]) -> list[Rule]:
         if each not in RULES:
             raise KeyError(each)
     found = [each for each in RULES.values() if not wanted or each.id in wanted]
-    return sorted(found, key=lambda each: _MODULES.index(each.judge.__module__.rpartition(".")[2]))
+    return sorted(found, key=lambda each: _MODULES.index(each.check.__module__.rpartition(".")[2]))
 
 
-def check(start: Start, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[Outcome]:
+def check(start: AdapterStarter, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[Outcome]:
     """Check an adapter against rules, and yield each outcome.
 
     Args:
@@ -81,9 +81,9 @@ def check(start: Start, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[O
     try:
         for each in rules:
             bench = bench or Bench(start, scale)
-            outcome = _judge(each, bench)
+            outcome = _check_rule(each, bench)
             yield outcome
-            if outcome.status == "failed" or each.is_last or not _is_clear(bench):
+            if outcome.status == "failed" or each.is_last or not _try_clear(bench):
                 bench.close()
                 bench = None
     finally:
@@ -91,7 +91,7 @@ def check(start: Start, rules: Iterable[Rule], scale: float = 1.0) -> Iterator[O
             bench.close()
 
 
-def _judge(rule: Rule, bench: Bench) -> Outcome:
+def _check_rule(rule: Rule, bench: Bench) -> Outcome:
     announced = bench.features.get("features", ())
     lacking = [each for each in rule.features if each not in announced]
     if lacking:
@@ -99,7 +99,7 @@ def _judge(rule: Rule, bench: Bench) -> Outcome:
             rule, "skipped", _("the adapter does not announce '{feature}'").format(feature=lacking[0])
         )
     try:
-        rule.judge(bench)
+        rule.check(bench)
     except NepError as error:
         return Outcome(rule, "failed", str(error))
     except (KeyError, IndexError, TypeError, ValueError) as error:  # missing or invalid field
@@ -108,7 +108,7 @@ def _judge(rule: Rule, bench: Bench) -> Outcome:
     return Outcome(rule, "passed")
 
 
-def _is_clear(bench: Bench) -> bool:
+def _try_clear(bench: Bench) -> bool:
     try:
         bench.clear()
     except AdapterError:

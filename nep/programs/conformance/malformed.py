@@ -9,11 +9,13 @@ import msgpack  # type: ignore[import-untyped]
 
 from nep.protocol.wire import BATCH, EXTENSION, LATCHED, Header, topic_part
 
-_PUBLISHER = 7  # not listed by the master, which distinguishes delivered malformed messages from valid ones
+_PUBLISHER_ID = (
+    7  # not listed by the master, which distinguishes delivered malformed messages from valid ones
+)
 
 
 def _header(codec: int = 1, flags: int = 0, size: int = 0) -> bytes:
-    return Header(codec, flags, 1, 1, _PUBLISHER, size).pack()
+    return Header(codec, flags, 1, 1, _PUBLISHER_ID, size).pack()
 
 
 def malformed_parts(topic: str) -> Iterator[tuple[str, list[bytes]]]:

@@ -35,7 +35,7 @@ class OtherSocket:
             self._listener.close()
             raise
 
-    def has_been_left(self) -> bool:
+    def has_disconnected(self) -> bool:
         """Accept pending clients; return True if one of them has disconnected."""
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -43,7 +43,7 @@ class OtherSocket:
                 client.setblocking(False)
                 client.send(self._said)
                 self._clients.append(client)
-        return any(_has_ended(each) for each in self._clients)
+        return any(_is_disconnected(each) for each in self._clients)
 
     def close(self) -> None:
         """Close the listener and all connections."""
@@ -51,7 +51,7 @@ class OtherSocket:
             each.close()
 
 
-def _has_ended(client: sockets.socket) -> bool:
+def _is_disconnected(client: sockets.socket) -> bool:
     try:
         while client.recv(4096):
             pass

@@ -13,7 +13,7 @@ import zmq
 from nep.errors import WireError
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.ports import bind_again
-from nep.protocol.batch import BATCH_FORM, batch_part, read_parts
+from nep.protocol.batch import BATCH_FORM_FLAG, batch_part, read_parts
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from nep.protocol.wire import (
     BYE,
@@ -40,7 +40,7 @@ class Filter:
 
     at: float
     is_added: bool
-    what: bytes
+    prefix: bytes
 
 
 @dataclass(frozen=True)
@@ -107,29 +107,29 @@ class ScriptedPublisher:
             now = time.monotonic()
             noted = Filter(now, event[:1] == b"\1", event[1:])
             self.filters.append(noted)
-            hello = parse_hello(noted.what)
+            hello = parse_hello(noted.prefix)
             if hello is None or hello.topic != self.topic:
                 continue
             if noted.is_added:
-                self.hellos[noted.what] = hello
+                self.hellos[noted.prefix] = hello
                 if self.echoes:
-                    self.echo(noted.what)
+                    self.send_echo(noted.prefix)
             else:
-                self.hellos.pop(noted.what, None)
+                self.hellos.pop(noted.prefix, None)
 
-    def echo(self, hello: bytes) -> None:
+    def send_echo(self, hello: bytes) -> None:
         """Answer a hello with the sequence number of the last message."""
-        self.notice(hello)
+        self.send_notice(hello)
         self.echoed_at = time.monotonic()
 
-    def notice(self, hello: bytes, flags: int = 0, seq: int | None = None) -> None:
+    def send_notice(self, hello: bytes, flags: int = 0, seq: int | None = None) -> None:
         """Send a notice under a hello."""
         self.socket.send_multipart([hello, self._header(flags, b"", seq)])
 
-    def bye(self) -> None:
+    def send_byes(self) -> None:
         """Send a bye to each subscriber."""
         for hello in self.hellos:
-            self.notice(hello, BYE)
+            self.send_notice(hello, BYE)
 
     def send(self, payload: bytes, form: str = "parts", *, seq: int | None = None, flags: int = 0) -> None:
         """Send the next message.
@@ -152,7 +152,7 @@ class ScriptedPublisher:
 
     def send_batch(self, payloads: Sequence[bytes]) -> None:
         """Send the next messages as a batch."""
-        form = form_of(self.codec.number, 0) & ~BATCH_FORM
+        form = form_of(self.codec.number, 0) & ~BATCH_FORM_FLAG
         stamps = [time.time_ns()] * len(payloads)
         part = batch_part(topic_part(self.topic), form, self.seq + 1, self.id, stamps, payloads)
         self.seq += len(payloads)

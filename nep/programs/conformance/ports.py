@@ -12,7 +12,7 @@ from typing import Any
 
 import zmq
 
-_WAIT_S = 5.0
+_BIND_TIMEOUT_S = 5.0
 
 
 def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
@@ -22,7 +22,7 @@ def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
 
 def retry_bind(bind: Callable[[], object]) -> None:
     """Call `bind`, retrying while libzmq's thread is still closing the previous socket of the endpoint."""
-    deadline = time.monotonic() + _WAIT_S
+    deadline = time.monotonic() + _BIND_TIMEOUT_S
     while True:
         try:
             bind()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from nep.programs.conformance.bench import Bench
 
-Judge = Callable[[Bench], None]
+RuleCheck = Callable[[Bench], None]
 
 
 @dataclass(frozen=True)
@@ -26,12 +26,12 @@ class Rule:
     id: str
     requirement: str
     section: str
-    judge: Judge
+    check: RuleCheck
     features: tuple[str, ...] = ()
     is_last: bool = False
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         """Page and section of the requirement in docs."""
         section = self.section.replace(" ", "-")
         return section if ".md#" in section else f"wire.md#{section}"
@@ -43,10 +43,10 @@ RULES: dict[str, Rule] = {}
 
 def rule(
     id: str, requirement: str, section: str, *features: str, is_last: bool = False
-) -> Callable[[Judge], Judge]:
+) -> Callable[[RuleCheck], RuleCheck]:
     """Register the decorated function as the check of a rule; see `Rule`."""
 
-    def register(judge: Judge) -> Judge:
+    def register(judge: RuleCheck) -> RuleCheck:
         RULES[id] = Rule(id, requirement, section, judge, features, is_last)
         return judge
 

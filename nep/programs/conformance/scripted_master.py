@@ -19,10 +19,10 @@ import zmq
 from nep.errors import WireError
 from nep.masters.graph import Graph, Outgoing
 from nep.programs.conformance.ports import bind_again
-from nep.protocol.encoding import AnswerEncoder, decode_request
+from nep.protocol.encoding import ReplyEncoder, decode_request
 from nep.protocol.requests import (
     NodeRecord,
-    PublisherCame,
+    PublisherAdded,
     PublisherRecord,
     Refused,
     RemotePublisher,
@@ -50,11 +50,11 @@ class RecordedRequest:
     sender: str
     do: str = ""
     call: int = 0
-    what: dict[str, Any] = field(default_factory=dict)
+    fields: dict[str, Any] = field(default_factory=dict)
     problem: str = ""
 
 
-Change = Callable[[RecordedRequest, dict[str, Any]], "dict[str, Any] | None"]
+ReplyFilter = Callable[[RecordedRequest, dict[str, Any]], "dict[str, Any] | None"]
 """Function that returns the reply to send instead of the given one, or None to send no reply."""
 
 
@@ -69,9 +69,9 @@ class ScriptedMaster:
     def __init__(self, context: zmq.Context[Any], on_push: Callable[[Outgoing], None]) -> None:
         self._context = context
         self._on_push = on_push
-        self._encoder = AnswerEncoder()
+        self._encoder = ReplyEncoder()
         self.received: list[RecordedRequest] = []
-        self.change: Change = lambda _request, reply: reply
+        self.change: ReplyFilter = lambda _request, reply: reply
         self.port = 0
         self._socket: zmq.Socket[bytes] | None = None
         self.start()
@@ -112,19 +112,19 @@ class ScriptedMaster:
     def submit(self, request: Request) -> None:
         """Apply a request of the tester. Raises `WireError` if the graph rejects the request."""
         for each in self.graph.apply(request, 1, 0.0, PEER):
-            if isinstance(each.answer, Refused):
-                raise WireError(each.answer.reason)
+            if isinstance(each.body, Refused):
+                raise WireError(each.body.reason)
             if each.call is None:
                 self._push(each)
 
     def drop(self, node_id: str) -> None:
         """Remove a node from the graph, as if its lease had expired."""
-        for each in self.graph.drop([node_id]):
+        for each in self.graph.unregister_nodes([node_id]):
             self._push(each)
 
     def repeat_pushes(self, node_id: str, record: PublisherRecord, node: NodeRecord) -> None:
         """Push a publisher to the adapter's node two more times."""
-        came = PublisherCame(
+        came = PublisherAdded(
             self.graph.epoch, self.graph.revision, RemotePublisher(record, node.id, node.name)
         )
         for _turn in range(2):
@@ -138,7 +138,7 @@ class ScriptedMaster:
 
     def _serve(self, sender: str, parts: list[bytes]) -> None:
         body = parts[-1]
-        request = _read(sender, parts)
+        request = _parse_request(sender, parts)
         self.received.append(request)
         received = decode_request(body)
         if isinstance(received.request, WireError):
@@ -155,7 +155,7 @@ class ScriptedMaster:
                 self._reply(request, each)
 
     def _reply(self, request: RecordedRequest, each: Outgoing) -> None:
-        encoded = self._encoder.encode(each.answer, each.call or 0)
+        encoded = self._encoder.encode(each.body, each.call or 0)
         reply = self.change(request, msgpack.unpackb(encoded, strict_map_key=False))
         if reply is not None:
             self._send(each.to, msgpack.packb(reply))
@@ -167,7 +167,7 @@ class ScriptedMaster:
         if member.route == PEER:
             self._on_push(each)
         else:
-            self._send(member.route, self._encoder.encode(each.answer))
+            self._send(member.route, self._encoder.encode(each.body))
 
     def _send(self, route: str, body: bytes) -> None:
         if self._socket is None:
@@ -176,7 +176,7 @@ class ScriptedMaster:
             self._socket.send_multipart([route.encode("utf-8", "surrogateescape"), body])
 
 
-def _read(sender: str, parts: list[bytes]) -> RecordedRequest:
+def _parse_request(sender: str, parts: list[bytes]) -> RecordedRequest:
     now = time.monotonic()
     if len(parts) != 1:
         return RecordedRequest(now, sender, problem=f"{len(parts)} parts")

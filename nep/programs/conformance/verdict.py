@@ -9,14 +9,14 @@ from contextlib import contextmanager
 from nep.errors import NepError
 from nep.i18n import _
 
-_MAX_SHOWN = 200
+_MAX_VALUE_LENGTH = 200
 
 
 class BrokenRuleError(NepError):
     """Error for a client that broke a rule; the message describes the observed behaviour."""
 
 
-def broken(sentence: str) -> BrokenRuleError:
+def broken_rule(sentence: str) -> BrokenRuleError:
     """Create the error with this message."""
     return BrokenRuleError(sentence)
 
@@ -32,16 +32,16 @@ def expect(what: str, seen: object, wanted: object) -> None:
 
 
 @contextmanager
-def at_most(seconds: float) -> Iterator[None]:
+def time_limit(seconds: float) -> Iterator[None]:
     """Raise `BrokenRuleError` if the block takes longer than `seconds`."""
     began = time.monotonic()
     yield
     took_s = time.monotonic() - began
     if took_s > seconds:
-        raise broken(_("it took {seconds:.1f} s").format(seconds=took_s))
+        raise broken_rule(_("it took {seconds:.1f} s").format(seconds=took_s))
 
 
 def printable(value: object) -> str:
     """Return the `ascii` of a value, shortened for a message."""
     text = ascii(value)
-    return text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}…"
+    return text if len(text) <= _MAX_VALUE_LENGTH else f"{text[:_MAX_VALUE_LENGTH]}…"

@@ -5,29 +5,29 @@ from these facts alone. `diagnose` does both, optionally for a topic whose messa
 (`topic_findings`).
 """
 
-from nep.programs.doctor.collect import collect_facts, start_obstacle
-from nep.programs.doctor.diagnose import Tell, diagnose
-from nep.programs.doctor.diagnosis import findings, in_order, report, to_plain, worst
+from nep.programs.doctor.collect import collect_facts, start_blocker
+from nep.programs.doctor.diagnose import ProgressCallback, diagnose
+from nep.programs.doctor.diagnosis import exit_code, findings, report_text, sort_findings, to_plain
 from nep.programs.doctor.facts import Facts, TopicFacts
 from nep.programs.doctor.finding import Finding, Severity
 from nep.programs.doctor.listen import collect_topic
-from nep.programs.doctor.topics import meant_topic, topic_findings
+from nep.programs.doctor.topics import closest_topic, topic_findings
 
 __all__ = [
     "Facts",
     "Finding",
+    "ProgressCallback",
     "Severity",
-    "Tell",
     "TopicFacts",
+    "closest_topic",
     "collect_facts",
     "collect_topic",
     "diagnose",
+    "exit_code",
     "findings",
-    "in_order",
-    "meant_topic",
-    "report",
-    "start_obstacle",
+    "report_text",
+    "sort_findings",
+    "start_blocker",
     "to_plain",
     "topic_findings",
-    "worst",
 ]

@@ -29,7 +29,7 @@ from nep.programs.doctor.facts import (
     ProgramFact,
 )
 from nep.programs.doctor.finding import Finding
-from nep.programs.doctor.listen import reach_of
+from nep.programs.doctor.listen import probe_endpoint
 from nep.programs.doctor.network import loopback, masters
 from nep.programs.gateway.portmap import default_file
 from nep.protocol.graph_view import GraphView
@@ -56,7 +56,7 @@ _GRAPH_TIMEOUT_S = 1.0
 _MAX_CLOCK_AHEAD_S = 0.5
 _MIN_FREE_BYTES = 10_000_000
 _ORIGINAL_FILES = ("helpers.py", "master.py", "publisher.py", "subscriber.py")
-_GATEWAY_OFF = {"0", "false", "no", "off"}
+_GATEWAY_OFF_VALUES = {"0", "false", "no", "off"}
 
 
 def collect_facts(
@@ -84,7 +84,7 @@ def collect_in_steps(
     chosen, package = master_address(address), Path(nep.errors.__file__).parent
     facts = Facts(time.time(), chosen, sys.platform, _versions(), str(package))
     yield ("clock", "versions"), facts
-    facts = replace(facts, loopback=loopback_problem())
+    facts = replace(facts, loopback_problem=loopback_problem())
     yield ("loopback",), facts
     state = (_("Ports of programs of the original NEP"), default_file(0).parent)
     facts = replace(facts, folders=tuple(_folder(purpose, path) for purpose, path in (state, *folders)))
@@ -92,17 +92,17 @@ def collect_in_steps(
     facts = replace(
         facts,
         packages=tuple(_packages()),
-        strange_files=tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
-        shadow=_shadow(here or Path.cwd(), package),
+        original_files=tuple(name for name in _ORIGINAL_FILES if (package / name).exists()),
+        shadow=_shadowing_file(here or Path.cwd(), package),
         path_package=namesakes.path_python_package(),
         node_packages=namesakes.node_packages(here or Path.cwd()),
     )
     yield ("packages",), facts
-    facts, master_pid, listening = _with_master(facts)
+    facts, master_pid, listening = _collect_master(facts)
     yield ("masters", "alerts", "clocks"), facts
-    joins = os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF
+    joins = os.environ.get("NEP_GATEWAY", "1").lower() not in _GATEWAY_OFF_VALUES
     ports = tuple(_port(port, purpose, listening, master_pid) for port, purpose in PORTS.items())
-    facts = replace(facts, ports=ports, joins_originals=joins)
+    facts = replace(facts, ports=ports, is_gateway_enabled=joins)
     yield ("ports", "originals"), facts
     holder = facts.master_port.holder if facts.master_port is not None else None
     facts = replace(
@@ -112,11 +112,11 @@ def collect_in_steps(
     yield ("programs",), replace(facts, programs=tuple(_programs(facts.view)))
 
 
-def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | None]]:
+def _collect_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | None]]:
     chosen = facts.address
     number = int(chosen.rpartition(":")[2])
     view, answered_s, is_known = _query_graph(chosen)
-    listening = processes.listening()
+    listening = processes.listening_ports()
     master_port = _port(number, "the master's", listening) if _is_own_address(chosen) else None
     holder = master_port.holder if master_port is not None else None
     master_pid = holder.pid if view is not None and holder is not None else None
@@ -125,35 +125,35 @@ def _with_master(facts: Facts) -> tuple[Facts, int | None, Mapping[int, int | No
     found = replace(
         facts,
         view=view,
-        answered_s=answered_s,
+        reply_time_s=answered_s,
         master_port=master_port,
-        masters=processes.masters(listening, number),
+        masters=processes.master_processes(listening, number),
         clocks=tuple(_clocks(view)),
         master_install=installs.install_of(master_pid) if master_pid is not None else None,
-        is_known=is_known,
-        answers_at=_answers_at(chosen) if elsewhere else "",
-        reach=reach_of(f"tcp://{chosen}") if is_far else None,
+        is_host_known=is_known,
+        replying_address=_replying_address(chosen) if elsewhere else "",
+        reach_failure=probe_endpoint(f"tcp://{chosen}") if is_far else None,
     )
     return found, master_pid, listening
 
 
-def _answers_at(address: str) -> str:
+def _replying_address(address: str) -> str:
     own = f"127.0.0.1:{address.rpartition(':')[2]}"
     return own if not is_loopback(address) and _query_graph(own)[0] is not None else ""
 
 
-def start_obstacle(address: str | None = None) -> Finding | None:
+def start_blocker(address: str | None = None) -> Finding | None:
     """Return the finding that prevents starting a master at the address, or None.
 
     An address that is not loopback is an obstacle, because masters are started at loopback addresses only.
     """
     chosen = master_address(address)
-    facts = Facts(time.time(), chosen, sys.platform, {}, "", loopback=loopback_problem())
+    facts = Facts(time.time(), chosen, sys.platform, {}, "", loopback_problem=loopback_problem())
     if is_loopback(chosen):
-        port = _port(int(chosen.rpartition(":")[2]), "", processes.listening())
+        port = _port(int(chosen.rpartition(":")[2]), "", processes.listening_ports())
         facts = replace(facts, master_port=port)
     else:
-        facts, *_more = _with_master(facts)
+        facts, *_more = _collect_master(facts)
     for finding in (*loopback(facts), *masters(facts)):
         if finding.severity == "error" and finding.id != "master:none":
             return finding
@@ -183,7 +183,7 @@ def _port(
     port: int, purpose: str, listening: Mapping[int, int | None], master_pid: int | None = None
 ) -> PortFact:
     if port in listening:
-        return PortFact(port, purpose, True, processes.describe(listening[port], master_pid))
+        return PortFact(port, purpose, True, processes.process_fact(listening[port], master_pid))
     return PortFact(port, purpose, not processes.is_free(port))
 
 
@@ -217,7 +217,7 @@ def _packages() -> Iterator[PackageFact]:
             yield PackageFact(name, found.version, str(found.locate_file("")))
 
 
-def _shadow(here: Path, package: Path) -> str:
+def _shadowing_file(here: Path, package: Path) -> str:
     for candidate in (here / "nep.py", here / "nep" / "__init__.py"):
         if candidate.exists() and candidate.resolve().parent != package.resolve():
             return str(candidate)
@@ -249,7 +249,7 @@ def _programs(view: GraphView | None) -> Iterator[ProgramFact]:
         if pid is None:
             continue
         opened, limit = processes.open_files(pid)
-        limit = limit or descriptors.limit()  # macOS reports only the limit of this process
+        limit = limit or descriptors.descriptor_limit()  # macOS reports only the limit of this process
         if opened is not None and limit is not None:
             yield ProgramFact(pid, name, opened, limit)
 

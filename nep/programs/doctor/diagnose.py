@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from nep.programs.doctor.collect import collect_in_steps
-from nep.programs.doctor.diagnosis import PARTS, in_order
+from nep.programs.doctor.diagnosis import CHECKS, sort_findings
 from nep.programs.doctor.facts import Facts
 from nep.programs.doctor.finding import Finding
 from nep.programs.doctor.listen import collect_topic
 from nep.programs.doctor.topics import topic_findings
 
-Tell = Callable[[tuple[Finding, ...], int, int], object]
+ProgressCallback = Callable[[tuple[Finding, ...], int, int], object]
 """Progress callback: (findings so far, worst first; number of completed checks; number of all checks)."""
 
 
@@ -20,7 +20,7 @@ def diagnose(
     address: str | None = None,
     topic: str = "",
     folders: Sequence[tuple[str, Path]] = (),
-    tell: Tell | None = None,
+    tell: ProgressCallback | None = None,
 ) -> tuple[Finding, ...]:
     """Run all checks and return the findings, worst first. Takes some seconds.
 
@@ -33,19 +33,21 @@ def diagnose(
     """
     found: dict[str, tuple[Finding, ...]] = {}
     facts: Facts | None = None
-    count = len(PARTS) + bool(topic)
+    count = len(CHECKS) + bool(topic)
     for names, facts in collect_in_steps(address, folders=folders):
-        found.update((name, tuple(PARTS[name](facts))) for name in names)
+        found.update((name, tuple(CHECKS[name](facts))) for name in names)
         if tell is not None:
-            tell(_all(found), len(found), count)
+            tell(_merge_findings(found), len(found), count)
     missed = collect_topic(topic, address) if topic and facts is not None and facts.view is not None else None
-    result = _all(found, topic_findings(missed) if missed is not None else ())
+    result = _merge_findings(found, topic_findings(missed) if missed is not None else ())
     if tell is not None:
         tell(result, count, count)
     return result
 
 
-def _all(found: dict[str, tuple[Finding, ...]], about: Sequence[Finding] = ()) -> tuple[Finding, ...]:
+def _merge_findings(
+    found: dict[str, tuple[Finding, ...]], about: Sequence[Finding] = ()
+) -> tuple[Finding, ...]:
     topic_ids = {each.id for each in about}
-    general = [each for name in PARTS for each in found.get(name, ()) if each.id not in topic_ids]
-    return in_order([*about, *general])
+    general = [each for name in CHECKS for each in found.get(name, ()) if each.id not in topic_ids]
+    return sort_findings([*about, *general])

@@ -17,33 +17,33 @@ MIN_FILES = 1024
 FILES_WARNING_RATIO = 0.8
 _FILES_PER_TOPIC = 20
 """File descriptors that a master needs per topic of the original NEP; a native topic needs fewer."""
-_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2, "ok": 3}
-_SIGNS = {"error": "x", "warning": "!", "info": "-", "ok": "+"}
-EARLIEST_S = 1_704_067_200.0
+_SEVERITY_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2, "ok": 3}
+_SEVERITY_SIGNS = {"error": "x", "warning": "!", "info": "-", "ok": "+"}
+MIN_VALID_TIME_S = 1_704_067_200.0
 """Start of 2024. A clock with an earlier time was never set."""
 
 
 def findings(facts: Facts) -> tuple[Finding, ...]:
     """Derive all findings from the facts, worst first."""
-    return in_order(finding for part in PARTS.values() for finding in part(facts))
+    return sort_findings(finding for part in CHECKS.values() for finding in part(facts))
 
 
-def in_order(found: Iterable[Finding]) -> tuple[Finding, ...]:
+def sort_findings(found: Iterable[Finding]) -> tuple[Finding, ...]:
     """Sort findings by severity, worst first; the order is stable."""
-    return tuple(sorted(found, key=lambda finding: _ORDER[finding.severity]))
+    return tuple(sorted(found, key=lambda finding: _SEVERITY_ORDER[finding.severity]))
 
 
-def worst(found: Sequence[Finding]) -> Literal[0, 1, 2]:
+def exit_code(found: Sequence[Finding]) -> Literal[0, 1, 2]:
     """Return the exit code for findings: 2 with an error, 1 with a warning, else 0."""
     severities = {finding.severity for finding in found}
     return 2 if "error" in severities else 1 if "warning" in severities else 0
 
 
-def report(found: Sequence[Finding]) -> str:
+def report_text(found: Sequence[Finding]) -> str:
     """Format findings as plain text, for a bug report."""
     lines = []
     for finding in found:
-        lines.append(f"{_SIGNS[finding.severity]} {finding.sentence}")
+        lines.append(f"{_SEVERITY_SIGNS[finding.severity]} {finding.sentence}")
         lines += [f"    {line}" for line in (finding.fix, finding.command) if line]
     return "\n".join(lines) + "\n"
 
@@ -69,12 +69,12 @@ def _packages(facts: Facts) -> Iterator[Finding]:
             ),
             command="pip uninstall -y nep && pip install --force-reinstall --no-deps nep-studio",
         )
-    if facts.strange_files and not originals:
+    if facts.original_files and not originals:
         yield Finding(
             "package:files",
             "error",
             _("The folder {folder} contains files of the original NEP: {names}.").format(
-                folder=facts.nep_file, names=", ".join(facts.strange_files)
+                folder=facts.nep_folder, names=", ".join(facts.original_files)
             ),
             _("Reinstall NEP Studio."),
             command="pip install --force-reinstall --no-deps nep-studio",
@@ -88,9 +88,9 @@ def _packages(facts: Facts) -> Iterator[Finding]:
             ),
             _("Rename that file."),
         )
-    if not originals and not facts.strange_files:
+    if not originals and not facts.original_files:
         yield Finding(
-            "package", "ok", _("“import nep” uses the package in {folder}.").format(folder=facts.nep_file)
+            "package", "ok", _("“import nep” uses the package in {folder}.").format(folder=facts.nep_folder)
         )
     yield from _python_namesake(facts)
     if facts.node_packages:
@@ -103,7 +103,7 @@ def _python_namesake(facts: Facts) -> Iterator[Finding]:
             "package:python3",
             "info",
             _("“python3” in the terminal imports the original nep {version} from {folder}.").format(
-                version=facts.path_package.version, folder=facts.path_package.place
+                version=facts.path_package.version, folder=facts.path_package.location
             ),
             _(
                 "Programs of the original NEP need this package and connect through the gateway. Start "
@@ -121,7 +121,7 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
             "ok",
             _(
                 "JavaScript programs in this folder import nep-js {version} of NEP Studio from {folder}."
-            ).format(version=imported.version, folder=imported.place),
+            ).format(version=imported.version, folder=imported.location),
         )
     if ours is not None:
         return Finding(
@@ -130,9 +130,9 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
             _(
                 "JavaScript programs in this folder import another project's nep-js {version} from "
                 "{folder} instead of NEP Studio's in {hidden}."
-            ).format(version=imported.version, folder=imported.place, hidden=ours.place),
+            ).format(version=imported.version, folder=imported.location, hidden=ours.location),
             _("Uninstall the other package, or keep programs of the original NEP in a separate folder."),
-            command=f'npm uninstall --prefix "{Path(imported.place).parent.parent}" nep-js',
+            command=f'npm uninstall --prefix "{Path(imported.location).parent.parent}" nep-js',
         )
     return Finding(
         "package:nep-js",
@@ -140,7 +140,7 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
         _(
             "JavaScript programs in this folder import nep-js {version} from {folder}, which is not "
             "part of NEP Studio."
-        ).format(version=imported.version, folder=imported.place),
+        ).format(version=imported.version, folder=imported.location),
         _(
             "Programs of the original NEP connect through the gateway. For other programs, install the file "
             "nep-js-….tgz of NEP Studio's release in this folder."
@@ -150,19 +150,19 @@ def _node_package(packages: Sequence[PackageFact]) -> Finding:
 
 def _files(facts: Facts) -> Iterator[Finding]:
     files = facts.files
-    if files.soft is not None and files.soft < MIN_FILES:
+    if files.soft_limit is not None and files.soft_limit < MIN_FILES:
         yield Finding(
             "files",
             "warning",
             _("The open-file limit is {files}, enough for about {topics} topics.").format(
-                files=files.soft, topics=files.soft // _FILES_PER_TOPIC
+                files=files.soft_limit, topics=files.soft_limit // _FILES_PER_TOPIC
             ),
             _("Raise the limit in the terminal from which you start programs."),
-            command=f"ulimit -n {min(8192, files.hard or 8192)}",
+            command=f"ulimit -n {min(8192, files.hard_limit or 8192)}",
         )
-    elif files.soft is not None:
-        yield Finding("files", "ok", _("Open-file limit: {files}.").format(files=files.soft))
-    opened, limit = files.master_open, files.master_limit
+    elif files.soft_limit is not None:
+        yield Finding("files", "ok", _("Open-file limit: {files}.").format(files=files.soft_limit))
+    opened, limit = files.master_open_count, files.master_limit
     if opened is not None and limit is not None and opened > FILES_WARNING_RATIO * limit:
         yield Finding(
             "files:master",
@@ -178,14 +178,14 @@ def _files(facts: Facts) -> Iterator[Finding]:
 
 def _programs(facts: Facts) -> Iterator[Finding]:
     for program in facts.programs:
-        if program.opened > FILES_WARNING_RATIO * program.limit:
+        if program.open_count > FILES_WARNING_RATIO * program.limit:
             yield Finding(
                 f"files:{program.pid}",
                 "warning",
                 _(
                     "The program of “{name}” has {opened} of at most {limit} files open. At the limit, it "
                     "can't create publishers or subscribers, and other programs can't connect to it."
-                ).format(name=program.name, opened=program.opened, limit=program.limit),
+                ).format(name=program.name, opened=program.open_count, limit=program.limit),
                 _(
                     "Close nodes and files that the program no longer needs, or start it from a terminal "
                     "with a higher limit."
@@ -218,7 +218,7 @@ def _folder_problem(folder: FolderFact) -> Finding:
 
 
 def _clock(facts: Facts) -> Iterator[Finding]:
-    if facts.now_s < EARLIEST_S:
+    if facts.now_s < MIN_VALID_TIME_S:
         yield Finding(
             "clock",
             "warning",
@@ -232,7 +232,7 @@ def _versions(facts: Facts) -> Iterator[Finding]:
     yield Finding("versions", "info", f"{words}.")
 
 
-PARTS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
+CHECKS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
     "loopback": loopback,
     "masters": masters,
     "ports": ports,

@@ -9,7 +9,7 @@ from typing import Literal
 from nep.programs.doctor.installs import Install
 from nep.protocol.graph_view import Alert, GraphView
 
-Reach = Literal["", "elsewhere", "refused", "timeout", "unknown"]
+ReachFailure = Literal["", "elsewhere", "refused", "timeout", "unknown"]
 """Reason why an address can't be reached; "" if it can, or was not tried.
 
 "elsewhere": reachable only from its own computer. "refused": the port is closed. "timeout": no reply.
@@ -31,7 +31,7 @@ class ProcessFact:
     pid: int | None
     name: str
     is_master: bool = False
-    since_s: float | None = None
+    started_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class PackageFact:
 
     name: str
     version: str
-    place: str
+    location: str
     is_ours: bool = True
 
 
@@ -72,9 +72,9 @@ class FileFact:
         master_limit: Limit of the master.
     """
 
-    soft: int | None
-    hard: int | None
-    master_open: int | None = None
+    soft_limit: int | None
+    hard_limit: int | None
+    master_open_count: int | None = None
     master_limit: int | None = None
 
 
@@ -91,7 +91,7 @@ class ProgramFact:
 
     pid: int
     name: str
-    opened: int
+    open_count: int
     limit: int
 
 
@@ -157,25 +157,25 @@ class Facts:
     address: str
     platform: str
     versions: Mapping[str, str]
-    nep_file: str
+    nep_folder: str
     view: GraphView | None = None
-    answered_s: float | None = None
+    reply_time_s: float | None = None
     master_port: PortFact | None = None
     ports: tuple[PortFact, ...] = ()
     masters: tuple[tuple[ProcessFact, int | None], ...] = ()
-    joins_originals: bool = True
+    is_gateway_enabled: bool = True
     packages: tuple[PackageFact, ...] = ()
-    strange_files: tuple[str, ...] = ()
+    original_files: tuple[str, ...] = ()
     shadow: str = ""
     files: FileFact = field(default_factory=lambda: FileFact(None, None))
     folders: tuple[FolderFact, ...] = ()
     clocks: tuple[ClockFact, ...] = ()
-    loopback: str = ""
+    loopback_problem: str = ""
     master_install: Install | None = None
     programs: tuple[ProgramFact, ...] = ()
-    is_known: bool = True
-    answers_at: str = ""
-    reach: Reach | None = None
+    is_host_known: bool = True
+    replying_address: str = ""
+    reach_failure: ReachFailure | None = None
     path_package: PackageFact | None = None
     node_packages: tuple[PackageFact, ...] = ()
 
@@ -199,9 +199,9 @@ class PublisherFact:
     host: str
     generation: str = "native"
     sent: int | None = None
-    last_s: float | None = None
+    last_message_s: float | None = None
     endpoint: str = ""
-    reach: Reach = ""
+    reach_failure: ReachFailure = ""
     remedies: tuple[str, ...] = ()
 
 
@@ -230,11 +230,11 @@ class TopicFacts:
     address: str
     is_shared: bool = False
     publishers: tuple[PublisherFact, ...] = ()
-    others: Mapping[str, float | None] = field(default_factory=dict)
+    other_topics: Mapping[str, float | None] = field(default_factory=dict)
     services: tuple[str, ...] = ()
     alerts: tuple[Alert, ...] = ()
-    listened_s: float = 0.0
+    listen_duration_s: float = 0.0
     received: int = 0
-    refused: int = 0
-    unreadable: str = ""
-    bad_name: str = ""
+    rejected: int = 0
+    decode_problem: str = ""
+    name_problem: str = ""

@@ -39,7 +39,7 @@ class Finding:
         return words[:1].lower() + words[1:]
 
 
-def ago(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Format a duration in the largest suitable unit, from seconds to days."""
     if seconds < 90:
         return f"{max(0, round(seconds))} s"

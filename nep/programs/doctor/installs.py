@@ -28,8 +28,8 @@ class Install:
     """Version of NEP Studio in a Python environment, with the time of installation (s since 1970)."""
 
     version: str
-    since_s: float
-    place: str
+    installed_s: float
+    location: str
 
 
 def install_of(pid: int) -> Install | None:

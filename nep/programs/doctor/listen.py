@@ -13,15 +13,15 @@ import zmq
 import nep.errors
 from nep.i18n import _
 from nep.nodes.node import Node
-from nep.programs.doctor.facts import PublisherFact, Reach, TopicFacts
+from nep.programs.doctor.facts import PublisherFact, ReachFailure, TopicFacts
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from nep.protocol.wire import check_topic
-from nep.system.addresses import master_address, nearest
+from nep.system.addresses import master_address, reachable_endpoint
 
 _GRAPH_TIMEOUT_S = 1.0
-_LISTEN_S = 1.5
+_LISTEN_DURATION_S = 1.5
 _CONNECT_TIMEOUT_S = 0.7
-_MAX_TRIED = 4
+_MAX_ENDPOINTS_TRIED = 4
 """Maximum number of publisher addresses tried; an address without reply takes `_CONNECT_TIMEOUT_S`."""
 _REMEDIES = ("restart", "reset", "start")
 """Name prefixes of services that may restart a program."""
@@ -33,7 +33,7 @@ def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
     try:
         check_topic(topic)
     except nep.errors.NepError as error:
-        return TopicFacts(topic, time.time(), chosen, bad_name=str(error))
+        return TopicFacts(topic, time.time(), chosen, name_problem=str(error))
     try:
         with Node(f"nep-doctor-topic-{os.getpid()}", master=chosen) as node:
             return _collect(node, topic, chosen)
@@ -41,7 +41,7 @@ def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
         return None
 
 
-def reach_of(endpoint: str) -> Reach:
+def probe_endpoint(endpoint: str) -> ReachFailure:
     """Try to connect to an endpoint; return the reason of the failure, or "" if it can be reached."""
     place, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
     if not endpoint.startswith("tcp://") or not colon:
@@ -63,7 +63,12 @@ def _collect(node: Node, topic: str, address: str) -> TopicFacts:
     others = {name: each.rate_hz for name, each in view.topics.items() if each.publishers}
     if info is None or not info.publishers:
         return TopicFacts(
-            topic, time.time(), address, bool(view.listens), others=others, services=tuple(view.services)
+            topic,
+            time.time(),
+            address,
+            bool(view.listens),
+            other_topics=others,
+            services=tuple(view.services),
         )
     received, refused, unreadable, listened_s = _listen(node, info)
     view = node.graph(_GRAPH_TIMEOUT_S)  # includes alerts raised while subscribed
@@ -87,7 +92,7 @@ def _collect(node: Node, topic: str, address: str) -> TopicFacts:
 def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
     began = time.monotonic()
     with node.new_sub(info.name, info.msg_type, wildcards=False) as subscriber:
-        message, unreadable = subscriber.receive(_LISTEN_S), ""
+        message, unreadable = subscriber.receive(_LISTEN_DURATION_S), ""
         if message is not None:
             try:
                 message.kind.decode(message.raw, message.extension)
@@ -97,11 +102,13 @@ def _listen(node: Node, info: TopicInfo) -> tuple[int, int, str, float]:
 
 
 def _publishers(view: GraphView, info: TopicInfo, address: str) -> tuple[PublisherFact, ...]:
-    tried: dict[str, Reach] = {}
+    tried: dict[str, ReachFailure] = {}
     return tuple(_publisher(view, each, address, tried) for each in info.publishers)
 
 
-def _publisher(view: GraphView, each: PublisherInfo, address: str, tried: dict[str, Reach]) -> PublisherFact:
+def _publisher(
+    view: GraphView, each: PublisherInfo, address: str, tried: dict[str, ReachFailure]
+) -> PublisherFact:
     node = view.nodes.get(each.node_id)
     is_native = node is None or node.generation == "native"
     endpoint, reach = _endpoint_and_reach(each, address, tried) if is_native else ("", "")
@@ -115,35 +122,37 @@ def _publisher(view: GraphView, each: PublisherInfo, address: str, tried: dict[s
         node.host if node is not None else "",
         node.generation if node is not None else "native",
         each.count if is_native else None,
-        _last_s(view, each),
+        _last_message_s(view, each),
         endpoint,
         reach,
         tuple(name for name in services if name.rpartition("/")[2].lower().startswith(_REMEDIES)),
     )
 
 
-def _endpoint_and_reach(each: PublisherInfo, address: str, tried: dict[str, Reach]) -> tuple[str, Reach]:
+def _endpoint_and_reach(
+    each: PublisherInfo, address: str, tried: dict[str, ReachFailure]
+) -> tuple[str, ReachFailure]:
     # Each endpoint is tried once.
     if not each.endpoints:
         return "", ""
-    endpoint = nearest(each.endpoints, address)
+    endpoint = reachable_endpoint(each.endpoints, address)
     if not endpoint:
         return each.endpoints[0], "elsewhere"
-    if endpoint not in tried and len(tried) < _MAX_TRIED:
-        tried[endpoint] = reach_of(endpoint)
+    if endpoint not in tried and len(tried) < _MAX_ENDPOINTS_TRIED:
+        tried[endpoint] = probe_endpoint(endpoint)
     return endpoint, tried.get(endpoint, "")
 
 
-def _last_s(view: GraphView, each: PublisherInfo) -> float | None:
+def _last_message_s(view: GraphView, each: PublisherInfo) -> float | None:
     if each.last_stamp_ns is None:
         return None
-    offsets = _offsets(view)
+    offsets = _clock_offsets(view)
     offset_ns = offsets.get(each.node_id, 0)
     here = next((offsets[id] for id, node in view.nodes.items() if id in offsets and _is_own(node.host)), 0)
     return (each.last_stamp_ns + offset_ns - here) / 1e9
 
 
-def _offsets(view: GraphView) -> Mapping[str, int]:
+def _clock_offsets(view: GraphView) -> Mapping[str, int]:
     return {id: node.clock_offset_ns for id, node in view.nodes.items() if node.clock_offset_ns is not None}
 
 

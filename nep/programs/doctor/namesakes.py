@@ -14,8 +14,13 @@ from pathlib import Path
 
 from nep.programs.doctor.facts import PackageFact
 
-_SITES = ("lib/{}/site-packages", "lib/{}/dist-packages", "local/lib/{}/dist-packages", "Lib/site-packages")
-_ORIGINAL_BELOW = (0, 6)
+_SITE_PACKAGES = (
+    "lib/{}/site-packages",
+    "lib/{}/dist-packages",
+    "local/lib/{}/dist-packages",
+    "Lib/site-packages",
+)
+_FIRST_NATIVE_VERSION = (0, 6)
 
 
 def node_packages(here: Path, environ: Mapping[str, str] = os.environ) -> tuple[PackageFact, ...]:
@@ -56,11 +61,11 @@ def path_python_package(
     names = (name, "python3") if name.startswith("python3.") else ("python3*",)
     is_virtual = (environment / "pyvenv.cfg").exists()
     users = [] if is_virtual else [(home or Path.home()) / ".local"]
-    return next(_originals((*users, environment), names), None)
+    return next(_original_packages((*users, environment), names), None)
 
 
-def _originals(environments: Iterable[Path], names: Iterable[str]) -> Iterator[PackageFact]:
-    patterns = dict.fromkeys(site.format(name) for name in names for site in _SITES)
+def _original_packages(environments: Iterable[Path], names: Iterable[str]) -> Iterator[PackageFact]:
+    patterns = dict.fromkeys(site.format(name) for name in names for site in _SITE_PACKAGES)
     for environment in environments:
         for site in (site for pattern in patterns for site in sorted(environment.glob(pattern))):
             package = site / "nep"
@@ -68,9 +73,9 @@ def _originals(environments: Iterable[Path], names: Iterable[str]) -> Iterator[P
                 continue
             for info in (*site.glob("nep-*.dist-info"), *site.glob("nep-*.egg-info")):
                 version = info.name.removeprefix("nep-").partition("-py")[0].removesuffix(info.suffix)
-                if _numbers(version) < _ORIGINAL_BELOW:
+                if _version_numbers(version) < _FIRST_NATIVE_VERSION:
                     yield PackageFact("nep", version, str(site), is_ours=False)
 
 
-def _numbers(version: str) -> tuple[int, ...]:
+def _version_numbers(version: str) -> tuple[int, ...]:
     return tuple(int(part) for part in version.split(".") if part.isdecimal())

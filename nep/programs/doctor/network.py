@@ -6,21 +6,23 @@ from collections.abc import Iterator
 
 from nep.i18n import _, ngettext, number
 from nep.programs.doctor.facts import Facts, ProcessFact
-from nep.programs.doctor.finding import Finding, ago, with_process
+from nep.programs.doctor.finding import Finding, duration_text, with_process
 from nep.system.addresses import host_of, is_loopback
 
-SLOW_S = 0.5
-NOT_SERVED = ("0.5.4.6", "0.5.4.7")
-_NATIVE = {"native", "gateway"}
+SLOW_REPLY_S = 0.5
+UNSUPPORTED_VERSIONS = ("0.5.4.6", "0.5.4.7")
+_NATIVE_GENERATIONS = {"native", "gateway"}
 
 
 def loopback(facts: Facts) -> Iterator[Finding]:
     """Check that programs of this computer can reach each other."""
-    if facts.loopback:
+    if facts.loopback_problem:
         yield Finding(
             "loopback",
             "error",
-            _("Programs on this computer can't reach each other: {problem}.").format(problem=facts.loopback),
+            _("Programs on this computer can't reach each other: {problem}.").format(
+                problem=facts.loopback_problem
+            ),
             _("Turn on the loopback interface. A firewall or a sandbox may have turned it off."),
             command="ip link set lo up" if facts.platform == "linux" else "",
         )
@@ -33,22 +35,22 @@ def masters(facts: Facts) -> Iterator[Finding]:
     port = facts.master_port
     holder = port.holder if port is not None else None
     if facts.view is not None:
-        yield _running(facts, holder)
+        yield _running_finding(facts, holder)
         yield from _version_mismatch(facts, holder)
-    elif not facts.is_known:
+    elif not facts.is_host_known:
         yield _unknown_host(facts)
-    elif facts.answers_at:
+    elif facts.replying_address:
         yield _loopback_only(facts)
     elif holder is not None and holder.is_master:
-        yield _hung(facts, holder)
+        yield _hung_finding(facts, holder)
     elif port is not None and port.is_taken:
-        yield _port_taken(facts, holder)
-    elif facts.reach is not None:
-        yield _unreached(facts)
+        yield _port_taken_finding(facts, holder)
+    elif facts.reach_failure is not None:
+        yield _unreachable_finding(facts)
     elif not is_loopback(facts.address):
-        yield _not_loopback(facts)
+        yield _not_loopback_finding(facts)
     else:
-        yield _not_running(facts)
+        yield _not_running_finding(facts)
     yield from _multiple_masters(facts)
 
 
@@ -68,28 +70,28 @@ def _loopback_only(facts: Facts) -> Finding:
         "master:closed",
         "error",
         _("The master at {own} accepts only this computer, so it can't be reached at {address}.").format(
-            own=facts.answers_at, address=facts.address
+            own=facts.replying_address, address=facts.address
         ),
         _(
             "Allow other computers to connect in the settings of the Studio that started the master, "
             "or set NEP_MASTER to {own} for the programs on this computer."
-        ).format(own=facts.answers_at),
+        ).format(own=facts.replying_address),
     )
 
 
-def _hung(facts: Facts, holder: ProcessFact) -> Finding:
+def _hung_finding(facts: Facts, holder: ProcessFact) -> Finding:
     return Finding(
         "master:hung",
         "error",
         _("The master at {master} does not reply; it is hung or suspended.").format(
-            master=_master(facts, holder)
+            master=_master_text(facts, holder)
         ),
         _("Stop it and start a new one. Programs that are already connected keep exchanging messages."),
-        command=_kill(facts, holder),
+        command=_kill_command(facts, holder),
     )
 
 
-def _port_taken(facts: Facts, holder: ProcessFact | None) -> Finding:
+def _port_taken_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
     number = facts.address.rpartition(":")[2]
     other = _other_port(number)
     return Finding(
@@ -106,7 +108,7 @@ def _port_taken(facts: Facts, holder: ProcessFact | None) -> Finding:
     )
 
 
-def _not_running(facts: Facts) -> Finding:
+def _not_running_finding(facts: Facts) -> Finding:
     number = facts.address.rpartition(":")[2]
     return Finding(
         "master:none",
@@ -119,7 +121,7 @@ def _not_running(facts: Facts) -> Finding:
     )
 
 
-def _not_loopback(facts: Facts) -> Finding:
+def _not_loopback_finding(facts: Facts) -> Finding:
     own = f"127.0.0.1:{facts.address.rpartition(':')[2]}"
     return Finding(
         "master:network",
@@ -134,18 +136,18 @@ def _not_loopback(facts: Facts) -> Finding:
     )
 
 
-def _unreached(facts: Facts) -> Finding:
+def _unreachable_finding(facts: Facts) -> Finding:
     host, _colon, port = facts.address.rpartition(":")
-    if facts.reach == "timeout":
+    if facts.reach_failure == "timeout":
         sentence = _("{address} does not respond, so the master can't be reached.")
         fix = _(
             "{host} is off, is in another network, or has a firewall that blocks the connection. Allow "
             "NEP Studio (Python) in its firewall."
         )
-    elif facts.reach == "refused":
+    elif facts.reach_failure == "refused":
         sentence = _("{host} can be reached, but accepts no connections from other computers on port {port}.")
         fix = _("Start NEP Studio on that computer and allow other computers to connect in its settings.")
-    elif facts.reach:
+    elif facts.reach_failure:
         sentence = _("This computer has no route to {address}, so the master can't be reached.")
         fix = _("Check that both computers are on the same network.")
     else:
@@ -158,7 +160,7 @@ def _unreached(facts: Facts) -> Finding:
     return Finding("master:unreached", "error", sentence.format(**holes), fix.format(**holes))
 
 
-def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
+def _running_finding(facts: Facts, holder: ProcessFact | None) -> Finding:
     view = facts.view
     people = ""
     if view is not None:
@@ -167,19 +169,19 @@ def _running(facts: Facts, holder: ProcessFact | None) -> Finding:
         nodes = ngettext("{count} node", "{count} nodes", len(view.nodes)).format(count=len(view.nodes))
         topics = ngettext("{count} topic", "{count} topics", len(live)).format(count=len(live))
         people = f"{nodes}, {topics}"
-    if holder is not None and holder.since_s is not None:
-        since = ago(facts.now_s - holder.since_s)
+    if holder is not None and holder.started_s is not None:
+        since = duration_text(facts.now_s - holder.started_s)
         words = _("A master has been running at {master} for {since}: {people}")
     else:
         since = ""
         words = _("A master is running at {master}: {people}")
-    sentence = words.format(master=_master(facts, holder), since=since, people=people)
-    if facts.answered_s is not None and facts.answered_s > SLOW_S:
+    sentence = words.format(master=_master_text(facts, holder), since=since, people=people)
+    if facts.reply_time_s is not None and facts.reply_time_s > SLOW_REPLY_S:
         return Finding(
             "master:slow",
             "warning",
             _("{sentence}. It took {seconds} s to reply.").format(
-                sentence=sentence, seconds=number(facts.answered_s, ".1f")
+                sentence=sentence, seconds=number(facts.reply_time_s, ".1f")
             ),
             _("This computer is very busy. Check which program uses its processor."),
         )
@@ -195,7 +197,7 @@ def _version_mismatch(facts: Facts, holder: ProcessFact | None) -> Iterator[Find
             "The master at {master} belongs to NEP Studio {version} ({place}); this is {own}. New "
             "features and fixes may not work with it."
         )
-    elif holder.since_s is not None and holder.since_s < install.since_s:
+    elif holder.started_s is not None and holder.started_s < install.installed_s:
         words = _(
             "The master at {master} was started before NEP Studio {own} was installed, so it is an "
             "older version. New features and fixes may not work with it."
@@ -205,16 +207,18 @@ def _version_mismatch(facts: Facts, holder: ProcessFact | None) -> Iterator[Find
     yield Finding(
         "master:version",
         "warning",
-        words.format(master=_master(facts, holder), version=install.version, place=install.place, own=own),
+        words.format(
+            master=_master_text(facts, holder), version=install.version, place=install.location, own=own
+        ),
         _(
             "Stop it. If Studio is open, it starts a new master; otherwise, run “nep master”. Programs "
             "that are already connected keep exchanging messages."
         ),
-        command=_kill(facts, holder),
+        command=_kill_command(facts, holder),
     )
 
 
-def _kill(facts: Facts, holder: ProcessFact) -> str:
+def _kill_command(facts: Facts, holder: ProcessFact) -> str:
     return f"kill {holder.pid}" if facts.platform != "win32" else f"taskkill /F /PID {holder.pid}"
 
 
@@ -240,13 +244,13 @@ def originals(facts: Facts) -> Iterator[Finding]:
     """Report programs of the original NEP, including those that the gateway can't serve."""
     if facts.view is None:
         return
-    nodes = [node for node in facts.view.nodes.values() if node.generation not in _NATIVE]
+    nodes = [node for node in facts.view.nodes.values() if node.generation not in _NATIVE_GENERATIONS]
     for node in nodes:
-        if node.generation in NOT_SERVED:
-            yield not_served(f"original:{node.id}", node.name, node.generation)
-    served = [node for node in nodes if node.generation not in NOT_SERVED]
+        if node.generation in UNSUPPORTED_VERSIONS:
+            yield unsupported_finding(f"original:{node.id}", node.name, node.generation)
+    served = [node for node in nodes if node.generation not in UNSUPPORTED_VERSIONS]
     if served:
-        names = ", ".join(f"{node.name} ({_wire(node.generation)})" for node in served)
+        names = ", ".join(f"{node.name} ({_wire_name(node.generation)})" for node in served)
         words = ngettext(
             "{count} program of the original NEP: {names}.",
             "{count} programs of the original NEP: {names}.",
@@ -278,11 +282,11 @@ def clocks(facts: Facts) -> Iterator[Finding]:
         )
 
 
-def _wire(generation: str) -> str:
+def _wire_name(generation: str) -> str:
     return {"A": _("up to 0.5.4.5"), "B": "0.5.4.8"}.get(generation, generation)
 
 
-def _master(facts: Facts, holder: ProcessFact | None) -> str:
+def _master_text(facts: Facts, holder: ProcessFact | None) -> str:
     return with_process(facts.address, holder.pid if holder is not None else None)
 
 
@@ -296,7 +300,7 @@ def _other_port(number: str) -> int:
     return int(number) + 1 if number.isdigit() and int(number) < 65535 else 7781
 
 
-def not_served(finding_id: str, program: str, generation: str) -> Finding:
+def unsupported_finding(finding_id: str, program: str, generation: str) -> Finding:
     """Create the finding for a program with an incompatible version of the original NEP."""
     return Finding(
         finding_id,

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from nep.i18n import _, listed, ngettext
+from nep.i18n import _, format_list, ngettext
 from nep.programs.doctor.facts import Facts, PortFact, ProcessFact
 from nep.programs.doctor.finding import Finding, with_process
 
 KILL_PORT = 12345
 AIRPLAY_PORT = 7000
-_AIRPLAY = ("ControlCe", "AirPlay", "rapportd")
+_AIRPLAY_PROCESSES = ("ControlCe", "AirPlay", "rapportd")
 
 
 def ports(facts: Facts) -> Iterator[Finding]:
     """Report the programs that hold the ports to which programs of the original NEP connect."""
-    if not facts.joins_originals:
+    if not facts.is_gateway_enabled:
         yield Finding(
             "ports",
             "info",
@@ -23,23 +23,23 @@ def ports(facts: Facts) -> Iterator[Finding]:
         )
         return
     asked = [port for port in facts.ports if port.port != KILL_PORT]
-    own = [port for port in asked if port.is_taken and _is_masters(facts, port)]
+    own = [port for port in asked if port.is_taken and _belongs_to_master(facts, port)]
     taken = [port for port in asked if port.is_taken and port not in own]
     airplay = [port for port in taken if _is_airplay(facts, port)]
-    yield from map(_airplay, airplay)
-    yield from _taken([port for port in taken if port not in airplay])
-    yield from _free([port for port in asked if not port.is_taken and facts.view is not None])
+    yield from map(_airplay_finding, airplay)
+    yield from _taken_findings([port for port in taken if port not in airplay])
+    yield from _free_findings([port for port in asked if not port.is_taken and facts.view is not None])
     if own:
         words = ngettext(
             "The master uses port {ports}, which programs of the original NEP connect to.",
             "The master uses ports {ports}, which programs of the original NEP connect to.",
             len(own),
         )
-        yield Finding("ports", "ok", words.format(ports=_numbers(own)))
-    yield from (_kill_port(port) for port in facts.ports if port.port == KILL_PORT and port.is_taken)
+        yield Finding("ports", "ok", words.format(ports=_port_list(own)))
+    yield from (_kill_port_finding(port) for port in facts.ports if port.port == KILL_PORT and port.is_taken)
 
 
-def _is_masters(facts: Facts, port: PortFact) -> bool:
+def _belongs_to_master(facts: Facts, port: PortFact) -> bool:
     view, here = facts.view, facts.master_port
     if here is None or (view is not None and any(each.id == f"port:{port.port}" for each in view.alerts)):
         return False
@@ -52,10 +52,10 @@ def _is_masters(facts: Facts, port: PortFact) -> bool:
 def _is_airplay(facts: Facts, port: PortFact) -> bool:
     name = port.holder.name if port.holder is not None else ""
     is_there = facts.platform == "darwin" and port.port == AIRPLAY_PORT
-    return is_there and (not name or name.startswith(_AIRPLAY))
+    return is_there and (not name or name.startswith(_AIRPLAY_PROCESSES))
 
 
-def _airplay(port: PortFact) -> Finding:
+def _airplay_finding(port: PortFact) -> Finding:
     return Finding(
         "ports:airplay",
         "warning",
@@ -64,10 +64,10 @@ def _airplay(port: PortFact) -> Finding:
     )
 
 
-def _taken(ports: Sequence[PortFact]) -> Iterator[Finding]:
+def _taken_findings(ports: Sequence[PortFact]) -> Iterator[Finding]:
     if not ports:
         return
-    holders = [_holder(port.holder) for port in ports]
+    holders = [_holder_text(port.holder) for port in ports]
     if len(ports) == 1:
         sentence = _("Port {port}, {purpose}, is in use by {program}.").format(
             port=ports[0].port, purpose=_(ports[0].purpose), program=holders[0]
@@ -75,14 +75,14 @@ def _taken(ports: Sequence[PortFact]) -> Iterator[Finding]:
     elif len(set(holders)) == 1:
         sentence = _(
             "Ports {ports}, which programs of the original NEP need, are in use by {program}."
-        ).format(ports=_numbers(ports), program=holders[0])
+        ).format(ports=_port_list(ports), program=holders[0])
     else:
         each = [
             _("{port} ({program})").format(port=port.port, program=holder)
             for port, holder in zip(ports, holders, strict=True)
         ]
         sentence = _("Ports that programs of the original NEP need are in use: {each}.").format(
-            each=listed(each)
+            each=format_list(each)
         )
     yield Finding(
         "ports:taken",
@@ -92,7 +92,7 @@ def _taken(ports: Sequence[PortFact]) -> Iterator[Finding]:
     )
 
 
-def _free(ports: Sequence[PortFact]) -> Iterator[Finding]:
+def _free_findings(ports: Sequence[PortFact]) -> Iterator[Finding]:
     if ports:
         words = ngettext(
             "The gateway for programs of the original NEP is not running: port {ports} is not in use.",
@@ -100,24 +100,24 @@ def _free(ports: Sequence[PortFact]) -> Iterator[Finding]:
             len(ports),
         )
         why = _("The master was started without its gateway.")
-        yield Finding("ports:free", "info", words.format(ports=_numbers(ports)), why)
+        yield Finding("ports:free", "info", words.format(ports=_port_list(ports)), why)
 
 
-def _kill_port(port: PortFact) -> Finding:
+def _kill_port_finding(port: PortFact) -> Finding:
     return Finding(
         f"port:{KILL_PORT}",
         "info",
         _(
             "{program} uses port 12345, where programs of the original NEP listen for the shutdown message."
-        ).format(program=_holder(port.holder)),
+        ).format(program=_holder_text(port.holder)),
     )
 
 
-def _numbers(ports: Sequence[PortFact]) -> str:
-    return listed([str(port.port) for port in ports])
+def _port_list(ports: Sequence[PortFact]) -> str:
+    return format_list([str(port.port) for port in ports])
 
 
-def _holder(holder: ProcessFact | None) -> str:
+def _holder_text(holder: ProcessFact | None) -> str:
     if holder is None:
         return _("another program")
     return with_process(_("another master") if holder.is_master else f"“{holder.name}”", holder.pid)

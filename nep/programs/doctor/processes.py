@@ -18,23 +18,23 @@ else:
     psutil = lazy_module("psutil")
 
 
-_LOOPBACK = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noqa: S104  nothing is bound
+_LOOPBACK_ADDRESSES = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1"})  # noqa: S104  nothing is bound
 _CODE_OPTIONS = frozenset({"-c", "-e", "--eval", "-p", "--print"})
 """Options of Python and Node.js that are followed by source code instead of a file name."""
 _MAX_PORT_DISTANCE = 20
 """Maximum distance of a master's port from the usual port, if the process listens at several ports."""
 
 
-def listening() -> dict[int, int | None]:
+def listening_ports() -> dict[int, int | None]:
     """Return the listening TCP ports with their process ids; None if the system doesn't report one."""
     try:
         connections: Iterable[object] = psutil.net_connections(kind="tcp")
     except psutil.AccessDenied:  # macOS: all connections for root only, own ones for everyone
         connections = _own_connections()
-    return holders(connections)
+    return port_holders(connections)
 
 
-def holders(connections: Iterable[object]) -> dict[int, int | None]:
+def port_holders(connections: Iterable[object]) -> dict[int, int | None]:
     """Return the process id for each listening port; None if the system doesn't report the process.
 
     If several programs listen at one port with different addresses, the one reached at 127.0.0.1 is returned.
@@ -47,7 +47,7 @@ def holders(connections: Iterable[object]) -> dict[int, int | None]:
         local = getattr(each, "laddr", None)
         port = getattr(local, "port", None)
         if isinstance(port, int):
-            found = at_loopback if getattr(local, "ip", "") in _LOOPBACK else elsewhere
+            found = at_loopback if getattr(local, "ip", "") in _LOOPBACK_ADDRESSES else elsewhere
             found[port] = getattr(each, "pid", None) or found.get(port)
     return elsewhere | at_loopback
 
@@ -82,21 +82,23 @@ def is_free(port: int) -> bool:
     return True
 
 
-def describe(pid: int | None, master_pid: int | None = None) -> ProcessFact | None:
+def process_fact(pid: int | None, master_pid: int | None = None) -> ProcessFact | None:
     """Return the facts about a process, or None if the process is unknown or has exited."""
     if pid is None:
         return None
     try:
         process = psutil.Process(pid)
         with process.oneshot():
-            command = _command(process)
+            command = _command_line(process)
             is_master = pid == master_pid or is_master_command(command)
-            return ProcessFact(pid, _name(process.name(), command), is_master, process.create_time())
+            return ProcessFact(pid, _program_name(process.name(), command), is_master, process.create_time())
     except psutil.Error:
         return None
 
 
-def masters(ports: Mapping[int, int | None], usual: int) -> tuple[tuple[ProcessFact, int | None], ...]:
+def master_processes(
+    ports: Mapping[int, int | None], usual: int
+) -> tuple[tuple[ProcessFact, int | None], ...]:
     """Return the processes that run a master, each with its port; the usual port comes first."""
     held: dict[int, list[int]] = {}
     for port, pid in ports.items():
@@ -104,13 +106,13 @@ def masters(ports: Mapping[int, int | None], usual: int) -> tuple[tuple[ProcessF
             held.setdefault(pid, []).append(port)
     found = []
     for pid, own in held.items():
-        fact = describe(pid)
+        fact = process_fact(pid)
         if fact is not None and fact.is_master:
-            found.append((fact, _masters_port(own, usual)))
+            found.append((fact, _master_port(own, usual)))
     return tuple(sorted(found, key=lambda each: (each[1] != usual, each[1] or 0)))
 
 
-def _masters_port(ports: Sequence[int], usual: int) -> int | None:
+def _master_port(ports: Sequence[int], usual: int) -> int | None:
     near = sorted(ports, key=lambda port: abs(port - usual))
     return near[0] if near and (abs(near[0] - usual) <= _MAX_PORT_DISTANCE or len(near) == 1) else None
 
@@ -135,14 +137,14 @@ def open_files(pid: int) -> tuple[int | None, int | None]:
     return opened, limit if limit is not None and limit > 0 else None
 
 
-def _command(process: psutil.Process) -> list[str]:
+def _command_line(process: psutil.Process) -> list[str]:
     try:
         return process.cmdline()
     except psutil.Error:
         return []
 
 
-def _name(name: str, command: Sequence[str]) -> str:
+def _program_name(name: str, command: Sequence[str]) -> str:
     if PurePath(name).stem.lower().startswith(("python", "node", "java")):
         for word in command[1:]:
             if word in _CODE_OPTIONS:

@@ -6,26 +6,26 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
-from nep.i18n import _, listed, number
+from nep.i18n import _, format_list, number
 from nep.programs.doctor.facts import PublisherFact, TopicFacts
-from nep.programs.doctor.finding import Finding, ago
-from nep.programs.doctor.network import NOT_SERVED, not_served
+from nep.programs.doctor.finding import Finding, duration_text
+from nep.programs.doctor.network import UNSUPPORTED_VERSIONS, unsupported_finding
 from nep.system.addresses import is_loopback
 
-QUIET_S = 2.0
+MIN_SILENCE_S = 2.0
 """Time without messages in seconds after which a publisher with a low rate counts as silent."""
-_MAX_NAMED = 5
+_MAX_NAMES = 5
 
 
 def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
     """Return the findings about the topic under diagnosis, most likely cause first."""
-    if facts.bad_name:
+    if facts.name_problem:
         return (
             Finding(
                 "topic:name",
                 "error",
                 _("“{topic}” is not a valid topic name: {reason}.").format(
-                    topic=facts.topic, reason=facts.bad_name
+                    topic=facts.topic, reason=facts.name_problem
                 ),
                 _("Choose an existing topic."),
             ),
@@ -37,7 +37,7 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
     return (*found, *_arrival(facts, is_explained=any(each.severity == "error" for each in found)))
 
 
-def meant_topic(topic: str, names: Iterable[str]) -> str | None:
+def closest_topic(topic: str, names: Iterable[str]) -> str | None:
     """Return the published topic that `topic` most likely means, or None.
 
     The criteria are, in this order: the same name apart from slashes and case, a unique name with the same
@@ -61,22 +61,26 @@ def _normalized(topic: str) -> str:
 
 def _unpublished(facts: TopicFacts) -> Iterator[Finding]:
     sentence = _("{topic} has no publisher.").format(topic=facts.topic)
-    near = meant_topic(facts.topic, facts.others)
+    near = closest_topic(facts.topic, facts.other_topics)
     service = facts.topic if facts.topic in facts.services else ""
     if near is not None:
-        yield Finding("topic:near", "error", sentence, _near_words(facts, near), instead=near)
+        yield Finding("topic:near", "error", sentence, _similar_name_text(facts, near), instead=near)
     elif service:
         words = _("A service has this name. Services reply to calls; they don't publish.")
         yield Finding("topic:service", "error", sentence, words, instead=service)
     else:
         words = _("Start the program that publishes it. Topics published now: {topics}.")
-        known = sorted(name for name in facts.others if not name.startswith("/nep/"))  # hide nep's own topics
-        some = known[:_MAX_NAMED]
+        known = sorted(
+            name for name in facts.other_topics if not name.startswith("/nep/")
+        )  # hide nep's own topics
+        some = known[:_MAX_NAMES]
         if not some:
             words = _("Start the program that publishes it. No other topics are published either.")
         more = len(known) - len(some)
         names = [*some, _("{count} more").format(count=more)] if more else some
-        yield Finding("topic:nobody", "error", sentence, words.format(topics=listed(names) if names else ""))
+        yield Finding(
+            "topic:nobody", "error", sentence, words.format(topics=format_list(names) if names else "")
+        )
     if facts.is_shared:
         yield Finding(
             "topic:shared",
@@ -98,8 +102,8 @@ def _unpublished(facts: TopicFacts) -> Iterator[Finding]:
         )
 
 
-def _near_words(facts: TopicFacts, near: str) -> str:
-    rate_hz = facts.others[near]
+def _similar_name_text(facts: TopicFacts, near: str) -> str:
+    rate_hz = facts.other_topics[near]
     if rate_hz is None:
         return _("Did you mean {topic}?").format(topic=near)
     words = _("Did you mean {topic}? Its publishers send {rate} messages per second.")
@@ -107,29 +111,29 @@ def _near_words(facts: TopicFacts, near: str) -> str:
 
 
 def _publisher(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
-    if each.generation in NOT_SERVED:
-        yield not_served(f"topic:version:{each.node}", each.node, each.generation)
-    elif each.reach:
-        yield _unreached(each)
+    if each.generation in UNSUPPORTED_VERSIONS:
+        yield unsupported_finding(f"topic:version:{each.node}", each.node, each.generation)
+    elif each.reach_failure:
+        yield _unreachable(each)
     elif not facts.received:
         yield from _silence(facts, each)
 
 
-def _unreached(each: PublisherFact) -> Finding:
+def _unreachable(each: PublisherFact) -> Finding:
     place = each.endpoint.removeprefix("tcp://")
-    if each.reach == "elsewhere":
+    if each.reach_failure == "elsewhere":
         sentence = _("“{node}” can be reached only from its own computer, {host}.")
         fix = _(
             "Its NEP_MASTER is an address that works only on that computer. Restart it with the "
             "master's network address as NEP_MASTER."
         )
-    elif each.reach == "timeout":
+    elif each.reach_failure == "timeout":
         sentence = _("“{node}” publishes at {place} ({host}), but that address does not respond.")
         fix = _(
             "A firewall blocks the connection, or the computers are in different networks. Allow "
             "Python in the firewall of {host}."
         )
-    elif each.reach == "refused":
+    elif each.reach_failure == "refused":
         sentence = _("“{node}” published at {place} ({host}), but nothing is listening there now.")
         fix = _("The program has stopped or is not responding. Start it again.")
     else:
@@ -142,17 +146,17 @@ def _unreached(each: PublisherFact) -> Finding:
 
 
 def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
-    quiet_s = facts.now_s - each.last_s if each.last_s is not None else None
-    if quiet_s is not None and quiet_s < max(QUIET_S, facts.listened_s):
+    quiet_s = facts.now_s - each.last_message_s if each.last_message_s is not None else None
+    if quiet_s is not None and quiet_s < max(MIN_SILENCE_S, facts.listen_duration_s):
         return  # it sends; `_arrival` reports missing messages
     if quiet_s is None and each.sent:
         return
-    if quiet_s is None or each.last_s is None:
+    if quiet_s is None or each.last_message_s is None:
         sentence = _("“{node}” is connected but has sent nothing on {topic} yet.")
         fix = _("Check what that program is waiting for.")
     else:
         sentence = _("“{node}” is connected but has sent nothing on {topic} for {ago}.")
-        at = time.strftime("%H:%M:%S", time.localtime(each.last_s))
+        at = time.strftime("%H:%M:%S", time.localtime(each.last_message_s))
         words = _("Its last message was at {at}. Check what that program is waiting for.")
         if each.sent:
             words = _("Its last message was number {count}, at {at}. Check what that program is waiting for.")
@@ -163,7 +167,7 @@ def _silence(facts: TopicFacts, each: PublisherFact) -> Iterator[Finding]:
     yield Finding(
         f"topic:silent:{each.node}",
         "error",
-        sentence.format(node=each.node, topic=facts.topic, ago=ago(quiet_s or 0.0)),
+        sentence.format(node=each.node, topic=facts.topic, ago=duration_text(quiet_s or 0.0)),
         fix,
         instead=remedy,
     )
@@ -174,12 +178,12 @@ def _from_alert(id: str, sentence: str, hint: str) -> Finding:
 
 
 def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
-    if facts.unreadable:
+    if facts.decode_problem:
         yield Finding(
             "topic:unreadable",
             "error",
             _("Messages on {topic} arrive but can't be read: {reason}.").format(
-                topic=facts.topic, reason=facts.unreadable
+                topic=facts.topic, reason=facts.decode_problem
             ),
             _("Check the raw bytes in the Inspector, and the program that sends them: {nodes}.").format(
                 nodes=_publisher_text(facts.publishers)
@@ -188,7 +192,7 @@ def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
     elif facts.received:
         words = _("Messages on {topic} arrive and can be read.")
         yield Finding("topic", "ok", words.format(topic=facts.topic))
-    elif facts.refused:
+    elif facts.rejected:
         yield Finding(
             "topic:wire",
             "error",
@@ -206,7 +210,7 @@ def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
             _("{nodes} sends {topic}, but no messages were received in {seconds} s.").format(
                 topic=facts.topic,
                 nodes=_publisher_text(facts.publishers),
-                seconds=number(facts.listened_s, ".1f"),
+                seconds=number(facts.listen_duration_s, ".1f"),
             ),
             _("This computer or its network may be overloaded, or a firewall blocks the messages."),
         )
@@ -214,4 +218,4 @@ def _arrival(facts: TopicFacts, *, is_explained: bool) -> Iterator[Finding]:
 
 def _publisher_text(publishers: Sequence[PublisherFact]) -> str:
     places = dict.fromkeys(f"{each.node} ({each.host})" for each in publishers)
-    return listed(list(places)[:_MAX_NAMED])
+    return format_list(list(places)[:_MAX_NAMES])

@@ -14,7 +14,7 @@ from nep.errors import BadTopicError, ClosedError, DecodeError, EncodeError, Nep
 from nep.i18n import _, ngettext
 from nep.masters.master import Master
 from nep.messages import image_codec
-from nep.messages.image_files import examine
+from nep.messages.image_files import parse_header
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.publisher import Publisher
@@ -29,7 +29,7 @@ from nep.programs.gateway.relay import Key
 from nep.programs.gateway.request_server import Ports
 from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import Reply, ReportAlerts, Request
-from nep.system.descriptors import allow_many
+from nep.system.descriptors import raise_open_file_limit
 from nep.system.lazy_import import lazy_module
 from nep.text import escaped
 
@@ -62,7 +62,7 @@ class GatewayAttachment:
 
     def start(self, master: Master) -> None:
         """Start the gateway. A port in use is reported as an alert, not raised."""
-        allow_many()
+        raise_open_file_limit()
         address = master.address
 
         def make_node() -> Node:
@@ -166,7 +166,7 @@ class NativeNetwork:
             return message.data
         try:
             if image_codec.raw_layout(message.extension.get("encoding")) is None:
-                examine(message.data)  # reject decompression bombs: original programs decode anything
+                parse_header(message.data)  # reject decompression bombs: original programs decode anything
                 return message.data
             created = image_codec.encode(message.payload)
             if image_codec.raw_layout((created.extension or {}).get("encoding")) is not None:

@@ -71,11 +71,11 @@ class Shape:
 
     def read(self, frame: bytes) -> bytes:
         """Convert a frame to bytes of the native codec. Raises `FrameError`."""
-        data = self._strip(frame)
+        data = self._strip_prefix(frame)
         if self.codec == "image":
-            return _from_base64(data)
+            return _decode_base64(data)
         if self.codec == "json" and _NON_FINITE.search(data):
-            return _without_nan(data)
+            return _replace_nan(data)
         return data
 
     def write(self, data: bytes | memoryview) -> bytes:
@@ -83,7 +83,7 @@ class Shape:
         body = base64.b64encode(data) if self.codec == "image" else data
         return b"".join((self.prefix, body))
 
-    def wants(self, subscription: bytes) -> bool:
+    def matches_filter(self, subscription: bytes) -> bool:
         """Return True if a subscriber with this ZeroMQ filter receives frames of this format."""
         if self.framing == "prefixed":
             return self.prefix.startswith(subscription) or subscription.startswith(self.prefix)
@@ -96,7 +96,7 @@ class Shape:
         """
         return self.framing == "bare" and bool(subscription) and self.topic.encode().startswith(subscription)
 
-    def _strip(self, frame: bytes) -> bytes:
+    def _strip_prefix(self, frame: bytes) -> bytes:
         own = f"{self.topic} ".encode()
         if self.framing == "prefixed":
             if frame.startswith(own):
@@ -122,7 +122,7 @@ class Shape:
             )
 
 
-def lost_numbers(frame: bytes, data: bytes) -> bool:
+def has_replaced_nan(frame: bytes, data: bytes) -> bool:
     """Return True if NaN or infinity in `frame` became `null` in `data`."""
     return _NON_FINITE.search(frame) is not None and data.count(b"null") > frame.count(b"null")
 
@@ -171,7 +171,7 @@ def _utf16_units(letter: str) -> tuple[int, ...]:
     return tuple(int.from_bytes(packed[at : at + 2], "big") for at in range(0, len(packed), 2))
 
 
-def _from_base64(data: bytes) -> bytes:
+def _decode_base64(data: bytes) -> bytes:
     try:
         return base64.b64decode(data, validate=True)
     except binascii.Error as error:
@@ -186,9 +186,9 @@ def _is_json_in_json(frame: bytes) -> bool:
         return False
 
 
-def _without_nan(data: bytes) -> bytes:
+def _replace_nan(data: bytes) -> bytes:
     try:
-        value = json.loads(data, parse_constant=lambda _: None, parse_float=_finite)
+        value = json.loads(data, parse_constant=lambda _: None, parse_float=_parse_finite)
     except (ValueError, RecursionError):
         return data  # not valid JSON: the subscriber's decoder reports it
     try:
@@ -197,6 +197,6 @@ def _without_nan(data: bytes) -> bytes:
         return json.dumps(value, separators=(",", ":")).encode()
 
 
-def _finite(written: str) -> float | None:
+def _parse_finite(written: str) -> float | None:
     number = float(written)
     return number if math.isfinite(number) else None

@@ -20,8 +20,8 @@ from nep.programs.gateway.proxy_pair import ProxyPair, is_free, reply_port
 from nep.programs.gateway.relay import AlertSink, NativeSide, Relay
 from nep.programs.gateway.request_server import Ports, RequestServer
 from nep.programs.gateway.requests import LOOPBACK, Request, RequestError, Role
-from nep.system.descriptors import SPARE, has_room
-from nep.system.forks import give_up, watch
+from nep.system.descriptors import RESERVED_DESCRIPTORS, has_free_descriptors
+from nep.system.forks import close_in_child, watch
 
 _MAINTENANCE_S = 1.0
 """Interval in seconds at which programs that exited are removed and ports in use are retried."""
@@ -97,9 +97,9 @@ class Gateway:
     def forked(self) -> None:
         """Release inherited ports in a forked child process. See `nep.system.forks`."""
         for port in self._request_server.ports:
-            give_up(f"tcp://{LOOPBACK}:{port}")
+            close_in_child(f"tcp://{LOOPBACK}:{port}")
         for pair in tuple(self._relay.pairs):
-            give_up(*(f"tcp://{LOOPBACK}:{end.port}" for end in pair.ends))
+            close_in_child(*(f"tcp://{LOOPBACK}:{end.port}" for end in pair.ends))
 
     def start(self, timeout_s: float = 5.0) -> bool:
         """Start the thread; return True if requests are served within `timeout_s` seconds."""
@@ -120,17 +120,17 @@ class Gateway:
             self._outside.start(self._inbox)
             self._restore()
             self._request_server.open()
-            self._show()
+            self._publish_state()
             self._ready.set()
             while not self._ending.is_set():
-                self._step_safely()
+                self._try_step()
         finally:
             self._relay.close()
             self._request_server.close()
             self._outside.close()
             self._context.term()
 
-    def _step_safely(self) -> None:
+    def _try_step(self) -> None:
         # An error in one topic must not stop the others.
         try:
             self._step()
@@ -150,14 +150,14 @@ class Gateway:
                 changed.add(pair.line)
         for socket in ready:
             if socket in self._request_sockets:
-                self._request_server.answer(socket, self._request_sockets[socket])
+                self._request_server.reply(socket, self._request_sockets[socket])
         for message in self._inbox.pop_all():
             data = self._outside.data_of(message)
             if data is not None:
                 self._relay.deliver(message.topic, message.codec, data)
         if changed:
             self._programs.update(changed)
-            self._show()
+            self._publish_state()
         if time.monotonic() >= self._maintain_at:
             self._maintain()
 
@@ -179,21 +179,21 @@ class Gateway:
                 self._relay.close_line(line)
             self._poller = None
             self._save()
-            self._show()
+            self._publish_state()
         if self._request_server.open():
             self._poller = None
-        if self._unserved() != self._shown_unserved:
-            self._show()
+        if self._unsupported_versions() != self._shown_unserved:
+            self._publish_state()
         self._outside.tick()
 
     def _program_names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
         return self._programs.names(line, role)  # created after the relay, whose pairs it uses
 
-    def _unserved(self) -> dict[TopicLine, dict[Role, str]]:
+    def _unsupported_versions(self) -> dict[TopicLine, dict[Role, str]]:
         return {pair.line: dict(pair.unserved) for pair in self._relay.pairs if pair.unserved}
 
-    def _show(self) -> None:
-        self._shown_unserved = self._unserved()
+    def _publish_state(self) -> None:
+        self._shown_unserved = self._unsupported_versions()
         self._relay.set_languages(self._programs.languages())
         self._outside.show(self._programs.programs())
         self._request_server.publish_members(self._programs.members())
@@ -203,7 +203,7 @@ class Gateway:
         self._programs.remove_ended()
         for line in {known.line for known in self._port_map.registrations if not known.line.is_service}:
             base = self._port_map.port_of(line)
-            if base is not None and not self._open(line, base):
+            if base is not None and not self._open_line(line, base):
                 self._outside.report(
                     f"port:{base}",
                     _("Another program is using port {first} or {second}, which “{topic}” needs").format(
@@ -218,7 +218,7 @@ class Gateway:
         if line.is_service:
             line = TopicLine(request.topic, "bare", codec, "many2many")
         base = self._port_for(line)
-        if len(self._port_map.registrations) >= _MAX_REGISTRATIONS and not self._programs.make_room():
+        if len(self._port_map.registrations) >= _MAX_REGISTRATIONS and not self._programs.evict_unconnected():
             raise RequestError(
                 _("{count} programs are already registered, the maximum").format(count=_MAX_REGISTRATIONS),
                 line.topic,
@@ -228,27 +228,27 @@ class Gateway:
         self._programs.expect(registration)
         self._save()
         self._programs.update([line])
-        self._show()
+        self._publish_state()
         return reply_port(line, base, request.socket)
 
     def _port_for(self, line: TopicLine) -> int:
         known = self._port_map.port_of(line)
-        if known is not None and (line.is_service or self._relay.pair(line) or self._open(line, known)):
+        if known is not None and (line.is_service or self._relay.pair(line) or self._open_line(line, known)):
             return known
-        if not has_room(_FILES_PER_PAIR + SPARE):
+        if not has_free_descriptors(_FILES_PER_PAIR + RESERVED_DESCRIPTORS):
             raise RequestError(
                 _("the master has too many files open; close programs, or restart the master"), line.topic
             )
         for base in self._port_map.candidates(self._programs.is_used):
-            if self._open(line, base):
+            if self._open_line(line, base):
                 self._port_map.assign(line, base)
                 return base
         raise RequestError(_("all ports from 9000 to 9999 are in use"), line.topic)
 
-    def _open(self, line: TopicLine, base: int) -> bool:
+    def _open_line(self, line: TopicLine, base: int) -> bool:
         if line.is_service:
             return is_free(base)
-        if not has_room(_FILES_PER_PAIR + SPARE):
+        if not has_free_descriptors(_FILES_PER_PAIR + RESERVED_DESCRIPTORS):
             return False
         try:
             self._relay.open(line, base)

@@ -41,7 +41,7 @@ _MAX_NAME_LENGTH = 100
 
 
 @dataclass
-class _Count:
+class _TopicCount:
     """Number and size of the messages that original programs have published on one topic."""
 
     messages: int = 0
@@ -73,12 +73,12 @@ class GraphRegistrar:
         self._loads: dict[str, CpuLoad] = {}
         self._shown: dict[str, Join] = {}
         self._since: dict[str, int] = {}
-        self._counts: dict[Key, _Count] = {}
+        self._counts: dict[Key, _TopicCount] = {}
         self._stat_keys: dict[int, Key] = {}
 
     def count(self, key: Key, size_bytes: int) -> None:
         """Count a message that an original program has published."""
-        counted = self._counts.setdefault(key, _Count())
+        counted = self._counts.setdefault(key, _TopicCount())
         counted.messages += 1
         counted.bytes += size_bytes
         counted.last_ns = time.time_ns()
@@ -102,14 +102,14 @@ class GraphRegistrar:
         for node_id, join in self._shown.items():
             publishers = tuple(self._publisher_count(record) for record in join.publishers)
             subscribers = tuple(SubscriberCount(record.id, None, None) for record in join.subscribers)
-            load = self._load(node_id, join.node.pid)
+            load = self._cpu_load(node_id, join.node.pid)
             self._submit(Renew(node_id, self._epoch, 0, publishers, subscribers, load))
 
     def close(self) -> None:
         """Remove all programs from the graph."""
         self.show(())
 
-    def _load(self, node_id: str, pid: int | None) -> float | None:
+    def _cpu_load(self, node_id: str, pid: int | None) -> float | None:
         if pid is None:
             return None
         if node_id not in self._loads:
@@ -158,7 +158,7 @@ class GraphRegistrar:
 
     def _publisher_count(self, record: PublisherRecord) -> PublisherCount:
         key = self._stat_keys.get(record.id)
-        counted = self._counts.get(key, _Count()) if key is not None else _Count()
+        counted = self._counts.get(key, _TopicCount()) if key is not None else _TopicCount()
         return PublisherCount(record.id, counted.messages, counted.bytes, counted.messages, counted.last_ns)
 
 

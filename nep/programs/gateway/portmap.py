@@ -145,11 +145,11 @@ class PortMap:
             for entry in document["lines"]:
                 port = entry["port"]
                 if isinstance(port, int) and FIRST_PORT <= port <= LAST_PORT:
-                    self._ports[_line(entry)] = port
+                    self._ports[_parse_line(entry)] = port
             if abs(document["boot"] - self._boot) > _SAME_BOOT_S:
                 return
             for entry in document["programs"]:
-                known = _registration(entry)
+                known = _parse_registration(entry)
                 if known.line in self._ports:
                     self.add(known)
         except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
@@ -170,7 +170,7 @@ def default_file(port: int) -> Path:
     return folder / f"gateway-{port}.json"
 
 
-def _line(entry: Mapping[str, object]) -> TopicLine:
+def _parse_line(entry: Mapping[str, object]) -> TopicLine:
     topic, framing, codec, mode = (entry[key] for key in ("topic", "framing", "codec", "mode"))
     if not isinstance(topic, str) or not isinstance(codec, str):
         raise TypeError("a line is not of text")
@@ -179,12 +179,12 @@ def _line(entry: Mapping[str, object]) -> TopicLine:
     return TopicLine(topic, framings[framings.index(framing)], codec, modes[modes.index(mode)])
 
 
-def _registration(entry: Mapping[str, object]) -> Registration:
+def _parse_registration(entry: Mapping[str, object]) -> Registration:
     line, pid, started, language = (entry[key] for key in ("line", "pid", "started", "language"))
     if not isinstance(line, dict):
         raise TypeError("a registration has no line")
     return Registration(
-        line=_line(line),
+        line=_parse_line(line),
         node=str(entry["node"]),
         socket=str(entry["socket"]),
         msg_type=str(entry["msg_type"]),

@@ -91,10 +91,10 @@ class ProgramTable:
     def remove_ended(self) -> bool:
         """Remove programs that exited or closed their connections; return True if there were any."""
         ended = {registration for registration in self._port_map.registrations if self._is_gone(registration)}
-        self._forget(ended)
+        self._discard(ended)
         return bool(ended)
 
-    def _forget(self, ended: set[Registration]) -> None:
+    def _discard(self, ended: set[Registration]) -> None:
         if ended:
             self._port_map.remove(ended)
             self._was_joined -= ended
@@ -102,11 +102,11 @@ class ProgramTable:
                 self._roles.pop(registration, None)
                 self._openings.pop(registration, None)
 
-    def make_room(self) -> bool:
+    def evict_unconnected(self) -> bool:
         """Remove the oldest program that sent a request but never connected; return True if there was one."""
         for registration in self._port_map.registrations:
             if not self._roles.get(registration):
-                self._forget({registration})
+                self._discard({registration})
                 return True
         return False
 
@@ -172,7 +172,7 @@ class ProgramTable:
         }
         links |= dict.fromkeys(self._service_links(asked))
         first = asked[0]
-        generation = self._unserved(asked) or first.generation
+        generation = self._unsupported_version(asked) or first.generation
         return OriginalProgram(node_id, first.node, first.pid, generation, first.language, tuple(links))
 
     def _service_links(self, asked: list[Registration]) -> Iterator[TopicLink]:
@@ -182,7 +182,7 @@ class ProgramTable:
                 port = self._port_map.port_of(each.line)
                 yield TopicLink(each.line.topic, each.msg_type, each.line.codec, role, port)
 
-    def _unserved(self, asked: list[Registration]) -> str | None:
+    def _unsupported_version(self, asked: list[Registration]) -> str | None:
         for registration in asked:
             pair = self._pair_of(registration.line)
             for role in self._roles.get(registration, ()):
@@ -201,7 +201,7 @@ class ProgramTable:
 
     def _is_joined(self, registration: Registration, end: Endpoint) -> bool:
         if registration.pid is not None and registration.started is not None:
-            known = self._processes.is_joined(registration.pid, end.port, binds=end.bound_by_program)
+            known = self._processes.is_joined(registration.pid, end.port, binds=end.is_bound_by_program)
             if known is not None:
                 return known
         return registration.socket == end.role

@@ -15,8 +15,8 @@ from nep.programs.gateway.framing import Shape, shield_csharp, shield_javascript
 from nep.programs.gateway.portmap import TopicLine
 from nep.programs.gateway.requests import LOOPBACK, Role
 
-_OPENED = zmq.EVENT_ACCEPTED | zmq.EVENT_CONNECTED
-_CLOSED = zmq.EVENT_DISCONNECTED
+_CONNECT_EVENTS = zmq.EVENT_ACCEPTED | zmq.EVENT_CONNECTED
+_DISCONNECT_EVENTS = zmq.EVENT_DISCONNECTED
 _QUEUE_LENGTH = 1000
 _IMAGE_QUEUE_LENGTH = 20
 MAX_BUFFERED_BYTES = 128 * 2**20
@@ -34,14 +34,14 @@ class Endpoint:
 
     role: Role
     port: int
-    bound_by_program: bool
+    is_bound_by_program: bool
 
 
 def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
     """Return the endpoints for publishers and for subscribers of a line, given its base port."""
     return (
-        Endpoint("publisher", base, bound_by_program=line.mode == "one2many"),
-        Endpoint("subscriber", base + 1, bound_by_program=line.mode == "many2one"),
+        Endpoint("publisher", base, is_bound_by_program=line.mode == "one2many"),
+        Endpoint("subscriber", base + 1, is_bound_by_program=line.mode == "many2one"),
     )
 
 
@@ -102,14 +102,14 @@ class ProxyPair:
         opened.setsockopt(zmq.SNDHWM, self._queue)
         opened.setsockopt(zmq.RCVHWM, self._queue)
         opened.setsockopt(zmq.MAXMSGSIZE, max_bytes)  # larger messages disconnect the sender
-        if end.bound_by_program and not is_free(end.port):
+        if end.is_bound_by_program and not is_free(end.port):
             raise zmq.ZMQError(zmq.EADDRINUSE)
-        monitor = opened.get_monitor_socket(_OPENED | _CLOSED)
+        monitor = opened.get_monitor_socket(_CONNECT_EVENTS | _DISCONNECT_EVENTS)
         undo.callback(monitor.close, 0)
         undo.callback(opened.disable_monitor)
         self.monitors[end.role] = monitor
         address = f"tcp://{LOOPBACK}:{end.port}"
-        if end.bound_by_program:
+        if end.is_bound_by_program:
             opened.connect(address)
         else:
             opened.bind(address)
@@ -123,7 +123,7 @@ class ProxyPair:
     @property
     def has_subscribers(self) -> bool:
         """True if an original program subscribes to this line."""
-        return any(self.shape.wants(filter_) for filter_ in self.filters)
+        return any(self.shape.matches_filter(filter_) for filter_ in self.filters)
 
     @property
     def has_0546(self) -> bool:
@@ -160,7 +160,7 @@ class ProxyPair:
                 event = parse_monitor_message(monitor.recv_multipart())
                 handles = self._open_handles[role]
                 # By handle: connections that don't speak ZeroMQ also cause disconnect events.
-                if event["event"] & _OPENED:
+                if event["event"] & _CONNECT_EVENTS:
                     handles.add(event["value"])
                     self.openings += 1
                 else:
@@ -168,18 +168,18 @@ class ProxyPair:
                 happened = True
         return happened
 
-    def pass_on(self, frame: bytes, data: bytes) -> None:
+    def forward(self, frame: bytes, data: bytes) -> None:
         """Send a frame of this line to the line's own subscribers.
 
         The frame is unchanged unless the programming language of a subscriber requires shielding.
         """
         if self.has_subscribers:
-            self._send(self.shape.write(self._shielded(data)) if self._needs_shield else frame)
+            self._send(self.shape.write(self._shield(data)) if self._needs_shield else frame)
 
     def deliver(self, data: bytes | memoryview) -> None:
         """Encode bytes of the native codec in this line's format and send them to the line's subscribers."""
         if self.has_subscribers:
-            self._send(self.shape.write(self._shielded(bytes(data)) if self._needs_shield else data))
+            self._send(self.shape.write(self._shield(bytes(data)) if self._needs_shield else data))
 
     def close(self) -> None:
         """Close both sockets, with a short linger."""
@@ -189,7 +189,7 @@ class ProxyPair:
     def _needs_shield(self) -> bool:
         return self.line.codec == "json" and not self.languages.isdisjoint(("javascript", "csharp"))
 
-    def _shielded(self, data: bytes) -> bytes:
+    def _shield(self, data: bytes) -> bytes:
         if "javascript" in self.languages:
             data = shield_javascript(data, self.line.topic)
         if "csharp" in self.languages:

@@ -9,7 +9,7 @@ from typing import Protocol
 import zmq
 
 from nep.i18n import _, ngettext
-from nep.programs.gateway.framing import FrameError, lost_numbers
+from nep.programs.gateway.framing import FrameError, has_replaced_nan
 from nep.programs.gateway.portmap import TopicLine
 from nep.programs.gateway.proxy_pair import ProxyPair
 from nep.programs.gateway.requests import Role
@@ -182,7 +182,7 @@ class Relay:
             return
         if pair.line.topic in self._rejected:
             self._rejected[pair.line.topic].is_resolved = True
-        if pair.line.codec == "json" and lost_numbers(frame, data):
+        if pair.line.codec == "json" and has_replaced_nan(frame, data):
             self._alerts.report(
                 f"nan:{pair.line.topic}",
                 _(
@@ -194,7 +194,7 @@ class Relay:
             )
         for other in self._pairs_of(key):
             if other is pair:
-                other.pass_on(frame, data)
+                other.forward(frame, data)
             else:
                 other.deliver(data)
         self._publishing.add(key)

@@ -16,10 +16,10 @@ from nep.programs.gateway.requests import (
     Member,
     Request,
     RequestError,
-    broadcast,
-    grant,
-    read_request,
-    refuse,
+    encode_broadcast,
+    encode_grant,
+    encode_rejection,
+    parse_request,
 )
 
 _logger = logging.getLogger("nep.programs.gateway")
@@ -95,7 +95,7 @@ class RequestServer:
         for port, counter in self._request_sockets.items():
             yield counter, port
 
-    def answer(self, counter: zmq.Socket[bytes], port: int) -> None:
+    def reply(self, counter: zmq.Socket[bytes], port: int) -> None:
         """Reply to a pending request. Never raises because of the request's content."""
         try:
             parts = counter.recv_multipart(zmq.NOBLOCK)
@@ -107,19 +107,19 @@ class RequestServer:
         end = parts.index(b"") + 1
         envelope, asked = parts[:end], b"".join(parts[end:])
         try:
-            request = read_request(asked, port)
-            reply = grant(request, self._assign_port(request))
+            request = parse_request(asked, port)
+            reply = encode_grant(request, self._assign_port(request))
         except RequestError as error:
-            reply = refuse(error)
+            reply = encode_rejection(error)
         except Exception:  # a reply must be sent, or the port would hang for everyone
             _logger.exception("the gateway could not carry out a request")
-            reply = refuse(RequestError("the gateway could not carry this out; its log says why"))
+            reply = encode_rejection(RequestError("the gateway could not carry this out; its log says why"))
         counter.send_multipart([*envelope, reply])
 
     def publish_members(self, members: Iterable[Member]) -> None:
         """Broadcast all topics to tools of the original NEP."""
         if self._broadcast_socket is not None:
-            self._broadcast_socket.send(broadcast(members))
+            self._broadcast_socket.send(encode_broadcast(members))
 
     def close(self) -> None:
         """Release the ports."""

@@ -38,18 +38,18 @@ class Request:
     mode: Mode
     msg_type: str
     pid: int | None
-    asked_port: int
+    request_port: int
     language: str | None
 
     @property
     def generation(self) -> str:
         """Wire generation of the original NEP: "A" or "B"; the two are incompatible."""
-        return "B" if self.asked_port == PORT_B else "A"
+        return "B" if self.request_port == PORT_B else "A"
 
     @property
     def framing(self) -> Framing:
         """Frame format that the program uses."""
-        return framing_of(self.asked_port, self.msg_type)
+        return framing_of(self.request_port, self.msg_type)
 
     @property
     def codec(self) -> str:
@@ -62,7 +62,7 @@ class Request:
         return self.socket in _SERVICE_SOCKETS
 
 
-def read_request(data: bytes, asked_port: int) -> Request:
+def parse_request(data: bytes, asked_port: int) -> Request:
     """Parse a request received at `asked_port`. Raises `RequestError`."""
     if len(data) > MAX_REQUEST_BYTES:
         raise RequestError(f"the request has {len(data)} bytes; at most {MAX_REQUEST_BYTES} are read")
@@ -80,22 +80,22 @@ def read_request(data: bytes, asked_port: int) -> Request:
         mode=_MODES[_choice(fields, "mode", frozenset(_MODES), topic, default="many2many")],
         msg_type=_choice(fields, "msg_type", None, topic, default="json"),
         pid=_pid(fields.get("pid")),
-        asked_port=asked_port,
+        request_port=asked_port,
         language=_language(fields),
     )
 
 
-def grant(request: Request, port: int) -> bytes:
+def encode_grant(request: Request, port: int) -> bytes:
     """Encode the reply that assigns `port`, in the format that original programs expect."""
     answer: dict[str, object] = {"topic": request.topic, "port": port}
     if not request.is_service:
         answer["mode"] = request.mode
-    return _dump({**answer, "ip": LOOPBACK, "socket": request.socket, "state": "success"})
+    return _encode_json({**answer, "ip": LOOPBACK, "socket": request.socket, "state": "success"})
 
 
-def refuse(error: RequestError) -> bytes:
+def encode_rejection(error: RequestError) -> bytes:
     """Encode the reply to a rejected request. Programs read `state`; `error` is for people."""
-    return _dump({"topic": error.topic, "state": "failure", "error": str(error)})
+    return _encode_json({"topic": error.topic, "state": "failure", "error": str(error)})
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class Member:
     pid: int | None
 
 
-def broadcast(members: Iterable[Member]) -> bytes:
+def encode_broadcast(members: Iterable[Member]) -> bytes:
     """Encode the broadcast for port 7777, with its prefix: all topics and their nodes."""
     topics: dict[str, dict[str, object]] = {}
     nodes: dict[str, dict[str, object]] = {}
@@ -123,10 +123,10 @@ def broadcast(members: Iterable[Member]) -> bytes:
                 about["mode"] = member.mode
             topics[member.topic] = {**about, "msg_type": member.msg_type, "nodes": nodes[member.topic]}
         nodes[member.topic][member.node] = {"socket": member.socket, "pid": member.pid, "ip": LOOPBACK}
-    return b"master " + _dump(topics)
+    return b"master " + _encode_json(topics)
 
 
-def _dump(value: object) -> bytes:
+def _encode_json(value: object) -> bytes:
     return json.dumps(value, separators=(",", ":")).encode("ascii")
 
 

@@ -9,20 +9,20 @@ from nep.programs.robots.guard import MotionGuard
 from nep.programs.robots.moving import (
     COMMAND_TYPE,
     DESCRIPTION_TYPE,
-    RIZE_COMMANDS,
+    RIZE_COMMAND_TOPIC,
     MovingTopics,
     RobotControls,
-    controls_in,
     moving_topics,
+    parse_controls,
 )
 
 __all__ = [
     "COMMAND_TYPE",
     "DESCRIPTION_TYPE",
-    "RIZE_COMMANDS",
+    "RIZE_COMMAND_TOPIC",
     "MotionGuard",
     "MovingTopics",
     "RobotControls",
-    "controls_in",
     "moving_topics",
+    "parse_controls",
 ]

@@ -12,7 +12,7 @@ import time
 from collections.abc import Collection, Sequence
 
 from nep.errors import NepError
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 from nep.messages.message import Message
 from nep.nodes.node import Node
 from nep.nodes.subscriber import Subscriber
@@ -20,11 +20,11 @@ from nep.programs.robots.moving import (
     DESCRIPTION_TYPE,
     MovingTopics,
     RobotControls,
-    controls_in,
     described_name,
     description_topics,
     moving_topics,
     original_robots,
+    parse_controls,
 )
 from nep.protocol.graph_view import GraphView
 from nep.text import escaped, shortened
@@ -70,7 +70,7 @@ class MotionGuard:
         self._cache: dict[tuple[str, str], str] = {}
 
     @property
-    def moving(self) -> MovingTopics:
+    def moving_topics(self) -> MovingTopics:
         """Topics that currently move robots."""
         return self._moving
 
@@ -78,9 +78,9 @@ class MotionGuard:
     def is_settled(self) -> bool:
         """True if a graph was processed and all descriptions in it were read."""
         with self._lock:
-            return self._view is not None and not self._is_dirty and not self._unread(self._view)
+            return self._view is not None and not self._is_dirty and not self._unread_topics(self._view)
 
-    def see(self, view: GraphView) -> None:
+    def update_graph(self, view: GraphView) -> None:
         """Process a new graph. Cheap if nothing has changed."""
         with self._lock:
             before = self._view
@@ -97,7 +97,7 @@ class MotionGuard:
             view = self._node.graph(_GRAPH_TIMEOUT_S)
         except NepError:
             return
-        self.see(view)
+        self.update_graph(view)
 
     def wait_for_descriptions(self, timeout_s: float) -> bool:
         """Wait until all descriptions are read; return False after `timeout_s` seconds."""
@@ -114,10 +114,10 @@ class MotionGuard:
             self._allowed = frozenset(names)
             self._cache = {}
 
-    def refused_robots(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
+    def denied_robots(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
         """Return the robots because of which a topic is denied; the topic itself for an unknown robot."""
         with self._lock:
-            return _not_allowed(topic, self._moving.moved_by(topic, msg_type), self._allowed)
+            return _denied_robots(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
 
     def refusal(self, topic: str, msg_type: str = "") -> str:
         """Return why publishing on a topic is denied, with the option that allows it; "" if it is allowed."""
@@ -125,7 +125,7 @@ class MotionGuard:
         said = self._cache.get(key)
         if said is None:
             with self._lock:
-                said = refusal_words(topic, self._moving.moved_by(topic, msg_type), self._allowed)
+                said = refusal_text(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
                 if len(self._cache) >= _MAX_CACHED:
                     self._cache.clear()
                 self._cache[key] = said
@@ -173,7 +173,7 @@ class MotionGuard:
             self._is_dirty = False
             received, self._received = self._received, {}
         for (topic, publisher), message in received.items():
-            controls = _read(message, topic)
+            controls = _parse_description(message, topic)
             if controls is not None:
                 claims = self._controls.setdefault(topic, {})
                 claims.pop(publisher, None)
@@ -182,10 +182,10 @@ class MotionGuard:
                     del claims[next(iter(claims))]
         robots = [controls for claims in self._controls.values() for controls in claims.values()]
         robots += original_robots(view)
-        self._moving = moving_topics(view, robots, self._unread(view), self._own_nodes)
+        self._moving = moving_topics(view, robots, self._unread_topics(view), self._own_nodes)
         self._cache = {}
 
-    def _unread(self, view: GraphView) -> frozenset[str]:
+    def _unread_topics(self, view: GraphView) -> frozenset[str]:
         def is_unread(topic: str) -> bool:
             read = self._controls.get(topic, {}).keys()
             return None not in read and any(each.id not in read for each in view.topics[topic].publishers)
@@ -193,21 +193,21 @@ class MotionGuard:
         return frozenset(filter(is_unread, description_topics(view)))
 
 
-def _read(message: Message, topic: str) -> RobotControls | None:
+def _parse_description(message: Message, topic: str) -> RobotControls | None:
     # Every publisher's description is used, because it can only protect.
     try:
-        return controls_in(message.payload, described_name(topic))
+        return parse_controls(message.payload, described_name(topic))
     except Exception:  # noqa: BLE001 - untrusted input; an unread robot is protected by its subscriptions
         return None
 
 
-def _not_allowed(topic: str, robots: Sequence[str], allowed: Collection[str]) -> tuple[str, ...]:
+def _denied_robots(topic: str, robots: Sequence[str], allowed: Collection[str]) -> tuple[str, ...]:
     return () if topic in allowed else tuple(name for name in robots if name not in allowed)
 
 
-def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
+def refusal_text(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
     """Return a message naming the robots and the option that allows moving them; "" if all are allowed."""
-    missing = list(_not_allowed(topic, robots, allowed))
+    missing = list(_denied_robots(topic, robots, allowed))
     if not missing:
         return ""
     shown = shortened(escaped(topic), _MAX_NAME_SHOWN)
@@ -219,4 +219,4 @@ def refusal_words(topic: str, robots: Sequence[str], allowed: Collection[str]) -
         return said.format(topic=shown, options=options)
     robots = names[:_MAX_NAMES_SHOWN] + ["…"] * (len(names) > _MAX_NAMES_SHOWN)
     said = _("'{topic}' moves {robots}; make sure that nobody is in the way, then add {options}")
-    return said.format(topic=shown, robots=listed(robots), options=options)
+    return said.format(topic=shown, robots=format_list(robots), options=options)

@@ -17,8 +17,8 @@ from nep.protocol.wire import check_topic
 
 DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
-ANSWER_TYPE = "robot/answer"
-RIZE_COMMANDS = "robot_action"
+REPLY_TYPE = "robot/answer"
+RIZE_COMMAND_TOPIC = "robot_action"
 """Topic for commands to all RIZE robots. Robots of the driver kit subscribe to this topic, too."""
 _CONTROL_KEYS = ("command", "world")
 _DESCRIPTION, _ANSWER = "/description", "/answer"
@@ -77,12 +77,12 @@ class MovingTopics:
         """Topics and patterns that move identified robots, each with the names of these robots."""
         found = dict(self._by_topic)
         if self._all_names:
-            found[RIZE_COMMANDS] = self._all_names
+            found[RIZE_COMMAND_TOPIC] = self._all_names
         return found
 
     def robots_on(self, topic: str) -> tuple[str, ...]:
         """Return the names of identified robots that a message on a topic moves."""
-        if topic == RIZE_COMMANDS:
+        if topic == RIZE_COMMAND_TOPIC:
             return self._all_names
         names = dict.fromkeys(self._by_topic.get(topic, ()))
         for pattern in self._patterns:
@@ -90,7 +90,7 @@ class MovingTopics:
                 names |= dict.fromkeys(self._by_topic.get(pattern, ()))
         return tuple(names)
 
-    def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
+    def robots_moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
         """Return the names of the robots that a message moves; empty if the message moves none.
 
         If a robot of unknown name is moved (because of the type ``robot/command``, RIZE's topic, or
@@ -104,7 +104,7 @@ class MovingTopics:
 
     def _is_unidentified(self, topic: str, msg_type: str) -> bool:
         return (
-            topic == RIZE_COMMANDS
+            topic == RIZE_COMMAND_TOPIC
             or msg_type == COMMAND_TYPE
             or topic in self._unidentified
             or (self._uses_names and topic.rpartition("/")[2] in _COMMAND_NAMES)
@@ -112,7 +112,7 @@ class MovingTopics:
         )
 
 
-def controls_in(description: object, fallback_name: str = "") -> RobotControls | None:
+def parse_controls(description: object, fallback_name: str = "") -> RobotControls | None:
     """Read the name and the controlling topics from a robot's description.
 
     Only these parts are read, so an otherwise invalid description still protects its robot.
@@ -129,7 +129,7 @@ def controls_in(description: object, fallback_name: str = "") -> RobotControls |
     title = description.get("title")
     name = title if isinstance(title, str) and title and len(title) <= _MAX_NAME_LENGTH else fallback_name
     topics = set[str]()
-    for topic in _topics_in(description):
+    for topic in _controlling_topics(description):
         with suppress(BadTopicError):  # publishing there is impossible
             topics.add(check_topic(topic))
         if len(topics) >= _MAX_TOPICS:
@@ -137,7 +137,7 @@ def controls_in(description: object, fallback_name: str = "") -> RobotControls |
     return RobotControls(name, frozenset(topics)) if name and topics else None
 
 
-def _topics_in(description: Mapping[object, object]) -> Iterator[str]:
+def _controlling_topics(description: Mapping[object, object]) -> Iterator[str]:
     named = description.get("rb:topics")
     if isinstance(named, Mapping):
         yield from (topic for key in _CONTROL_KEYS if isinstance(topic := named.get(key), str) and topic)
@@ -200,7 +200,7 @@ def _unread_robots(
     programs += [
         (topic.removesuffix(_ANSWER), nodes)
         for topic, info in view.topics.items()
-        if info.msg_type == ANSWER_TYPE and (nodes := _publishers(view, topic) - announcing)
+        if info.msg_type == REPLY_TYPE and (nodes := _publishers(view, topic) - announcing)
     ]
     subscribed = _subscriptions(view) if programs else {}
     for home, nodes in programs:
@@ -227,8 +227,8 @@ def _subscriptions(view: GraphView) -> dict[str, set[str]]:
 
 def original_robots(view: GraphView) -> Iterator[RobotControls]:
     """Yield programs of the original NEP that subscribe to RIZE commands: robots without a description."""
-    info = view.topics.get(RIZE_COMMANDS)
+    info = view.topics.get(RIZE_COMMAND_TOPIC)
     for subscriber in info.subscribers if info is not None else ():
         node = view.nodes.get(subscriber.node_id)
         if node is not None and node.generation in _ORIGINAL_GENERATIONS:
-            yield RobotControls(node.name, frozenset({RIZE_COMMANDS}))
+            yield RobotControls(node.name, frozenset({RIZE_COMMAND_TOPIC}))

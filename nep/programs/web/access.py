@@ -23,7 +23,7 @@ from nep.text import quotable
 
 _CLOCK_TOLERANCE_S = 5
 """Maximum difference between the clocks of server and client in seconds, as in rosauth."""
-_MAX_REMEMBERED = 1_000
+_MAX_USED_MACS = 1_000
 _DEFAULT_PORTS = {"http": 80, "https": 443}
 
 
@@ -103,7 +103,7 @@ class Access:
             "pages from '{origin}' are not allowed to connect; allow them with --origin {option}"
         ).format(origin=quotable(origin), option=quotable(origin))
 
-    def is_given(self, path: str, authorization: str | None) -> bool | None:
+    def check_token(self, path: str, authorization: str | None) -> bool | None:
         """Return True if the token in the URL or the header is valid, False if not, None if there is none.
 
         Accepted forms are ``ws://host:9090/?token=TOKEN`` and ``Authorization: Bearer TOKEN``.
@@ -114,9 +114,9 @@ class Access:
             given.append(value.strip())
         if not given:
             return None
-        return sum(map(self._is_right, given)) > 0
+        return sum(map(self._is_valid_token, given)) > 0
 
-    def _is_right(self, given: str) -> bool:
+    def _is_valid_token(self, given: str) -> bool:
         return hmac.compare_digest(given.encode("utf-8", "replace"), self.token.encode())
 
 
@@ -128,7 +128,7 @@ class AuthCheck:
         self._clock = clock
         self._used: dict[str, None] = {}
 
-    def is_right(self, auth: Auth) -> bool:
+    def verify(self, auth: Auth) -> bool:
         """Return True if the MAC is valid for the token, current, and not used before."""
         parts = (self._token, auth.client, auth.dest, auth.rand, auth.time_s, auth.level, auth.end_s)
         text = "".join(map(str, parts)).encode("utf-8", "replace")
@@ -139,6 +139,6 @@ class AuthCheck:
         if not (is_right and is_now) or mac in self._used:
             return False
         self._used[mac] = None
-        while len(self._used) > _MAX_REMEMBERED:
+        while len(self._used) > _MAX_USED_MACS:
             del self._used[next(iter(self._used))]
         return True

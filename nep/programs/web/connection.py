@@ -15,7 +15,7 @@ from nep.i18n import ngettext
 from nep.nodes.node import Node
 from nep.programs.web.context import ConnectedPage, PageTopic, Protocol, WebCounts
 from nep.programs.web.outgoing import Frame
-from nep.programs.web.send_queue import Queued, SendQueue
+from nep.programs.web.send_queue import QueuedMessage, SendQueue
 from nep.programs.web.visitors import client_name, device_kind, page_title
 from nep.system.lazy_import import lazy_module
 
@@ -53,7 +53,7 @@ class PageConnection:
         self._dropped = 0
         self._thread = ThreadPoolExecutor(1, f"nep-{name[:40]}")
         self._node = new_node(name)
-        self._queue = SendQueue(asyncio.get_running_loop().time, self._end_slow)
+        self._queue = SendQueue(asyncio.get_running_loop().time, self._close_slow)
         self._closing: asyncio.Task[None] | None = None
         self.is_closing = False
         """True if the page's messages are ignored because it is being disconnected.
@@ -68,7 +68,7 @@ class PageConnection:
         """Topics that the page publishes or subscribes to. Thread-safe."""
         raise NotImplementedError
 
-    async def _frames_of(self, queued: Queued) -> list[Frame]:
+    async def _frames_of(self, queued: QueuedMessage) -> list[Frame]:
         """Encode a message of a topic. Raises `NepError` if it can't be sent to this page."""
         raise NotImplementedError
 
@@ -138,11 +138,11 @@ class PageConnection:
             if not self.is_closing:
                 return data
 
-    def _end_slow(self) -> None:
+    def _close_slow(self) -> None:
         _logger.warning("the page '%s' is closed: it does not read the answers that it asked for", self.name)
         self.start_closing("the page does not read its answers")
 
-    def _announce(self) -> None:
+    def _log_connection(self) -> None:
         """Log the connection with the page's node, because a node without topics is not in the graph.
 
         Called in the page's thread.
@@ -167,7 +167,7 @@ class PageConnection:
             _logger.exception("the page '%s' is closed because of an error", self.name)
             await self._close_connection(_INTERNAL_ERROR, "internal error")
 
-    async def _send(self, item: Frame | Queued) -> None:
+    async def _send(self, item: Frame | QueuedMessage) -> None:
         if isinstance(item, Frame):
             await self._connection.send(item.data, text=item.is_text)
             self._counts.sent += 1
@@ -181,10 +181,10 @@ class PageConnection:
             self._counts.sent += 1
             feed.sent.count(sum(len(frame.data) for frame in frames))
 
-    async def _frames_of_message(self, queued: Queued) -> list[Frame]:
+    async def _frames_of_message(self, queued: QueuedMessage) -> list[Frame]:
         feed = queued.feed
         if feed.dropped_count:
-            self._tell_dropped(feed.topic, feed.dropped_count)
+            self._report_dropped(feed.topic, feed.dropped_count)
             feed.dropped_count = 0
         try:
             return await self._frames_of(queued)
@@ -192,7 +192,7 @@ class PageConnection:
             self._reject(error)
             return []
 
-    def _tell_dropped(self, topic: str, count: int) -> None:
+    def _report_dropped(self, topic: str, count: int) -> None:
         self._counts.dropped += count
         self._dropped += count
         said = ngettext(

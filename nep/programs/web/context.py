@@ -20,7 +20,7 @@ from nep.programs.web.visitors import Device
 Protocol = Literal["rosbridge", "foxglove"]
 RefusalKind = Literal["origin", "token", "robot", "limit", "kept out", "other"]
 _ROBOT_REFUSAL_INTERVAL_S = 10.0
-_MAX_REMEMBERED_ROBOTS = 50
+_MAX_REPORTED_ROBOTS = 50
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -43,8 +43,8 @@ class PageTopic:
 
     topic: str
     is_published: bool
-    at_most_per_s: float | None = None
-    rate: float = 0.0
+    max_rate_hz: float | None = None
+    rate_hz: float = 0.0
     bytes_per_s: float = 0.0
     sent_count: int = 0
     dropped_count: int = 0
@@ -84,12 +84,12 @@ class ConnectedPage:
     """Kind of device according to the User-Agent; many tablets claim to be computers."""
 
     @property
-    def subscribed(self) -> tuple[str, ...]:
+    def subscribed_topics(self) -> tuple[str, ...]:
         """Names of the topics to which the page subscribes."""
         return tuple(each.topic for each in self.topics if not each.is_published)
 
     @property
-    def published(self) -> tuple[str, ...]:
+    def published_topics(self) -> tuple[str, ...]:
         """Names of the topics that the page publishes."""
         return tuple(each.topic for each in self.topics if each.is_published)
 
@@ -110,7 +110,7 @@ class Refusal:
     """
 
     time_s: float
-    who: str
+    client: str
     reason: str
     origin: str = ""
     kind: RefusalKind = "other"
@@ -175,7 +175,7 @@ class PageContext:
         self._refused_at: dict[str, float] = {}
         self._refused_lock = threading.Lock()
 
-    async def in_thread(self, function: Callable[_P, _T], *args: _P.args, **named: _P.kwargs) -> _T:
+    async def run_in_thread(self, function: Callable[_P, _T], *args: _P.args, **named: _P.kwargs) -> _T:
         """Call a function that waits for the network in the page's thread. Calls are executed in order."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, lambda: function(*args, **named))
@@ -187,7 +187,7 @@ class PageContext:
         """
         refusal = self.guard.refusal(topic, msg_type)
         if refusal:
-            for robot in self.guard.refused_robots(topic, msg_type):
+            for robot in self.guard.denied_robots(topic, msg_type):
                 self._report_refused(robot, refusal)
         return refusal
 
@@ -198,7 +198,7 @@ class PageContext:
                 return
             self._refused_at.pop(robot, None)
             self._refused_at[robot] = now
-            while len(self._refused_at) > _MAX_REMEMBERED_ROBOTS:
+            while len(self._refused_at) > _MAX_REPORTED_ROBOTS:
                 del self._refused_at[next(iter(self._refused_at))]
         self._on_robot_refused(robot, reason)
 

@@ -21,7 +21,7 @@ class _Visitor(NamedTuple):
     user_agent: str
 
 
-class KeptOut:
+class BlockedPages:
     """Set of blocked pages, identified by address, origin and User-Agent. Thread-safe."""
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class KeptOut:
         with self._lock:
             self._visitors.pop(page_id, None)
 
-    def refuses(self, connection: ServerConnection, request: Request) -> bool:
+    def is_blocked(self, connection: ServerConnection, request: Request) -> bool:
         """Return True if the page that sent this handshake is blocked."""
         with self._lock:
             return _visitor(connection, request) in self._visitors.values()

@@ -28,7 +28,7 @@ else:
     cbor2 = lazy_module("cbor2")
 
 
-_NS = 1_000_000_000
+_NS_PER_S = 1_000_000_000
 _TYPED_ARRAYS = {
     "int8": (72, "b"), "uint16": (69, "H"), "uint32": (70, "I"), "uint64": (71, "Q"), "int16": (77, "h"),
     "int32": (78, "i"), "int64": (79, "q"), "float32": (85, "f"), "float64": (86, "d"),
@@ -58,7 +58,7 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
     Raises `NepError` if the message can't be decoded or has no such form.
     """
     if form.compression == "cbor-raw":
-        secs, nsecs = divmod(message.stamp_ns or time.time_ns(), _NS)
+        secs, nsecs = divmod(message.stamp_ns or time.time_ns(), _NS_PER_S)
         raw = {"secs": secs, "nsecs": nsecs, "bytes": ros_bytes(message, as_pixels=form.as_pixels)}
         return [Frame(cbor2.dumps({"op": "publish", "topic": topic, "msg": raw}), is_text=False)]
     if form.compression == "cbor":
@@ -113,12 +113,12 @@ def _json_payload(message: Message) -> bytes | None:
 def json_bytes(value: object) -> bytes:
     """Encode a value as JSON, with bytes in base64. Raises `EncodeError`."""
     try:
-        return orjson.dumps(value, _as_text, orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
+        return orjson.dumps(value, _encode_default, orjson.OPT_NON_STR_KEYS | orjson.OPT_SERIALIZE_NUMPY)
     except (TypeError, RecursionError) as error:
         raise EncodeError("json", type(value).__name__, str(error.__cause__ or error)) from error
 
 
-def _as_text(value: object) -> object:
+def _encode_default(value: object) -> object:
     if isinstance(value, bytes | bytearray | memoryview):
         return base64.b64encode(value).decode()
     raise TypeError(type(value).__name__)
@@ -132,10 +132,10 @@ def _cbor(value: object) -> bytes:
 
 
 def _with_typed_arrays(msg: Mapping[str, object], definition: Definition) -> object:
-    return {**msg, **_typed(msg, [(each.name, each.kind) for each in definition.fields])}
+    return {**msg, **_typed_array_fields(msg, [(each.name, each.kind) for each in definition.fields])}
 
 
-def _typed(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, object]:
+def _typed_array_fields(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, object]:
     """Return the fields of a map that are, or contain, arrays of numbers, converted to typed arrays."""
     packed: dict[str, object] = {}
     if not isinstance(value, Mapping):
@@ -145,13 +145,16 @@ def _typed(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, objec
             continue
         inside = value[name]
         if kind.element is not None and kind.element.name in _TYPED_ARRAYS:
-            packed[name] = _packed(inside, kind.element.name)
+            packed[name] = _pack_typed_array(inside, kind.element.name)
         elif kind.fields and isinstance(inside, Mapping):
-            packed[name] = {**inside, **_typed(inside, [(each.name, each.kind) for each in kind.fields])}
+            packed[name] = {
+                **inside,
+                **_typed_array_fields(inside, [(each.name, each.kind) for each in kind.fields]),
+            }
     return packed
 
 
-def _packed(values: object, kind: str) -> object:
+def _pack_typed_array(values: object, kind: str) -> object:
     """Convert a list of numbers to a typed array; `null`, which represents NaN in JSON, becomes NaN."""
     tag, letter = _TYPED_ARRAYS[kind]
     if not isinstance(values, list):

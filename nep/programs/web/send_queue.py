@@ -26,7 +26,7 @@ _MAX_LATCHED_BYTES = MAX_QUEUED_BYTES // 4
 """Maximum size of a topic's latched messages that are kept for further subscriptions of a page."""
 
 
-class Queued(NamedTuple):
+class QueuedMessage(NamedTuple):
     """Message and the feed that contained it."""
 
     feed: Feed
@@ -73,7 +73,7 @@ class Feed:
             for each in tuple(self._latched.values()):
                 self.add(each)
         self._wishes[wish.id] = wish
-        self._combine(as_pixels=as_pixels)
+        self._update_options(as_pixels=as_pixels)
 
     def unsubscribe(self, id_: OperationId) -> bool:
         """End the subscription with this id, or all if the id is None; return True if there was one."""
@@ -83,10 +83,10 @@ class Feed:
         else:
             self._wishes.pop(id_, None)
         if self._wishes:
-            self._combine(as_pixels=self.form.as_pixels)
+            self._update_options(as_pixels=self.form.as_pixels)
         return found
 
-    def _combine(self, *, as_pixels: bool) -> None:
+    def _update_options(self, *, as_pixels: bool) -> None:
         wishes = self._wishes.values()
         sizes = [each.fragment_size for each in wishes if each.fragment_size is not None]
         compression = max((each.compression for each in wishes), key=COMPRESSIONS.index)
@@ -98,13 +98,13 @@ class Feed:
     def add(self, message: Message) -> None:
         """Append a message; drop the oldest beyond the queue's length."""
         if message.is_latched:
-            self._keep_latched(message)
+            self._store_latched(message)
         self._messages.append(message)
         self.size_bytes += message.size_bytes
         while len(self._messages) > self._capacity:
             self.drop_oldest()
 
-    def _keep_latched(self, message: Message) -> None:
+    def _store_latched(self, message: Message) -> None:
         self._latched.pop(message.publisher, None)
         self._latched[message.publisher] = message
         while sum(each.size_bytes for each in self._latched.values()) > _MAX_LATCHED_BYTES:
@@ -120,7 +120,7 @@ class Feed:
             self.total_dropped_count += 1
 
     @property
-    def at_most_per_s(self) -> float | None:
+    def max_rate_hz(self) -> float | None:
         """Maximum messages per second that the page requested; None for no limit."""
         return 1 / self._throttle_s if self._throttle_s else None
 
@@ -207,7 +207,7 @@ class SendQueue:
         if feed in self._active:
             self._active.remove(feed)
 
-    async def pop(self) -> Frame | Queued:
+    async def pop(self) -> Frame | QueuedMessage:
         """Wait for the next item to be sent, and return it."""
         while True:
             if self._frames:
@@ -215,14 +215,14 @@ class SendQueue:
                 self._frames_bytes -= len(frame.data)
                 return frame
             now = self._clock()
-            queued = self._take_turn(now)
+            queued = self._pop_next(now)
             if queued is not None:
                 return queued
             self._is_filled.clear()
             wait_s = min((each.next_at for each in self._active), default=float("inf")) - now
             await self._wait(None if wait_s == float("inf") else max(0.0, wait_s))
 
-    def _take_turn(self, now: float) -> Queued | None:
+    def _pop_next(self, now: float) -> QueuedMessage | None:
         for _turn in range(len(self._active)):
             feed = self._active.popleft()
             if not len(feed):
@@ -233,7 +233,7 @@ class SendQueue:
             message = feed.pop(now)
             if len(feed):
                 self._active.append(feed)
-            return Queued(feed, message)
+            return QueuedMessage(feed, message)
         return None
 
     async def _wait(self, timeout_s: float | None) -> None:

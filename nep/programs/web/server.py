@@ -26,12 +26,12 @@ from nep.programs.web.access import Access, AuthCheck, is_own_host, query_of
 from nep.programs.web.context import ConnectedPage, Refusal, RefusalKind, WebCounts
 from nep.programs.web.foxglove import SUBPROTOCOLS, ChannelFormat, FoxglovePage, is_offered
 from nep.programs.web.handshake import address_of, host_of, is_handshake, origin_of, own_origin
-from nep.programs.web.kept_out import KeptOut
+from nep.programs.web.kept_out import BlockedPages
 from nep.programs.web.limits import MAX_MESSAGE_BYTES, MAX_PAGES
 from nep.programs.web.rosbridge.page import Page, authenticate
-from nep.programs.web.served_pages import PageRequest, answer
-from nep.system.addresses import ANY
-from nep.system.descriptors import is_lack, limit, opened
+from nep.programs.web.served_pages import PageRequest, respond
+from nep.system.addresses import ANY_HOST
+from nep.system.descriptors import descriptor_limit, is_descriptor_shortage, open_descriptor_count
 from nep.system.log_rarely import is_logged
 from nep.text import escaped
 
@@ -49,17 +49,17 @@ _LOOPBACK = "127.0.0.1"
 _NODE_NAME = "nep_web"
 _REFRESH_S = 1.0
 """Interval in seconds at which the guard checks for new robots while pages are connected."""
-_WAIT_FOR_MASTER_S = 2.0
+_MASTER_TIMEOUT_S = 2.0
 _OPEN_TIMEOUT_S = 5.0
 _CLOSE_TIMEOUT_S = 2.0
-_END_TIMEOUT_S = 1.0
+_SHUTDOWN_TIMEOUT_S = 1.0
 """Time in seconds that pages have to reply to a close frame when the server stops."""
-_JOIN_S = 10.0
+_JOIN_TIMEOUT_S = 10.0
 _POLICY_VIOLATION = 1008
 _MAX_REFUSALS = 50
 LANGUAGE = "web"
 """Language of pages' nodes in the graph, by which other programs recognize them."""
-_MAX_LOCKED = 16
+_MAX_UNAUTHENTICATED = 16
 """Maximum number of connections without a token that may still send an ``auth`` operation."""
 
 
@@ -90,8 +90,8 @@ class WebSettings:
     @property
     def hosts(self) -> tuple[str, ...]:
         """All addresses at which the server listens."""
-        if ANY in self.listen:
-            return (ANY,)
+        if ANY_HOST in self.listen:
+            return (ANY_HOST,)
         return tuple(dict.fromkeys((_LOOPBACK, *self.listen)))
 
     @property
@@ -103,7 +103,7 @@ class WebSettings:
 class _Rejection(NamedTuple):
     status: HTTPStatus
     kind: RefusalKind
-    sentence: str
+    message: str
 
 
 class WebServer:
@@ -128,7 +128,7 @@ class WebServer:
         self._connections: WeakSet[ServerConnection] = WeakSet()
         """All open connections, including those without a handshake."""
         self._locked = 0
-        self._kept_out = KeptOut()
+        self._kept_out = BlockedPages()
         self._refusals_lock = threading.Lock()
         self._refusals: tuple[Refusal, ...] = ()
         self._auth = AuthCheck(settings.access.token)
@@ -171,8 +171,8 @@ class WebServer:
         """Close the connection of a page without waiting; the page may connect again. Thread-safe."""
         self._disconnect(lambda page, _access: page.id == page_id, "disconnected by the user of the server")
 
-    def keep_out(self, page_id: int) -> None:
-        """Disconnect a page, and reject it when it connects again, until `let_in` is called. Thread-safe.
+    def block_page(self, page_id: int) -> None:
+        """Disconnect a page, and reject its connections until `unblock_page` is called. Thread-safe.
 
         A page is identified by its address, origin and User-Agent. Other connected pages with the same
         identity stay connected.
@@ -182,8 +182,8 @@ class WebServer:
             self._kept_out.add(page_id, page.connection)
             self.disconnect(page_id)
 
-    def let_in(self, page_id: int) -> None:
-        """Allow a page that `keep_out` disconnected to connect again. Thread-safe."""
+    def unblock_page(self, page_id: int) -> None:
+        """Allow a page that `block_page` disconnected to connect again. Thread-safe."""
         self._kept_out.remove(page_id)
 
     def set_access(self, access: Access) -> int:
@@ -199,7 +199,7 @@ class WebServer:
                 self._auth = AuthCheck(access.token)
             self.settings = replace(self.settings, access=access)
             return self._disconnect(
-                lambda page, known: not self._may_stay(page.connection, known),
+                lambda page, known: not self._is_still_allowed(page.connection, known),
                 "this page may not be connected any more",
             )
 
@@ -259,7 +259,7 @@ class WebServer:
         self._thread.start()
         self._started.wait()
         if self._problem is not None:
-            self._thread.join(_JOIN_S)
+            self._thread.join(_JOIN_TIMEOUT_S)
             raise self._problem
         return self
 
@@ -280,7 +280,7 @@ class WebServer:
             with suppress(RuntimeError):  # the event loop is closed
                 loop.call_soon_threadsafe(stop.set)
         if self._thread.is_alive():
-            self._thread.join(_JOIN_S)
+            self._thread.join(_JOIN_TIMEOUT_S)
 
     def __enter__(self) -> Self:
         return self.start()
@@ -303,7 +303,7 @@ class WebServer:
     async def _serve(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
         with Node(
-            _NODE_NAME, self.settings.transport, master=self.settings.master, wait_s=_WAIT_FOR_MASTER_S
+            _NODE_NAME, self.settings.transport, master=self.settings.master, wait_s=_MASTER_TIMEOUT_S
         ) as node:
             with self._lock:
                 guard = self._guard = MotionGuard(node, self.settings.allow_moving)
@@ -316,7 +316,7 @@ class WebServer:
                 watch.cancel()
                 server.close()  # with 1001, going away
                 with suppress(asyncio.TimeoutError):
-                    await asyncio.wait_for(server.wait_closed(), _END_TIMEOUT_S)
+                    await asyncio.wait_for(server.wait_closed(), _SHUTDOWN_TIMEOUT_S)
                 for connection in tuple(self._connections):  # connections that did not close in time
                     if hasattr(connection, "transport"):  # connected
                         connection.transport.abort()
@@ -325,14 +325,14 @@ class WebServer:
     async def _listen(self, guard: MotionGuard) -> Server:
         from websockets.asyncio.server import ServerConnection, serve  # noqa: PLC0415 - only needed here
 
-        def connection(*args: Any, **options: Any) -> ServerConnection:  # noqa: ANN401 - the library's own
+        def new_connection(*args: Any, **options: Any) -> ServerConnection:  # noqa: ANN401 - the library's own
             created = ServerConnection(*args, **options)
             self._connections.add(created)
             return created
 
         try:
             return await serve(
-                partial(self._page, guard),
+                partial(self._serve_page, guard),
                 self.settings.hosts,  # type: ignore[arg-type] # asyncio takes several
                 self.settings.port,
                 process_request=self._refusal,
@@ -344,7 +344,7 @@ class WebServer:
                 max_queue=2,
                 server_header=None,
                 logger=_quiet_logger(),
-                create_connection=connection,  # type: ignore[arg-type] # a function that returns one, too
+                create_connection=new_connection,  # type: ignore[arg-type] # a function that returns one, too
             )
         except OSError as error:
             raise self._bind_error(error) from error
@@ -353,8 +353,8 @@ class WebServer:
         address = f"{', '.join(self.settings.hosts)}:{self.settings.port}"
         if error.errno == errno.EADDRINUSE:
             return AddressInUseError(address)
-        if error.errno is not None and is_lack(error.errno):
-            return TooManyFilesError(_("a web server"), opened(), limit())
+        if error.errno is not None and is_descriptor_shortage(error.errno):
+            return TooManyFilesError(_("a web server"), open_descriptor_count(), descriptor_limit())
         if isinstance(error, PermissionError):
             return NepError(
                 _("port {port} needs administrator rights; choose a port above 1023").format(
@@ -396,7 +396,7 @@ class WebServer:
             refusal = _Rejection(HTTPStatus.SERVICE_UNAVAILABLE, "limit", _("too many connections"))
         elif said := access.origin_refusal(origin, own_origin(connection)):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "origin", said)
-        elif self._kept_out.refuses(connection, request):
+        elif self._kept_out.is_blocked(connection, request):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "kept out", _("the user disconnected this page"))
         elif not (self.settings.rosbridge or is_offered(request.headers.get_all("Sec-WebSocket-Protocol"))):
             refusal = _Rejection(HTTPStatus.FORBIDDEN, "other", _("rosbridge is turned off"))
@@ -404,10 +404,10 @@ class WebServer:
             refusal = self._token_refusal(connection, request, access)
         if refusal is None:
             return None
-        self._turn_away(
-            connection, refusal.kind, refusal.sentence, (origin or "") if refusal.kind == "origin" else ""
+        self._record_rejection(
+            connection, refusal.kind, refusal.message, (origin or "") if refusal.kind == "origin" else ""
         )
-        return connection.respond(refusal.status, refusal.sentence + "\n")
+        return connection.respond(refusal.status, refusal.message + "\n")
 
     def _page_response(self, connection: ServerConnection, request: Request) -> Response:
         """Respond to an HTTP request for one of the server's own pages."""
@@ -423,9 +423,11 @@ class WebServer:
             own_origin(connection),
             authorizations[0] if len(authorizations) == 1 else None,
         )
-        found = answer(asked, self.settings.access)
+        found = respond(asked, self.settings.access)
         if found.is_token_refused:
-            self._turn_away(connection, "token", _("a page connected without the token or with a wrong one"))
+            self._record_rejection(
+                connection, "token", _("a page connected without the token or with a wrong one")
+            )
         headers = Headers(found.headers)
         headers["Connection"] = "close"
         headers["Content-Length"] = str(len(found.body))
@@ -436,14 +438,14 @@ class WebServer:
         self, connection: ServerConnection, request: Request, access: Access
     ) -> _Rejection | None:
         authorizations = request.headers.get_all("Authorization")
-        is_given = access.is_given(request.path, authorizations[0] if authorizations else None)
+        is_given = access.check_token(request.path, authorizations[0] if authorizations else None)
         connection.is_unlocked = not access.token or is_given is True  # type: ignore[attr-defined]
         connection.access = access  # type: ignore[attr-defined]
         if not access.token or is_given:
             return None
         if is_given is False:
             return _Rejection(HTTPStatus.UNAUTHORIZED, "token", _("the token is wrong"))
-        if self._locked >= _MAX_LOCKED:
+        if self._locked >= _MAX_UNAUTHENTICATED:
             return _Rejection(
                 HTTPStatus.UNAUTHORIZED,
                 "token",
@@ -459,26 +461,26 @@ class WebServer:
             return None
         return next((each for each in offered if each in SUBPROTOCOLS), None)
 
-    def _turn_away(
+    def _record_rejection(
         self, connection: ServerConnection, kind: RefusalKind, said: str, origin: str = ""
     ) -> None:
         who = escaped((origin or host_of(connection))[:200])
-        self._list_refusal(Refusal(time.time(), who, said, origin[:200], kind))
+        self._add_refusal(Refusal(time.time(), who, said, origin[:200], kind))
         self.counts.turned_away += 1
         if is_logged(self.counts.turned_away):
             where = address_of(connection)
             _logger.warning("refused %s: %s (%d so far)", where, said, self.counts.turned_away)
 
-    def _report_robot(self, connection: ServerConnection, robot: str, said: str) -> None:
+    def _record_robot_refusal(self, connection: ServerConnection, robot: str, said: str) -> None:
         who = escaped((origin_of(connection) or host_of(connection))[:200])
-        self._list_refusal(Refusal(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
+        self._add_refusal(Refusal(time.time(), who, said, kind="robot", robot=escaped(robot[:200])))
 
-    def _list_refusal(self, refusal: Refusal) -> None:
+    def _add_refusal(self, refusal: Refusal) -> None:
         with self._refusals_lock:
             others = (each for each in self._refusals if replace(each, time_s=refusal.time_s) != refusal)
             self._refusals = (*others, refusal)[-_MAX_REFUSALS:]
 
-    async def _page(self, guard: MotionGuard, connection: ServerConnection) -> None:
+    async def _serve_page(self, guard: MotionGuard, connection: ServerConnection) -> None:
         access: Access = connection.access  # type: ignore[attr-defined]
         page: Page | FoxglovePage | None = None
         try:
@@ -488,7 +490,7 @@ class WebServer:
                 if access.token and not await self._is_authenticated(connection, auth):
                     return
             with self._lock:
-                if self._may_stay(connection, access):
+                if self._is_still_allowed(connection, access):
                     page = self._new_page(connection, guard)
                     self._pages[page] = access
             if page is None:
@@ -497,7 +499,7 @@ class WebServer:
             self.counts.opened += 1
             await page.run()
         except NepError as error:  # no file descriptor left for a node
-            self._turn_away(connection, "limit", str(error))
+            self._record_rejection(connection, "limit", str(error))
             await connection.close(1013, "try again later")
         finally:
             if page is not None:
@@ -506,7 +508,7 @@ class WebServer:
     def _new_page(self, connection: ServerConnection, guard: MotionGuard) -> Page | FoxglovePage:
         name = node_name(origin_of(connection), address_of(connection))
         channels = self.settings.foxglove
-        report = partial(self._report_robot, connection)
+        report = partial(self._record_robot_refusal, connection)
         if channels is not None and connection.subprotocol in SUBPROTOCOLS:
             return FoxglovePage(
                 connection,
@@ -519,7 +521,7 @@ class WebServer:
             )
         return Page(connection, name, self._new_node, guard, self.counts, report)
 
-    def _may_stay(self, connection: ServerConnection, known: Access) -> bool:
+    def _is_still_allowed(self, connection: ServerConnection, known: Access) -> bool:
         """Return True if the current rules allow a page that was accepted under the rules `known`."""
         access = self.settings.access
         if not self.settings.rosbridge and connection.subprotocol not in SUBPROTOCOLS:
@@ -535,14 +537,14 @@ class WebServer:
         finally:
             self._locked -= 1
         said = _("a token is required; connect to ws://HOST:PORT/?token=TOKEN")
-        self._turn_away(connection, "token", said)
+        self._record_rejection(connection, "token", said)
         await connection.close(_POLICY_VIOLATION, "the token is missing or wrong")
         return False
 
     def _new_node(self, name: str) -> Node:
         settings = self.settings
         return Node(
-            name, settings.transport, master=settings.master, wait_s=_WAIT_FOR_MASTER_S, language=LANGUAGE
+            name, settings.transport, master=settings.master, wait_s=_MASTER_TIMEOUT_S, language=LANGUAGE
         )
 
 

@@ -65,13 +65,13 @@ def page_title(path: str, referer: str, origin: str) -> str:
         referer: URL of the page, which few browsers send; its last path segment is used next.
         origin: Origin of the page, which every browser sends; its host and port are used last.
     """
-    for title in (_given_title(path), _last_part(referer), _host(origin)):
+    for title in (_title_parameter(path), _last_part(referer), _host(origin)):
         if shown := escaped(title.strip())[:MAX_SHOWN_LENGTH]:
             return shown
     return ""
 
 
-def _given_title(path: str) -> str:
+def _title_parameter(path: str) -> str:
     try:
         return parse_qs(urlsplit(path[:_MAX_READ_LENGTH]).query).get("title", [""])[0]
     except ValueError:

@@ -10,7 +10,7 @@ from typing import IO
 from nep.messages.packing import pack, unpack
 from nep.recordings.file_reader import FileFacts
 from nep.recordings.formats.channels import ChannelDefinition
-from nep.recordings.formats.index import AttachedFile, Damage
+from nep.recordings.formats.index import AttachedFile, CorruptRange
 from nep.recordings.formats.records import RawMessage, message_head
 
 _LENGTH = struct.Struct("<I")
@@ -41,7 +41,7 @@ def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
     return content if isinstance(content, dict) else None
 
 
-def packed_messages(messages: Iterable[RawMessage]) -> bytes:
+def pack_messages(messages: Iterable[RawMessage]) -> bytes:
     """Encode messages as consecutive MCAP records, to be read with `messages_in`."""
     pieces: list[bytes | memoryview] = []
     for raw in messages:
@@ -50,20 +50,20 @@ def packed_messages(messages: Iterable[RawMessage]) -> bytes:
     return b"".join(pieces)
 
 
-def plain_damage(damage: Iterable[Damage]) -> list[dict[str, object]]:
+def corruption_to_plain(damage: Iterable[CorruptRange]) -> list[dict[str, object]]:
     """Convert damage to plain values for a frame."""
     return [asdict(each) for each in damage]
 
 
-def damage_of(plain: object) -> tuple[Damage, ...]:
+def corruption_from_plain(plain: object) -> tuple[CorruptRange, ...]:
     """Convert plain values of a frame to damage. Raises `TypeError` for invalid data."""
-    return tuple(Damage(**each) for each in plain) if isinstance(plain, list) else ()
+    return tuple(CorruptRange(**each) for each in plain) if isinstance(plain, list) else ()
 
 
-def plain_facts(facts: FileFacts) -> dict[str, object]:
+def facts_to_plain(facts: FileFacts) -> dict[str, object]:
     """Convert the facts about a file to plain values for a frame."""
     return {
-        **{name: getattr(facts, name) for name in _SCALARS},
+        **{name: getattr(facts, name) for name in _SCALAR_FIELDS},
         "channels": {
             number: (
                 each.topic,
@@ -82,10 +82,10 @@ def plain_facts(facts: FileFacts) -> dict[str, object]:
     }
 
 
-_SCALARS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", "library")
+_SCALAR_FIELDS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", "library")
 
 
-def facts_of(plain: object) -> FileFacts:
+def facts_from_plain(plain: object) -> FileFacts:
     """Convert plain values of a frame to facts. Raises `TypeError` or `KeyError` for invalid data."""
     if not isinstance(plain, dict):
         raise TypeError("facts")
@@ -99,5 +99,5 @@ def facts_of(plain: object) -> FileFacts:
         metadata=tuple((name, values) for name, values in plain["metadata"]),
         attachments=tuple(AttachedFile(**each) for each in plain["attachments"]),
         compressions=plain["compressions"],
-        **{name: plain[name] for name in _SCALARS},
+        **{name: plain[name] for name in _SCALAR_FIELDS},
     )

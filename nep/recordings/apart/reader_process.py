@@ -17,8 +17,14 @@ from pathlib import Path
 from typing import IO, Any
 
 from nep.errors import NepError, RecordingError, RecordingTooLargeError
-from nep.i18n import _, begin
-from nep.recordings.apart.frames import packed_messages, plain_damage, plain_facts, read_frame, write_frame
+from nep.i18n import _, set_initial_language
+from nep.recordings.apart.frames import (
+    corruption_to_plain,
+    facts_to_plain,
+    pack_messages,
+    read_frame,
+    write_frame,
+)
 from nep.recordings.file_reader import FileReader
 from nep.recordings.formats.limits import ReadBudget
 from nep.recordings.formats.records import RawMessage
@@ -26,7 +32,7 @@ from nep.recordings.formats.records import RawMessage
 _MAX_CURSORS = 32
 _BATCH_BYTES = 1_000_000
 _MAX_BATCH = 4_096
-Answer = Mapping[str, object]
+Reply = Mapping[str, object]
 
 
 class RecordingService:
@@ -36,24 +42,24 @@ class RecordingService:
         tell: Called with progress frames.
     """
 
-    def __init__(self, tell: Callable[[Answer], object]) -> None:
+    def __init__(self, tell: Callable[[Reply], object]) -> None:
         self._report_progress = tell
         self._files: dict[int, FileReader] = {}
         self._numbers = count(1)
         self._reported_damage: dict[int, int] = {}
         self._cursors: OrderedDict[int, Iterator[RawMessage]] = OrderedDict()
-        self._operations: Mapping[str, Callable[[Mapping[str, Any]], Answer]] = {
+        self._operations: Mapping[str, Callable[[Mapping[str, Any]], Reply]] = {
             "open": self._open,
-            "raw": self._raw,
+            "raw": self._read_raw,
             "next": self._next,
             "newest": self._newest,
             "newest_times": self._newest_times,
             "densities": self._densities,
-            "pieces_of": self._pieces_of,
+            "pieces_of": self._chunks_with,
             "close": self._close,
         }
 
-    def answer(self, request: Mapping[str, Any]) -> Answer:
+    def reply(self, request: Mapping[str, Any]) -> Reply:
         """Execute a request and return the reply. Errors are returned, not raised."""
         path = str(request.get("path", ""))
         try:
@@ -70,20 +76,20 @@ class RecordingService:
             return {"error": str(error), "path": path}
         except (TypeError, ValueError, KeyError, OSError) as error:
             return {"error": str(error) or type(error).__name__, "path": path}
-        self._add_damage(answer, request.get("file", answer.get("file")))
+        self._add_corruption(answer, request.get("file", answer.get("file")))
         return answer
 
-    def _add_damage(self, answer: dict[str, object], number: object) -> None:
+    def _add_corruption(self, answer: dict[str, object], number: object) -> None:
         # Adds the damage of a file if it has grown since the last reply.
         file = self._files.get(number) if isinstance(number, int) else None
         if file is None or not isinstance(number, int):
             return
-        damage = file.damage
+        damage = file.corruption
         if len(damage) != self._reported_damage.get(number, 0):
             self._reported_damage[number] = len(damage)
-            answer["damage"] = plain_damage(damage)
+            answer["damage"] = corruption_to_plain(damage)
 
-    def _open(self, request: Mapping[str, Any]) -> Answer:
+    def _open(self, request: Mapping[str, Any]) -> Reply:
         path = Path(request["path"])
         budget = None if request["budget"] is None else ReadBudget(path, *request["budget"])
 
@@ -93,20 +99,20 @@ class RecordingService:
         file = FileReader(path, cache_bytes=request["cache_bytes"], progress=progress, budget=budget)
         number = next(self._numbers)
         self._files[number] = file
-        return {"file": number, "facts": plain_facts(file.facts)}
+        return {"file": number, "facts": facts_to_plain(file.facts)}
 
-    def _raw(self, request: Mapping[str, Any]) -> Answer:
+    def _read_raw(self, request: Mapping[str, Any]) -> Reply:
         pieces = None if request["pieces"] is None else set(request["pieces"])
         file = self._files[request["file"]]
         number = next(self._numbers)
-        self._cursors[number] = file.raw(
+        self._cursors[number] = file.read_raw(
             request["start_ns"], request["end_ns"], set(request["channels"]), pieces
         )
         while len(self._cursors) > _MAX_CURSORS:
             self._cursors.popitem(last=False)
         return self._next({"cursor": number, "most": request["most"]})
 
-    def _next(self, request: Mapping[str, Any]) -> Answer:
+    def _next(self, request: Mapping[str, Any]) -> Reply:
         # The cursor is 0 after the last message.
         number = request["cursor"]
         if number not in self._cursors:
@@ -121,28 +127,28 @@ class RecordingService:
         if not batch:
             del self._cursors[number]
             number = 0
-        return {"cursor": number, "messages": packed_messages(batch)}
+        return {"cursor": number, "messages": pack_messages(batch)}
 
-    def _newest(self, request: Mapping[str, Any]) -> Answer:
+    def _newest(self, request: Mapping[str, Any]) -> Reply:
         found = self._files[request["file"]].newest(request["at_ns"], request["groups"])
         return {
             "are_there": [each is not None for each in found],
-            "messages": packed_messages(each for each in found if each is not None),
+            "messages": pack_messages(each for each in found if each is not None),
         }
 
-    def _newest_times(self, request: Mapping[str, Any]) -> Answer:
+    def _newest_times(self, request: Mapping[str, Any]) -> Reply:
         return {"times": self._files[request["file"]].newest_times(request["at_ns"], request["channels"])}
 
-    def _densities(self, request: Mapping[str, Any]) -> Answer:
+    def _densities(self, request: Mapping[str, Any]) -> Reply:
         file, channels = self._files[request["file"]], set(request["channels"])
         return {
             "counts": file.densities(request["start_ns"], request["end_ns"], request["buckets"], channels)
         }
 
-    def _pieces_of(self, request: Mapping[str, Any]) -> Answer:
-        return {"pieces": self._files[request["file"]].pieces_of(request["channels"])}
+    def _chunks_with(self, request: Mapping[str, Any]) -> Reply:
+        return {"pieces": self._files[request["file"]].chunks_with(request["channels"])}
 
-    def _close(self, request: Mapping[str, Any]) -> Answer:
+    def _close(self, request: Mapping[str, Any]) -> Reply:
         file = self._files.pop(request["file"], None)
         if file is not None:
             file.close()
@@ -163,7 +169,7 @@ def serve(requests: IO[bytes], answers: IO[bytes]) -> None:
     """Execute requests until the input stream ends."""
     service = RecordingService(lambda content: write_frame(answers, content))
     while (request := read_frame(requests)) is not None:
-        write_frame(answers, service.answer(request))
+        write_frame(answers, service.reply(request))
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -171,7 +177,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="nep.recordings.apart.reader_process")
     parser.add_argument("--memory-mb", type=int, default=1024)
     _limit_memory(parser.parse_args(arguments).memory_mb)
-    begin()
+    set_initial_language()
     with suppress(OSError, KeyboardInterrupt):  # the parent process has ended
         serve(sys.stdin.buffer, sys.stdout.buffer)
 

@@ -17,9 +17,9 @@ from typing import IO, TYPE_CHECKING, Any
 from nep.errors import ClosedError, RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.masters.process import NO_CONSOLE
-from nep.recordings.apart.frames import damage_of, facts_of, read_frame, write_frame
+from nep.recordings.apart.frames import corruption_from_plain, facts_from_plain, read_frame, write_frame
 from nep.recordings.file_reader import CACHE_BYTES, FileFacts
-from nep.recordings.formats.index import Damage
+from nep.recordings.formats.index import CorruptRange
 from nep.recordings.formats.records import RawMessage, messages_in
 from nep.recordings.reader import Recording
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-_TIMEOUT_S = 60.0
-_CLOSE_S = 5.0
+_REQUEST_TIMEOUT_S = 60.0
+_CLOSE_TIMEOUT_S = 5.0
 _FIRST_BATCH, _GROWTH, _MAX_BATCH = 16, 4, 4_096
 
 
@@ -39,7 +39,7 @@ class ReaderProcess:
     requests don't wait long.
     """
 
-    def __init__(self, command: Sequence[str], *, timeout_s: float = _TIMEOUT_S) -> None:
+    def __init__(self, command: Sequence[str], *, timeout_s: float = _REQUEST_TIMEOUT_S) -> None:
         """Initialize without starting a process.
 
         Args:
@@ -80,7 +80,7 @@ class ReaderProcess:
                 self._pipe = _Pipe(self._command, path)
             pipe = self._pipe
         request = {"op": "open", "path": str(path), "cache_bytes": cache_bytes, "budget": budget}
-        answer = pipe.ask(path, request, self._timeout_s, progress)
+        answer = pipe.request(path, request, self._timeout_s, progress)
         return Recording(path, file=_RemoteFile(pipe, path, answer, self._timeout_s))
 
     def close(self) -> None:
@@ -89,7 +89,7 @@ class ReaderProcess:
             self._is_closed = True
             pipe, self._pipe = self._pipe, None
         if pipe is not None:
-            pipe.end()
+            pipe.close()
 
     def __enter__(self) -> Self:
         return self
@@ -134,7 +134,7 @@ class _Pipe:
                     frame = read_frame(out)
             self._answers.put(frame)
 
-    def ask(
+    def request(
         self,
         path: Path,
         request: Mapping[str, object],
@@ -178,7 +178,7 @@ class _Pipe:
         if self._was_ended:
             raise ClosedError(f"recording '{path.name}'")
 
-    def end(self) -> None:
+    def close(self) -> None:
         # Also interrupts a thread that waits for a reply.
         self._was_ended = True
         self._kill()
@@ -187,7 +187,7 @@ class _Pipe:
         with suppress(OSError):
             self._process.kill()
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(_CLOSE_S)
+            self._process.wait(_CLOSE_TIMEOUT_S)
         while self._thread.is_alive():  # the reader thread may wait for room in the queue
             with suppress(queue.Empty):
                 self._answers.get_nowait()
@@ -207,23 +207,23 @@ class _RemoteFile:
         self._pipe, self._path, self._timeout_s = pipe, path, timeout_s
         self._number = opened["file"]
         self._is_closed = False
-        self._damage = damage_of(opened.get("damage"))
-        self.facts: FileFacts = facts_of(opened["facts"])
+        self._damage = corruption_from_plain(opened.get("damage"))
+        self.facts: FileFacts = facts_from_plain(opened["facts"])
 
     @property
-    def damage(self) -> Sequence[Damage]:
+    def corruption(self) -> Sequence[CorruptRange]:
         return self._damage
 
-    def _ask(self, op: str, **request: object) -> dict[str, Any]:
+    def _request(self, op: str, **request: object) -> dict[str, Any]:
         if self._is_closed:
             raise ClosedError(f"recording '{self._path.name}'")
         asked = {"op": op, "file": self._number, **request}
-        answer = self._pipe.ask(self._path, asked, self._timeout_s)
+        answer = self._pipe.request(self._path, asked, self._timeout_s)
         if "damage" in answer:
-            self._damage = damage_of(answer["damage"])
+            self._damage = corruption_from_plain(answer["damage"])
         return answer
 
-    def raw(
+    def read_raw(
         self,
         start_ns: int | None,
         end_ns: int | None,
@@ -233,10 +233,10 @@ class _RemoteFile:
         if not channels:
             return
         most = _FIRST_BATCH
-        answer = self._ask(
+        answer = self._request(
             "raw",
-            start_ns=_bounded(start_ns),
-            end_ns=_bounded(end_ns),
+            start_ns=_clamp_time(start_ns),
+            end_ns=_clamp_time(end_ns),
             channels=list(channels),
             pieces=None if pieces is None else list(pieces),
             most=most,
@@ -246,40 +246,40 @@ class _RemoteFile:
                 if isinstance(record, RawMessage):
                     yield record
             most = min(_GROWTH * most, _MAX_BATCH)
-            answer = self._ask("next", cursor=answer["cursor"], most=most)
+            answer = self._request("next", cursor=answer["cursor"], most=most)
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
         if not groups:
             return []
-        answer = self._ask("newest", at_ns=_bounded(at_ns), groups=[list(each) for each in groups])
+        answer = self._request("newest", at_ns=_clamp_time(at_ns), groups=[list(each) for each in groups])
         messages = (each for each in messages_in(answer["messages"]) if isinstance(each, RawMessage))
         return [next(messages, None) if is_there else None for is_there in answer["are_there"]]
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        times: dict[int, int] = self._ask("newest_times", at_ns=_bounded(at_ns), channels=list(channels))[
-            "times"
-        ]
+        times: dict[int, int] = self._request(
+            "newest_times", at_ns=_clamp_time(at_ns), channels=list(channels)
+        )["times"]
         return times
 
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
-        span = {"start_ns": _bounded(start_ns), "end_ns": _bounded(end_ns)}
-        answer = self._ask("densities", **span, buckets=buckets, channels=list(channels))
+        span = {"start_ns": _clamp_time(start_ns), "end_ns": _clamp_time(end_ns)}
+        answer = self._request("densities", **span, buckets=buckets, channels=list(channels))
         counts: dict[int, Sequence[int]] = answer["counts"]
         return counts
 
-    def pieces_of(self, channels: Collection[int]) -> Sequence[int]:
-        pieces: list[int] = self._ask("pieces_of", channels=list(channels))["pieces"]
+    def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
+        pieces: list[int] = self._request("pieces_of", channels=list(channels))["pieces"]
         return pieces
 
     def close(self) -> None:
         if not self._is_closed:
             with suppress(RecordingError, ClosedError):
-                self._ask("close")
+                self._request("close")
             self._is_closed = True
 
 
-def _bounded(at_ns: int | None) -> int | None:
+def _clamp_time(at_ns: int | None) -> int | None:
     # Clamped to the range of msgpack.
     return None if at_ns is None else max(-(2**63), min(at_ns, 2**64 - 1))

@@ -20,10 +20,10 @@ import orjson
 from nep.errors import DecodeError
 from nep.messages.codecs import codec_for
 from nep.messages.image_codec import picture_info, raw_layout
-from nep.messages.message import NOTHING, Message, MessageKind, arrived, kind_of
+from nep.messages.message import NO_EXTENSION, Message, MessageKind, message_kind, received_message
 from nep.messages.packing import pack, unpack
 from nep.recordings.formats.protobuf import (
-    EXTRA,
+    EXTRA_FIELD,
     bytes_field,
     descriptor_set,
     fields,
@@ -33,7 +33,7 @@ from nep.recordings.formats.protobuf import (
 from nep.recordings.formats.records import RawMessage
 from nep.recordings.formats.schemas import schema_of
 
-PREFIX = "nep."
+METADATA_PREFIX = "nep."
 """Prefix of metadata keys that nep uses."""
 _U32, _U64 = 2**32 - 1, 2**64 - 1
 Role = str
@@ -119,15 +119,15 @@ def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = Fals
         form = "wrapped"
     if form in _DATA_FIELD:
         if extra:
-            packed = _packed(extra)
-            before += bytes_field(EXTRA, len(packed)) + packed
+            packed = _pack_extra(extra)
+            before += bytes_field(EXTRA_FIELD, len(packed)) + packed
         before += bytes_field(_DATA_FIELD[form], message.size_bytes)
     sequence = 0 if seq is None else seq & _U32
     publish_ns = log_ns if stamp is None else max(0, min(stamp, _U64))
     return Encoding(form, before, sequence, publish_ns, is_decodable, is_self_contained)
 
 
-def _packed(extra: Mapping[str, Any]) -> bytes:
+def _pack_extra(extra: Mapping[str, Any]) -> bytes:
     try:
         return pack(extra)
     except ValueError:  # an extension or number that can't have been received from a wire
@@ -179,7 +179,7 @@ def _picture_form(message: Message, stamp_ns: int) -> tuple[str, bool, bytes]:
         return "wrapped", False, b""
     height, width = sides
     step = message.size_bytes // height
-    if width * _pixel_bytes(layout.numbers, layout.channels) * height != message.size_bytes:
+    if width * _pixel_bytes(layout.dtype, layout.channels) * height != message.size_bytes:
         return "wrapped", False, b""
     if encoding not in _VIEWABLE_LAYOUTS or step > _U32:
         return "wrapped", True, b""
@@ -232,14 +232,14 @@ class LiveChannels:
         "json": "json", "msgpack": "msgpack", "string": "text", "image": "picture",
     }  # fmt: skip
 
-    def expected(self, topic: str, msg_type: str) -> ChannelDefinition:
+    def expected_channel(self, topic: str, msg_type: str) -> ChannelDefinition:
         """Return the most likely channel for a topic on which no message was received yet."""
         codec = codec_for(msg_type).name
-        message = arrived(kind_of(topic, codec, msg_type), b"", None, 0, 0)
+        message = received_message(message_kind(topic, codec, msg_type), b"", None, 0, 0)
         form = self._FORMS.get(codec, "wrapped")
         return definition_of(message, Encoding(form, b"", 0, 0, is_decodable=True))
 
-    def encoded(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:
+    def encode(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:
         """Return the channel of a message that was received at `log_ns`, and the message's encoded data.
 
         Raises:
@@ -274,7 +274,7 @@ class ChannelDecoder:
         self._data_field = 6 if schema == "foxglove.RawImage" else 2 if schema.endswith("Image") else 1
         self.codec = metadata.get("nep.codec", "") or self._guess_codec()
         self.msg_type = metadata.get("nep.msg_type", "") or schema or self.codec
-        self._kind = kind_of(
+        self._kind = message_kind(
             definition.topic,
             self.codec,
             self.msg_type,
@@ -304,24 +304,24 @@ class ChannelDecoder:
         kind, data = self._kind, raw.data
         seq = raw.sequence if self._has_seq else None
         stamp = raw.publish_ns if self._has_stamp else None
-        publisher, extension = self._publisher, NOTHING
+        publisher, extension = self._publisher, NO_EXTENSION
         if self._is_wrapped:
             data, extra = self._unwrap(data)
             if extra:  # untrusted: may contain any values
-                extra_extension = extra.get("extension", NOTHING)
-                extension = extra_extension if isinstance(extra_extension, Mapping) else NOTHING
+                extra_extension = extra.get("extension", NO_EXTENSION)
+                extension = extra_extension if isinstance(extra_extension, Mapping) else NO_EXTENSION
                 seq, stamp = _int_or_none(extra.get("seq", seq)), _int_or_none(extra.get("stamp_ns", stamp))
                 if "publisher" in extra:
                     publisher, kind = _int_or_none(extra["publisher"]), self._kind_of(extra)
         # `arrived` accepts a missing publisher
-        return arrived(kind, data, stamp, seq, publisher, extension)  # type: ignore[arg-type]
+        return received_message(kind, data, stamp, seq, publisher, extension)  # type: ignore[arg-type]
 
     def _kind_of(self, extra: Mapping[str, Any]) -> MessageKind:
         key = (str(extra.get("codec")), str(extra.get("msg_type")), bool(extra.get("is_latched")))
         if key not in self._kinds:
             if len(self._kinds) >= 1000:
                 self._kinds.clear()
-            self._kinds[key] = kind_of(self.topic, key[0], key[1], is_latched=key[2])
+            self._kinds[key] = message_kind(self.topic, key[0], key[1], is_latched=key[2])
         return self._kinds[key]
 
     def _unwrap(self, data: memoryview) -> tuple[memoryview, dict[str, Any]]:
@@ -331,7 +331,7 @@ class ChannelDecoder:
             for number, value in fields(data):
                 if number == self._data_field and isinstance(value, memoryview):
                     payload = value
-                elif number == EXTRA and isinstance(value, memoryview):
+                elif number == EXTRA_FIELD and isinstance(value, memoryview):
                     decoded = unpack(value)
                     extra = decoded if isinstance(decoded, dict) else {}
                 else:

@@ -45,7 +45,7 @@ def check_packages() -> None:
         raise RecordingsUnavailableError("pip install 'nep-studio[recordings]'") from error
 
 
-def compressed(data: bytes, compression: str) -> bytes:
+def compress(data: bytes, compression: str) -> bytes:
     """Compress the data of a chunk with "zstd", "lz4" or "" for none."""
     if compression == "zstd":
         return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(data)
@@ -55,7 +55,7 @@ def compressed(data: bytes, compression: str) -> bytes:
     return data
 
 
-def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
+def decompress(data: memoryview, head: ChunkHead) -> bytes | memoryview:
     """Decompress the records of a chunk, verifying size and CRC.
 
     Raises `ValueError` if the chunk is damaged or too large. Memory is limited to the declared size plus one
@@ -71,7 +71,7 @@ def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
         elif head.compression == "zstd" and zstandard.frame_content_size(data) == size:
             result = zstandard.ZstdDecompressor(max_window_size=_MAX_WINDOW_BYTES).decompress(data)
         else:
-            result = _joined(_pieces(data, head.compression, size + 1))
+            result = _join(_decompress_stream(data, head.compression, size + 1))
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise ValueError(str(error)) from error
     if len(result) != size:
@@ -81,28 +81,28 @@ def decompressed(data: memoryview, head: ChunkHead) -> bytes | memoryview:
     return result
 
 
-def decompressed_part(data: memoryview, head: ChunkHead) -> bytes | memoryview:
+def decompress_partial(data: memoryview, head: ChunkHead) -> bytes | memoryview:
     """Decompress as many records as the first bytes of a truncated chunk contain, without verification."""
     if not head.compression:
         return data
     size = min(head.uncompressed_bytes, max_chunk_bytes(head.data_bytes))
     buffer = bytearray()
     try:
-        for piece in _pieces(data, head.compression, size, _PART_STEP_BYTES):
+        for piece in _decompress_stream(data, head.compression, size, _PART_STEP_BYTES):
             buffer += piece
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
         pass  # pieces before the cut are intact
     return memoryview(buffer)
 
 
-def _joined(pieces: Iterator[bytes]) -> memoryview:
+def _join(pieces: Iterator[bytes]) -> memoryview:
     buffer = bytearray()
     for piece in pieces:
         buffer += piece
     return memoryview(buffer)
 
 
-def _pieces(
+def _decompress_stream(
     data: memoryview, compression: str, most_bytes: int, step_bytes: int = _STEP_BYTES
 ) -> Iterator[bytes]:
     # Short steps, so that Ctrl+C can interrupt.

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from nep.i18n import _, ngettext, number
-from nep.recordings.formats.index import Damage
+from nep.recordings.formats.index import CorruptRange
 
-_MAX_NAMED = 3
+_MAX_RANGES_LISTED = 3
 
 
-def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
+def corruption_text(damage: Sequence[CorruptRange], start_ns: int) -> str:
     """Format a summary of the skipped pieces, their times and the missing messages; "" if there is no damage.
 
     Times are in seconds after ``start_ns``, the start of the recording.
@@ -19,8 +19,8 @@ def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
         return ""
     known = [each.message_count for each in damage]
     start_ns = start_ns or damage[0].start_ns
-    places = "; ".join(_format_place(each, start_ns) for each in damage[:_MAX_NAMED])
-    if len(damage) > _MAX_NAMED:
+    places = "; ".join(_format_range(each, start_ns) for each in damage[:_MAX_RANGES_LISTED])
+    if len(damage) > _MAX_RANGES_LISTED:
         places += "; …"
     summary = ngettext(
         "{count} part of the file is damaged and was skipped ({places})",
@@ -35,7 +35,7 @@ def damage_words(damage: Sequence[Damage], start_ns: int) -> str:
     ).format(damage=summary, count=missing)
 
 
-def _format_place(each: Damage, start_ns: int) -> str:
+def _format_range(each: CorruptRange, start_ns: int) -> str:
     if not each.end_ns:
         return _("{size} bytes at byte {offset}").format(size=each.length, offset=each.offset)
     begin, end = ((at_ns - start_ns) / 1e9 for at_ns in (each.start_ns, each.end_ns))

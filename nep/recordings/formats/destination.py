@@ -23,17 +23,17 @@ class WriterLimits:
         least_free_bytes: Free disk space below which a recording stops, so that other programs have some
             left.
         flush_s: Maximum time until a received message is written to the file.
-        figures_s: Interval at which the counts by topic are written.
+        stats_interval_s: Interval at which the counts by topic are written.
     """
 
     queue_bytes: int = 256_000_000
     queue_messages: int = 200_000
-    least_free_bytes: int = 200_000_000
-    flush_s: float = 0.5
-    figures_s: float = 1.0
+    min_free_bytes: int = 200_000_000
+    flush_interval_s: float = 0.5
+    stats_interval_s: float = 1.0
 
 
-USUAL_LIMITS = WriterLimits()
+DEFAULT_LIMITS = WriterLimits()
 
 
 class Destination(Protocol):
@@ -43,7 +43,7 @@ class Destination(Protocol):
     def file(self) -> FileWriter:
         """File that is currently written."""
 
-    def flushed(self) -> None:
+    def on_flushed(self) -> None:
         """Process the end of a written chunk. Raises `OSError` or `RecordingError`."""
 
     @property
@@ -62,7 +62,7 @@ class Destination(Protocol):
     def finish(self) -> None:
         """Finish the recording. Raises `OSError`."""
 
-    def fail(self) -> None:
+    def abort(self) -> None:
         """Close the file without a summary, after an error."""
 
 
@@ -72,11 +72,11 @@ class OneFile:
     def __init__(self, file: FileWriter, least_free_bytes: int) -> None:
         self.file = file
         self._least_free_bytes = least_free_bytes
-        self._identity = _identity(file.path)
+        self._identity = _file_identity(file.path)
 
     is_full = False
 
-    def flushed(self) -> None:
+    def on_flushed(self) -> None:
         """Do nothing."""
 
     def next_file(self) -> None:
@@ -84,7 +84,7 @@ class OneFile:
 
     def check_file(self) -> None:
         """Check that the file still exists and the disk is not full. Raises `RecordingError`."""
-        if _identity(self.file.path) != self._identity:
+        if _file_identity(self.file.path) != self._identity:
             raise RecordingError(str(self.file.path), _("the file was moved or deleted during recording"))
         if shutil.disk_usage(self.file.path.parent).free < self._least_free_bytes:
             raise RecordingError(
@@ -95,12 +95,12 @@ class OneFile:
         """Write the summary and close the file. Raises `OSError`."""
         self.file.finish()
 
-    def fail(self) -> None:
+    def abort(self) -> None:
         """Close the file without a summary."""
         self.file.close()
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
+def _file_identity(path: Path) -> tuple[int, int] | None:
     try:
         found = path.stat()
     except OSError:

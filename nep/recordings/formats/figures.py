@@ -20,7 +20,7 @@ MAX_LOST = 2**63 - 1
 
 
 @dataclass(frozen=True)
-class TopicFigures:
+class TopicStats:
     """Counts of one topic.
 
     Attributes:
@@ -39,9 +39,9 @@ class TopicFigures:
     unkept: int = 0
     size_bytes: int = 0
 
-    def since(self, earlier: TopicFigures) -> TopicFigures:
+    def difference(self, earlier: TopicStats) -> TopicStats:
         """Return the difference to earlier counts."""
-        return TopicFigures(
+        return TopicStats(
             max(0, self.received - earlier.received),
             None if self.lost is None else max(0, self.lost - (earlier.lost or 0)),
             max(0, self.late - earlier.late),
@@ -62,7 +62,7 @@ class TopicFigures:
         }
 
 
-def read_figures(value: object) -> TopicFigures | None:
+def parse_stats(value: object) -> TopicStats | None:
     """Parse counts from a map or its JSON text; return None if the data is invalid."""
     if isinstance(value, str):
         try:
@@ -75,7 +75,7 @@ def read_figures(value: object) -> TopicFigures | None:
     names = ("received", "late", "undecodable", "unkept", "size_bytes")
     counts = {name: each for name in names if type(each := value.get(name)) is int and each >= 0}
     is_whole = len(counts) == len(names) and (lost is None or (type(lost) is int and lost >= 0))
-    return TopicFigures(lost=lost, **counts) if is_whole else None
+    return TopicStats(lost=lost, **counts) if is_whole else None
 
 
 @dataclass
@@ -84,11 +84,11 @@ class _SequenceRange:
 
     first: int
     last: int
-    came: int = 0
+    received: int = 0
 
     @property
     def lost(self) -> int:
-        return max(0, self.last - self.first + 1 - self.came)
+        return max(0, self.last - self.first + 1 - self.received)
 
 
 @dataclass
@@ -118,14 +118,14 @@ class TopicCounter:
             if len(self._publishers) < MAX_PUBLISHERS:
                 self._publishers[publisher] = _SequenceRange(seq, seq, 1)
             return
-        numbers.came += 1
+        numbers.received += 1
         if seq > numbers.last:
             numbers.last = seq
         else:
             self.late += 1
             numbers.first = min(numbers.first, seq)
 
-    def leave_out(self, publisher: int | None, count: int, size_bytes: int) -> None:
+    def count_skipped(self, publisher: int | None, count: int, size_bytes: int) -> None:
         """Count messages of a publisher that were received but not recorded."""
         self.received += count
         self.unkept += count
@@ -133,14 +133,14 @@ class TopicCounter:
         self.is_changed = True
         numbers = self._publishers.get(publisher)
         if numbers is not None:
-            numbers.came += count
+            numbers.received += count
 
-    def figures(self) -> TopicFigures:
+    def stats(self) -> TopicStats:
         """Return the current counts."""
         lost = None
         if self._publishers:
             lost = min(sum(each.lost for each in self._publishers.values()), MAX_LOST)
-        return TopicFigures(self.received, lost, self.late, self.undecodable, self.unkept, self.size_bytes)
+        return TopicStats(self.received, lost, self.late, self.undecodable, self.unkept, self.size_bytes)
 
 
 def changed(counters: Mapping[str, TopicCounter]) -> Iterable[tuple[str, TopicCounter]]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, BinaryIO
 from nep.errors import RecordingError, RecordingTooLargeError
 from nep.i18n import _
 from nep.recordings.formats.channels import ChannelDefinition
-from nep.recordings.formats.compression import decompressed
+from nep.recordings.formats.compression import decompress
 from nep.recordings.formats.limits import RECORD_COST_BYTES, ReadBudget, open_budget
 from nep.recordings.formats.records import (
     HEAD_BYTES,
@@ -39,7 +39,7 @@ from nep.recordings.formats.records import (
     read_message_index,
     read_record,
 )
-from nep.recordings.formats.walk import Place, walk
+from nep.recordings.formats.walk import RecordLocation, walk_records
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Schema
@@ -66,7 +66,7 @@ _READ_BYTES = 1_048_576
 
 
 @dataclass(frozen=True)
-class Damage:
+class CorruptRange:
     """Unreadable piece of a file.
 
     Attributes:
@@ -172,7 +172,7 @@ class FileIndex:
     chunks: list[ChunkInfo] = field(default_factory=list)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
     attachments: list[AttachedFile] = field(default_factory=list)
-    damage: list[Damage] = field(default_factory=list)
+    corruption: list[CorruptRange] = field(default_factory=list)
     counts: dict[int, int] | None = None
     """Number of messages by channel; None if the file doesn't contain it."""
     is_complete: bool = True
@@ -241,19 +241,19 @@ def _read_header(file: BinaryIO, index: FileIndex) -> None:
             index.profile, index.library = header.profile, header.library
 
 
-def _content(file: BinaryIO, place: Place) -> bytes:
-    if len(place.begin) == place.length:
-        return place.begin
+def _read_content(file: BinaryIO, place: RecordLocation) -> bytes:
+    if len(place.prefix) == place.length:
+        return place.prefix
     file.seek(place.offset + HEAD_BYTES)
     return file.read(place.length)
 
 
-def _read_metadata(file: BinaryIO, place: Place, index: FileIndex) -> None:
+def _read_metadata(file: BinaryIO, place: RecordLocation, index: FileIndex) -> None:
     index.metadata_bytes += place.length
     if not 0 < place.length <= MAX_RECORD_BYTES or index.metadata_bytes > _MAX_METADATA_BYTES:
         return
     with suppress(ValueError):
-        record = read_record("Metadata", _content(file, place))
+        record = read_record("Metadata", _read_content(file, place))
         index.metadata.append((record.name, record.metadata))
 
 
@@ -276,17 +276,17 @@ class _Summary:
         # None if the summary is missing, damaged or incomplete.
         start = int.from_bytes(footer[9:17], "little")
         end = self._size - _FOOTER_BYTES
-        if not len(MAGIC) <= start < end or not self._is_crc_right(start, end, footer):
+        if not len(MAGIC) <= start < end or not self._is_crc_valid(start, end, footer):
             return None
         try:
-            for place in walk(self._file, end, self._budget, start):
+            for place in walk_records(self._file, end, self._budget, start):
                 self._add(place)
         except ValueError:
             return None
         index = self._index
         return index if index.chunks and self._is_plausible(start) else None
 
-    def _is_crc_right(self, start: int, end: int, footer: bytes) -> bool:
+    def _is_crc_valid(self, start: int, end: int, footer: bytes) -> bool:
         wanted = int.from_bytes(footer[25:29], "little")
         if not wanted:
             return True
@@ -297,31 +297,33 @@ class _Summary:
             crc, left = zlib.crc32(block, crc), left - len(block)
         return zlib.crc32(footer[:25], crc) == wanted
 
-    def _add(self, place: Place) -> None:
+    def _add(self, place: RecordLocation) -> None:
         # Raises `ValueError` for invalid entries.
         index, opcode = self._index, place.opcode
         self._others.add(opcode)
         self._opcodes.add(opcode)
         if opcode == Opcode.CHUNK_INDEX:
-            self._add_chunk(read_chunk_info(_content(self._file, place)))
+            self._add_chunk(read_chunk_info(_read_content(self._file, place)))
         elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
             if place.length <= _MAX_SCHEMA_BYTES:
-                index.definitions.add(opcode, _content(self._file, place))
+                index.definitions.add(opcode, _read_content(self._file, place))
         elif opcode == Opcode.STATISTICS and place.length <= _MAX_METADATA_BYTES:
-            statistics = read_record("Statistics", _content(self._file, place))
+            statistics = read_record("Statistics", _read_content(self._file, place))
             index.counts, self._message_count = statistics.channel_message_counts, statistics.message_count
             self._has_unlisted = {
                 Opcode.METADATA_INDEX: bool(statistics.metadata_count),
                 Opcode.ATTACHMENT_INDEX: bool(statistics.attachment_count),
             }
         elif opcode == Opcode.METADATA_INDEX and place.length <= _MAX_HEADER_BYTES:
-            at = read_record("MetadataIndex", _content(self._file, place))
+            at = read_record("MetadataIndex", _read_content(self._file, place))
             if at.offset + at.length <= index.end and self._is_new(at.offset):
                 _read_metadata(
-                    self._file, Place(at.offset, Opcode.METADATA, max(0, at.length - HEAD_BYTES)), index
+                    self._file,
+                    RecordLocation(at.offset, Opcode.METADATA, max(0, at.length - HEAD_BYTES)),
+                    index,
                 )
         elif opcode == Opcode.ATTACHMENT_INDEX and place.length <= _MAX_HEADER_BYTES:
-            record = read_record("AttachmentIndex", _content(self._file, place))
+            record = read_record("AttachmentIndex", _read_content(self._file, place))
             if self._is_new(record.offset) and len(index.attachments) < _MAX_ATTACHMENTS:
                 index.attachments.append(AttachedFile(record.name, record.media_type, record.data_size))
 
@@ -339,8 +341,8 @@ class _Summary:
         if not self._is_new(info.offset):
             raise ValueError("two entries for one chunk")
         if not info.packed_offsets:
-            damage = _index_by_reading(self._file, info, self._index.definitions, self._budget)
-            self._index.damage.extend(damage)
+            damage = _index_from_records(self._file, info, self._index.definitions, self._budget)
+            self._index.corruption.extend(damage)
         if info.packed_offsets:
             self._index.chunks.append(info)
 
@@ -389,7 +391,7 @@ class _Scan:
         # Raises `RecordingTooLargeError`, `OSError`, and what `progress` raises.
         index, reported = self._index, 0
         is_closed = self._data_end < self._size
-        for place in walk(self._file, self._data_end, self._budget):
+        for place in walk_records(self._file, self._data_end, self._budget):
             self._add(place)
             index.end = place.end
             if self._progress is not None and index.end - reported >= _READ_BYTES:
@@ -401,15 +403,15 @@ class _Scan:
         self._end_chunk()
         self._end_run()
         if is_closed and index.end < self._data_end:  # the file is not truncated, so the rest is damaged
-            index.damage.append(Damage(index.end, self._data_end - index.end))
+            index.corruption.append(CorruptRange(index.end, self._data_end - index.end))
         for chunk in index.chunks:  # other programs write a schema into any chunk before its channel
             if index.definitions.lacks_schemas and not chunk.is_run:
-                _index_by_reading(self._file, chunk, index.definitions, self._budget)
+                _index_from_records(self._file, chunk, index.definitions, self._budget)
         if is_closed and index.end == self._data_end:
             index.end = self._size
         return index
 
-    def _add(self, place: Place) -> None:
+    def _add(self, place: RecordLocation) -> None:
         opcode = place.opcode
         if opcode == Opcode.MESSAGE:
             self._end_chunk()
@@ -417,7 +419,7 @@ class _Scan:
             return
         if opcode == Opcode.MESSAGE_INDEX:
             if self._chunk is not None and place.length >= 2:
-                self._offsets[int.from_bytes(place.begin[:2], "little")] = place.offset
+                self._offsets[int.from_bytes(place.prefix[:2], "little")] = place.offset
                 self._chunk.index_bytes += HEAD_BYTES + place.length
             return
         self._end_chunk()
@@ -425,10 +427,10 @@ class _Scan:
         if opcode == Opcode.CHUNK or place.length > _MAX_INSIDE_BYTES:
             self._end_run()
         if opcode == Opcode.CHUNK:
-            self._begin_chunk(place)
+            self._start_chunk(place)
         elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
             if place.length <= _MAX_SCHEMA_BYTES:
-                self._index.definitions.add(opcode, _content(self._file, place))
+                self._index.definitions.add(opcode, _read_content(self._file, place))
         elif opcode == Opcode.METADATA:
             _read_metadata(self._file, place, self._index)
         elif opcode == Opcode.ATTACHMENT:
@@ -436,10 +438,10 @@ class _Scan:
 
     # -- messages outside of chunks
 
-    def _add_message(self, place: Place) -> None:
+    def _add_message(self, place: RecordLocation) -> None:
         if place.length < MESSAGE_REST_BYTES:
             return
-        channel, _sequence, log_ns = MESSAGE_START.unpack_from(place.begin)
+        channel, _sequence, log_ns = MESSAGE_START.unpack_from(place.prefix)
         run = self._run
         if run is None or place.end - run.offset > _RUN_BYTES:
             self._end_run()
@@ -463,12 +465,12 @@ class _Scan:
 
     # -- chunks
 
-    def _begin_chunk(self, place: Place) -> None:
-        head = chunk_head(RECORD_HEAD.pack(place.opcode, place.length) + place.begin, place.length)
+    def _start_chunk(self, place: RecordLocation) -> None:
+        head = chunk_head(RECORD_HEAD.pack(place.opcode, place.length) + place.prefix, place.length)
         if head is None:
-            self._index.damage.append(Damage(place.offset, HEAD_BYTES + place.length))
+            self._index.corruption.append(CorruptRange(place.offset, HEAD_BYTES + place.length))
         else:
-            self._chunk = _info(place, head)
+            self._chunk = _chunk_info(place, head)
 
     def _end_chunk(self) -> None:
         # Called after the message indexes of the chunk.
@@ -478,12 +480,12 @@ class _Scan:
         chunk.packed_offsets, self._offsets = pack_offsets(self._offsets), {}
         known = self._index.definitions.channels
         if not chunk.packed_offsets or not all(each in known for each in chunk.channels):
-            damage = _index_by_reading(self._file, chunk, self._index.definitions, self._budget)
-            self._index.damage.extend(damage)
+            damage = _index_from_records(self._file, chunk, self._index.definitions, self._budget)
+            self._index.corruption.extend(damage)
         if chunk.packed_offsets:
             self._index.chunks.append(chunk)
 
-    def _add_attachment(self, place: Place) -> None:
+    def _add_attachment(self, place: RecordLocation) -> None:
         if len(self._index.attachments) >= _MAX_ATTACHMENTS:
             return
         self._file.seek(place.offset + HEAD_BYTES + 16)  # after its two times
@@ -499,7 +501,7 @@ class _Scan:
         self._index.attachments.append(AttachedFile(words[0], words[1], min(size, place.length)))
 
 
-def _info(place: Place, head: ChunkHead) -> ChunkInfo:
+def _chunk_info(place: RecordLocation, head: ChunkHead) -> ChunkInfo:
     return ChunkInfo(
         head.start_ns,
         head.end_ns,
@@ -513,15 +515,19 @@ def _info(place: Place, head: ChunkHead) -> ChunkInfo:
     )
 
 
-def _index_by_reading(
+def _index_from_records(
     file: BinaryIO, info: ChunkInfo, definitions: Definitions, budget: ReadBudget
-) -> list[Damage]:
+) -> list[CorruptRange]:
     # For files without message indexes; an offset of 0 means no index.
     budget.spend(info.length)
     try:
         chunk = read_chunk(file, info)
     except ValueError:
-        return [] if info.packed_offsets else [Damage(info.offset, info.length, info.start_ns, info.end_ns)]
+        return (
+            []
+            if info.packed_offsets
+            else [CorruptRange(info.offset, info.length, info.start_ns, info.end_ns)]
+        )
     budget.spend(len(chunk))
     channels, counts = info.index_offsets, dict[int, int]()
     for number, record in enumerate(messages_in(chunk), 1):
@@ -555,7 +561,7 @@ def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
     head = chunk_head(record, info.length - HEAD_BYTES)
     if head is None:
         raise ValueError("head")
-    return decompressed(record[head.data_at :], head)
+    return decompress(record[head.data_offset :], head)
 
 
 def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tuple[int, int]] | None:

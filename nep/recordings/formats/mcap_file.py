@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
 from nep.recordings.formats.channels import ChannelDefinition
-from nep.recordings.formats.compression import check_packages, compressed
+from nep.recordings.formats.compression import check_packages, compress
 from nep.recordings.formats.records import (
     MAGIC,
     ChunkInfo,
@@ -28,7 +28,7 @@ from nep.recordings.formats.records import (
     pack_chunk_info,
     pack_message_index,
     pack_offsets,
-    packed,
+    pack_record,
 )
 from nep.system.lazy_import import lazy_module
 from nep.version import __version__
@@ -69,7 +69,7 @@ class ChannelTable:
             self._add(known, definition)
         return known
 
-    def put(self, number: int, definition: ChannelDefinition) -> None:
+    def add_numbered(self, number: int, definition: ChannelDefinition) -> None:
         """Add a channel with a given number, for copied chunks."""
         if number not in self.definitions:
             self._add(number, definition)
@@ -175,7 +175,9 @@ class FileWriter:
         self._written_schemas: set[int] = set()
         self._metadata: list[mcap_records.MetadataIndex] = []
         try:
-            self._write(MAGIC + packed(mcap_records.Header(profile=profile, library=f"nep {__version__}")))
+            self._write(
+                MAGIC + pack_record(mcap_records.Header(profile=profile, library=f"nep {__version__}"))
+            )
         except OSError:
             self._file.close()
             with suppress(OSError):  # the file is empty
@@ -242,7 +244,7 @@ class FileWriter:
             return 0
         data = b"".join(chunk.parts)
         crc, size = zlib.crc32(data), len(data)
-        payload, compression = compressed(data, self._compression), self._compression
+        payload, compression = compress(data, self._compression), self._compression
         if len(payload) >= size:
             payload, compression = data, ""
         head = pack_chunk(payload, compression, size, crc, (chunk.start_ns, chunk.end_ns))
@@ -312,8 +314,8 @@ class FileWriter:
             schema, channel = self.table.records(number)
             if schema is not None and schema.id not in self._written_schemas and schema.id not in schemas:
                 schemas.add(schema.id)
-                parts.append(packed(schema))
-            parts.append(packed(channel))
+                parts.append(pack_record(schema))
+            parts.append(pack_record(channel))
         self._write(b"".join(parts))
         self._written_channels.update(new)
         self._written_schemas |= schemas
@@ -321,7 +323,7 @@ class FileWriter:
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Write the current chunk, followed by a metadata record."""
         self.flush()
-        record = packed(mcap_records.Metadata(name=name, metadata=dict(values)))
+        record = pack_record(mcap_records.Metadata(name=name, metadata=dict(values)))
         index = mcap_records.MetadataIndex(offset=self._at, length=len(record), name=name)
         self._write(record)
         self._metadata.append(index)
@@ -365,13 +367,13 @@ class FileWriter:
         self._file.close()
 
     def _summary(self) -> bytes:
-        data_end = packed(mcap_records.DataEnd(data_section_crc=0))
+        data_end = pack_record(mcap_records.DataEnd(data_section_crc=0))
         start = self._at + len(data_end)
         groups = self._groups()
         summary, offsets = b"", b""
         for opcode, group in groups:
             if group:
-                offsets += packed(
+                offsets += pack_record(
                     mcap_records.SummaryOffset(
                         group_opcode=opcode, group_start=start + len(summary), group_length=len(group)
                     )
@@ -380,7 +382,7 @@ class FileWriter:
         footer = mcap_records.Footer(
             summary_start=start, summary_offset_start=start + len(summary), summary_crc=0
         )
-        head = packed(footer)[:-4]
+        head = pack_record(footer)[:-4]
         crc = zlib.crc32(summary + offsets + head)
         return data_end + summary + offsets + head + crc.to_bytes(4, "little") + MAGIC
 
@@ -393,9 +395,9 @@ class FileWriter:
         channels = []
         for number in sorted(self._written_channels, key=self._summary_order):
             schema, channel = self.table.records(number)
-            channels.append(packed(channel))
+            channels.append(pack_record(channel))
             if schema is not None:
-                schemas.setdefault(schema.id, packed(schema))
+                schemas.setdefault(schema.id, pack_record(schema))
         statistics = mcap_records.Statistics(
             attachment_count=0,
             channel_count=len(channels),
@@ -410,7 +412,7 @@ class FileWriter:
         return [
             (Opcode.SCHEMA, b"".join(schemas.values())),
             (Opcode.CHANNEL, b"".join(channels)),
-            (Opcode.STATISTICS, packed(statistics)),
+            (Opcode.STATISTICS, pack_record(statistics)),
             (Opcode.CHUNK_INDEX, bytes(self._packed_chunks)),
-            (Opcode.METADATA_INDEX, b"".join(map(packed, self._metadata))),
+            (Opcode.METADATA_INDEX, b"".join(map(pack_record, self._metadata))),
         ]

@@ -19,11 +19,11 @@ import struct
 from collections.abc import Iterator, Mapping
 from functools import cache
 
-EXTRA = 1000
+EXTRA_FIELD = 1000
 """Number of the field with properties of nep."""
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
-_NS = 1_000_000_000
+_NS_PER_S = 1_000_000_000
 
 
 def _varint(number: int) -> bytes:
@@ -40,7 +40,7 @@ def bytes_field(number: int, size_bytes: int) -> bytes:
     return _varint(number << 3 | _BYTES) + _varint(size_bytes)
 
 
-def _whole(number: int, data: bytes) -> bytes:
+def _complete_field(number: int, data: bytes) -> bytes:
     return bytes_field(number, len(data)) + data
 
 
@@ -51,8 +51,8 @@ def fixed_field(number: int, value: int) -> bytes:
 
 def timestamp_field(number: int, stamp_ns: int) -> bytes:
     """Encode a field of type `google.protobuf.Timestamp`."""
-    seconds, rest = divmod(stamp_ns, _NS)
-    return _whole(number, b"\x08" + _varint(seconds) + b"\x10" + _varint(rest))
+    seconds, rest = divmod(stamp_ns, _NS_PER_S)
+    return _complete_field(number, b"\x08" + _varint(seconds) + b"\x10" + _varint(rest))
 
 
 def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
@@ -126,21 +126,21 @@ SCHEMAS: Mapping[str, _Fields] = {
 
 
 def _message_type(name: str, fields_of_it: _Fields) -> bytes:
-    encoded = _whole(1, name.encode())
+    encoded = _complete_field(1, name.encode())
     for field_name, (number, kind) in fields_of_it.items():
-        one = _whole(1, field_name.encode())
+        one = _complete_field(1, field_name.encode())
         one += b"\x18" + _varint(number) + b"\x20\x01\x28" + _varint(kind)  # number, optional, type
         if kind == _MESSAGE:
-            one += _whole(6, f".{_STAMP}".encode())
-        encoded += _whole(2, one)
+            one += _complete_field(6, f".{_STAMP}".encode())
+        encoded += _complete_field(2, one)
     return encoded
 
 
 def _file(name: str, package: str, depends_on: str, message: bytes) -> bytes:
-    encoded = _whole(1, name.encode()) + _whole(2, package.encode())
+    encoded = _complete_field(1, name.encode()) + _complete_field(2, package.encode())
     if depends_on:
-        encoded += _whole(3, depends_on.encode())
-    return encoded + _whole(4, message) + _whole(12, b"proto3")
+        encoded += _complete_field(3, depends_on.encode())
+    return encoded + _complete_field(4, message) + _complete_field(12, b"proto3")
 
 
 @cache
@@ -152,5 +152,5 @@ def descriptor_set(schema: str) -> bytes:
     encoded = b""
     if needs:
         stamp = _message_type("Timestamp", {"seconds": (1, _INT64), "nanos": (2, _INT32)})
-        encoded += _whole(1, _file(needs, "google.protobuf", "", stamp))
-    return encoded + _whole(1, _file(f"{package}/{name}.proto", package, needs, message))
+        encoded += _complete_field(1, _file(needs, "google.protobuf", "", stamp))
+    return encoded + _complete_field(1, _file(f"{package}/{name}.proto", package, needs, message))

@@ -32,7 +32,7 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of the content
 HEAD_BYTES = RECORD_HEAD.size
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
-_MAX_OTHERS = 200_000
+_MAX_OTHER_RECORDS = 200_000
 """Maximum number of schemas and channels in a chunk."""
 MESSAGE_REST_BYTES = MESSAGE_HEAD.size - HEAD_BYTES
 MESSAGE_START = struct.Struct("<HIQ")  # channel, sequence, log time
@@ -89,7 +89,7 @@ def _builder_class() -> Any:  # noqa: ANN401 - of mcap
     return mcap_stream.RecordBuilder
 
 
-def packed(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
+def pack_record(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
     """Encode a record of `mcap`."""
     builder = _builder_class()()
     record.write(builder)
@@ -139,7 +139,7 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
             )
         else:
             other_count += 1
-            if not opcode or other_count > _MAX_OTHERS:
+            if not opcode or other_count > _MAX_OTHER_RECORDS:
                 return
             yield opcode, whole[offset + HEAD_BYTES : end]
         offset = end
@@ -156,7 +156,7 @@ class ChunkHead(NamedTuple):
     uncompressed_bytes: int
     crc: int
     compression: str
-    data_at: int
+    data_offset: int
     data_bytes: int
 
 

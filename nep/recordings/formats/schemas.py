@@ -24,40 +24,40 @@ _MAX_DEPTH = 10
 
 
 @cache
-def _known() -> Mapping[str, type]:
+def _known_types() -> Mapping[str, type]:
     kinds = [vars(module)[name] for module in (geometry, sensor) for name in module.__all__]
     return {str(kind.MSG_TYPE): kind for kind in kinds if hasattr(kind, "MSG_TYPE")}
 
 
 def schema_of(msg_type: str) -> bytes:
     """Return the JSON Schema of a message type, given its name."""
-    declared = _known().get(msg_type)
+    declared = _known_types().get(msg_type)
     return ANY_OBJECT if declared is None else json_schema(declared)
 
 
 @cache
 def json_schema(declared: type) -> bytes:
     """Return the JSON Schema of a dataclass or TypedDict."""
-    schema = _of(declared, 0) or {"type": "object"}
+    schema = _schema_for(declared, 0) or {"type": "object"}
     return orjson.dumps({"title": getattr(declared, "MSG_TYPE", declared.__name__), **schema})
 
 
-def _of(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN401 - any annotation
+def _schema_for(hint: Any, depth: int) -> dict[str, object] | None:  # noqa: ANN401 - any annotation
     # None if viewers don't support it.
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint in _SCALARS:
         return {"type": _SCALARS[hint]}
     if origin in {typing.Union, types.UnionType}:
         known = [each for each in arguments if each is not type(None)]
-        return _of(known[0], depth) if len(known) == 1 else None
+        return _schema_for(known[0], depth) if len(known) == 1 else None
     if origin in {list, Sequence} or (origin is tuple and arguments[1:] == (...,)):
-        items = _of(arguments[0], depth)
+        items = _schema_for(arguments[0], depth)
         return None if items is None or items["type"] == "array" else {"type": "array", "items": items}
     if not (dataclasses.is_dataclass(hint) or hasattr(hint, "__required_keys__")) or depth >= _MAX_DEPTH:
         return None
     properties = {
         name: field_schema
         for name, each in typing.get_type_hints(hint).items()
-        if not name.startswith("_") and (field_schema := _of(each, depth + 1)) is not None
+        if not name.startswith("_") and (field_schema := _schema_for(each, depth + 1)) is not None
     }
     return {"type": "object", "properties": properties}

@@ -9,16 +9,16 @@ from nep.recordings.formats.limits import RECORD_COST_BYTES, ReadBudget
 from nep.recordings.formats.records import HEAD_BYTES, MAGIC, RECORD_HEAD, Opcode
 
 _SMALL_WINDOW, _LARGE_WINDOW = 4_096, 1_048_576
-_SPEND_EVERY = 1_000
+_BUDGET_INTERVAL = 1_000
 
 
-class Place(NamedTuple):
+class RecordLocation(NamedTuple):
     """Place of a record in a file; `begin` has the first bytes of the content, read with the header."""
 
     offset: int
     opcode: int
     length: int
-    begin: bytes = b""
+    prefix: bytes = b""
 
     @property
     def end(self) -> int:
@@ -26,13 +26,13 @@ class Place(NamedTuple):
         return self.offset + HEAD_BYTES + self.length
 
 
-def walk(
+def walk_records(
     file: BinaryIO,
     size: int,
     budget: ReadBudget,
     offset: int = len(MAGIC),
     begin_bytes: int = 64,
-) -> Iterator[Place]:
+) -> Iterator[RecordLocation]:
     """Iterate over the records from an offset, up to ``size`` or to invalid bytes.
 
     The file is read in windows that grow while records are short, so that millions of empty records take a
@@ -52,7 +52,7 @@ def walk(
             return
         at += HEAD_BYTES
         count += 1
-        if count % _SPEND_EVERY == 0:
-            budget.spend(_SPEND_EVERY * RECORD_COST_BYTES)
-        yield Place(offset, opcode, length, window[at : at + min(length, begin_bytes)])
+        if count % _BUDGET_INTERVAL == 0:
+            budget.spend(_BUDGET_INTERVAL * RECORD_COST_BYTES)
+        yield RecordLocation(offset, opcode, length, window[at : at + min(length, begin_bytes)])
         offset += HEAD_BYTES + length

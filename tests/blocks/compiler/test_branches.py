@@ -71,6 +71,6 @@ def test_old_or_invalid_branch_state_falls_back_to_block_kind(
 
 
 def test_number_of_else_if_branches_is_limited() -> None:
-    assert Branches.of({"elseIfs": 10**6}, has_else=False) == Branches(20)
+    assert Branches.from_extra_state({"elseIfs": 10**6}, has_else=False) == Branches(20)
     empty = compile_behaviour(workspace(started(chosen({"elseIfs": 1}))), [])
-    assert [each.sentence for each in empty.problems] == ["if needs a condition. Drag one into its slot."]
+    assert [each.message for each in empty.problems] == ["if needs a condition. Drag one into its slot."]

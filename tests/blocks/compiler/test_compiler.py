@@ -114,17 +114,17 @@ def test_absent_robot_and_missing_time_limit_are_reported_as_problems():
     program = compile_behaviour(picture(), [robot()], absent=[nao()])
     first, second = program.problems
     assert (first.severity, first.block_id, first.category, first.icon) == ("warning", "n", "robot", "hand")
-    assert (first.subject, first.sentence) == ("wave", "NAO is not connected, so wave will be skipped.")
+    assert (first.subject, first.message) == ("wave", "NAO is not connected, so wave will be skipped.")
     assert (first.fix, first.fix_action) == ("Show the robots", "connect:NAO")
     assert (second.severity, second.block_id, second.category) == ("info", "w", "control")
-    assert second.sentence == "wait until waits forever if no one appears."
+    assert second.message == "wait until waits forever if no one appears."
     assert (second.subject, second.fix, second.fix_action) == ("wait until", "Add a time limit", "limit:w")
 
 
 def sentences(saved, robots=None) -> list[tuple[str, str]]:
     program = compile_behaviour(saved, [robot()] if robots is None else robots)
     ast.parse(program.source)
-    return [(problem.severity, problem.sentence) for problem in program.problems]
+    return [(problem.severity, problem.message) for problem in program.problems]
 
 
 def test_robot_never_seen_before_is_named_in_problem():
@@ -225,7 +225,7 @@ def test_input_outside_action_schema_is_an_error_before_run():
 def test_block_with_invalid_field_value_is_skipped(it, end):
     (problem,) = compile_behaviour(workspace(started(it)), [robot()]).problems
     assert problem.severity == "error"
-    assert end in problem.sentence
+    assert end in problem.message
 
 
 def test_blocks_without_event_block_are_reported():
@@ -309,7 +309,7 @@ def test_long_script_and_deep_nesting_compile():
         deep = block("values_not", A=deep)
     (problem,) = compile_behaviour(workspace(started(write(deep))), []).problems
     assert problem.severity == "error"
-    assert "is nested too deeply" in problem.sentence
+    assert "is nested too deeply" in problem.message
 
     allowed: dict[str, object] = number(1)
     for _ in range(35):

@@ -35,14 +35,14 @@ def when(*body: Saved) -> Saved:
 def test_two_started_scripts_that_move_the_base_conflict() -> None:
     (problem,) = conflicts(started(turn("t")), started(home("h")))
     assert (problem.block_id, problem.subject, problem.fix) == ("h", "go home", "Run one after the other")
-    assert problem.sentence == (
+    assert problem.message == (
         "“turn” and “go home” both move Pepper at the same time: one replaces the other."
     )
 
 
 def test_conflict_names_another_part() -> None:
     (problem,) = conflicts(started(look("a")), started(look("b")))
-    assert "“look” both use the face of Pepper" in problem.sentence
+    assert "“look” both use the face of Pepper" in problem.message
 
 
 def set_variable() -> Saved:
@@ -90,14 +90,14 @@ def test_simultaneous_commands_are_a_conflict(scripts) -> None:
 )  # fmt: skip
 def test_scripts_without_overlap_do_not_conflict(scripts) -> None:
     found = conflicts(*(make() for make in scripts), robots=("Pepper", "Other"))
-    assert [each for each in found if "same time" in each.sentence] == []
+    assert [each for each in found if "same time" in each.message] == []
 
 
 def test_conflict_inside_called_function_is_found() -> None:
     moves = define("f", "dance", (), turn("in f"))
     (problem,) = conflicts(moves, started(call("f")), started(home("h")))
     assert problem.block_id == "h"
-    assert "“turn” and “go home”" in problem.sentence
+    assert "“turn” and “go home”" in problem.message
 
 
 def test_recursive_function_is_visited_once() -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.runtime import Runtime
-from app.blocks.runtime.values import letters
+from app.blocks.runtime.values import grapheme_clusters
 from app.blocks.runtime.values import text as as_text
 from tests.blocks.samples import block, boolean, list_of, number, started, text, workspace, write
 
@@ -81,7 +81,7 @@ def reference(tree):
         return as_text(reference(first)) + as_text(reference(second))
     if kind == "length":
         told = reference(first)
-        return len(letters(told) if isinstance(told, str) else told)
+        return len(grapheme_clusters(told) if isinstance(told, str) else told)
     if kind in ("list", "item", "contains"):
         return of_list(kind, how, first, second)
     left = reference(first)

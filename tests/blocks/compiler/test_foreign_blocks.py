@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from app.blocks import Program, compile_behaviour
-from app.blocks.compiler.foreign import OURS
+from app.blocks.compiler.foreign import EQUIVALENT_BLOCKS
 from app.blocks.model.workspace import parse_workspace
 from app.blocks.toolbox.catalogue import categories
 from tests.blocks.samples import block, robot, started, workspace
@@ -32,10 +32,10 @@ def test_unknown_blocks_including_nested_ones_are_named_as_on_the_canvas() -> No
         "r": "wave",
         "n": "control levitate",
     }
-    assert all(problem.subject in problem.sentence for problem in told.values())
-    assert "no connected robot" in told["r"].sentence
-    assert not any("robot" in told[id].sentence for id in "qzpv")
-    assert "version" in told["n"].sentence
+    assert all(problem.subject in problem.message for problem in told.values())
+    assert "no connected robot" in told["r"].message
+    assert not any("robot" in told[id].message for id in "qzpv")
+    assert "version" in told["n"].message
     assert (told["q"].fix_action, told["p"].fix_action) == ("point.block:control_if", None)
 
 
@@ -46,8 +46,8 @@ def test_disabled_unknown_blocks_are_not_reported() -> None:
 
 def test_suggested_replacements_exist_and_replace_only_unknown_blocks() -> None:
     ours = {each.type for category in categories() for each in category.blocks}
-    assert set(OURS.values()) <= ours
-    assert not ours & OURS.keys()
+    assert set(EQUIVALENT_BLOCKS.values()) <= ours
+    assert not ours & EQUIVALENT_BLOCKS.keys()
 
 
 def test_variable_without_name_is_reported_with_rename_fix() -> None:
@@ -68,5 +68,5 @@ def test_variable_without_name_is_reported_with_rename_fix() -> None:
 def test_rename_fix_finds_the_variable() -> None:
     saved = workspace(started(block("variables_set", "s") | {"fields": {"VAR": {"id": "gone"}}}))
     parsed = parse_workspace(saved)
-    assert parsed.nameless == {"gone"}
+    assert parsed.nameless_variables == {"gone"}
     assert parsed.variables["gone"]

@@ -13,7 +13,7 @@ from app.blocks.compiler.compiler import COMMANDS, compile_behaviour
 from app.blocks.model.fields import StatementInput, ValueInput, VariableField
 from app.blocks.toolbox.catalogue import Catalogue
 from app.errors import DescriptionError
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from tests.blocks.samples import MODEL, block, robot, stack, started, workspace
 
 CATALOGUE = Catalogue([robot()])
@@ -139,7 +139,7 @@ def test_hostile_robot_description_is_never_executed(action, parameter, words, r
     }
     model = MODEL | {"actions": {action: wave, "stop": MODEL["actions"]["stop"]}}  # type: ignore[index]
     try:
-        hostile_robot = parse(td_for(model, robot_name))
+        hostile_robot = parse(thing_description(model, robot_name))
     except DescriptionError:
         return
     editor_definitions([hostile_robot])

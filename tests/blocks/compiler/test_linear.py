@@ -11,9 +11,9 @@ from types import FrameType
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.model.names import Names
+from app.blocks.model.names import PythonNames
 from app.blocks.model.workspace import parse_workspace
-from app.core.documents.problems import listed
+from app.core.documents.problems import problem_lines
 from tests.blocks.samples import block, call, define, number, robot, say, started, workspace
 
 Saved = dict[str, object]
@@ -72,7 +72,7 @@ def test_compile_time_is_linear_in_number_of_blocks(make: Callable[[int], Saved]
 
 def test_duplicate_names_and_ids_keep_compile_time_linear() -> None:
     def name(count: int) -> None:
-        names = Names(frozenset())
+        names = PythonNames(frozenset())
         assert len({names.new("when started", "script") for _ in range(count)}) == count
 
     def parse(count: int) -> None:
@@ -92,7 +92,7 @@ def test_problems_of_many_missing_robots_keep_compile_time_linear() -> None:
         saved = strangers(count)
         missing = [robot(f"R{n}") for n in range(count)]
         problems = compile_behaviour(saved, (here,), absent=missing).problems
-        return steps(lambda: listed(problems, saved, missing, (here,), ()))
+        return steps(lambda: problem_lines(problems, saved, missing, (here,), ()))
 
     work(2)
     assert work(4 * 20) < 5 * work(20)

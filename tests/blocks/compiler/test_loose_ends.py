@@ -12,7 +12,7 @@ from tests.blocks.samples import block, get, list_of, number, stack, started, te
 
 def told(*scripts: dict[str, object], variables: tuple[str, ...] = ("scores", "n")) -> list[str]:
     return [
-        problem.sentence
+        problem.message
         for problem in compile_behaviour(workspace(*scripts, variables=variables), []).problems
     ]
 
@@ -38,8 +38,8 @@ def test_list_never_set_is_reported_and_fix_sets_it_at_program_start():
         variables=("scores",),
     )
     (problem,) = compile_behaviour(saved, []).problems
-    assert (problem.severity, problem.sentence) == ("warning", NEVER)
-    assert problem.subject in problem.sentence
+    assert (problem.severity, problem.message) == ("warning", NEVER)
+    assert problem.subject in problem.message
     assert problem.fix == "Set it to an empty list at the start"
     fixed = fix(saved, problem.fix_action or "")
     assert fixed is not None
@@ -60,7 +60,7 @@ def test_fixed_program_runs():
 def test_number_never_set_is_reported():
     saved = workspace(stack(block("events_message", TOPIC="/x"), write(get("n"))), variables=("n",))
     (problem,) = compile_behaviour(saved, []).problems
-    assert (problem.sentence, problem.fix) == ("“n” is used but never set.", "Set it to 0 at the start")
+    assert (problem.message, problem.fix) == ("“n” is used but never set.", "Set it to 0 at the start")
     fixed = fix(saved, problem.fix_action or "")  # nothing is started yet: it gets a script of its own
     assert fixed is not None
     assert compile_behaviour(fixed, []).problems == ()
@@ -98,7 +98,7 @@ def test_unset_variable_with_any_name_is_reported(name):
     saved = workspace(started(write(get("v"))))
     saved["variables"] = [{"name": name, "id": "v"}]
     (problem,) = compile_behaviour(saved, []).problems
-    assert problem.sentence == f"“{name or 'v'}” is used but never set."
+    assert problem.message == f"“{name or 'v'}” is used but never set."
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program
 from app.blocks.runtime.errors import BehaviourError
 from app.blocks.runtime.network import Network
-from app.blocks.runtime.publishing import PublishGuard, guarded, moved_by
+from app.blocks.runtime.publishing import PublishGuard, guarded_topics, robots_moved_by
 from app.robots import rize
 from nep.masters.master import Master
 from tests.blocks.samples import block, robot, started, text, workspace
@@ -32,7 +32,7 @@ def test_program_that_publishes_on_robot_topic_uses_and_moves_that_robot(topic: 
     assert (program.robots, program.moves) == (("Rover",), ("Rover",))
     (problem,) = program.problems
     assert (problem.severity, problem.block_id) == ("info", "p")
-    assert f"on {topic} moves Rover" in problem.sentence
+    assert f"on {topic} moves Rover" in problem.message
     assert Program.from_json(program.to_json()).moves == ("Rover",)
 
 
@@ -49,11 +49,11 @@ def test_publishing_on_topic_of_virtual_robot_is_not_a_problem() -> None:
 
 def test_topics_map_to_the_robots_they_move() -> None:
     far = replace(ROVER, topics=replace(ROVER.topics, command="/far", world="/far/world"))
-    assert moved_by("/far", [PEPPER, far]) == ("Rover",)
-    assert moved_by("/far/world", [PEPPER, far]) == ("Rover",)
-    assert moved_by(rize.COMMANDS, [PEPPER, far]) == ("Pepper", "Rover")
-    assert moved_by("/Rover/answer", [PEPPER, far]) == ()
-    topics = guarded([PEPPER, far])
+    assert robots_moved_by("/far", [PEPPER, far]) == ("Rover",)
+    assert robots_moved_by("/far/world", [PEPPER, far]) == ("Rover",)
+    assert robots_moved_by(rize.COMMANDS, [PEPPER, far]) == ("Pepper", "Rover")
+    assert robots_moved_by("/Rover/answer", [PEPPER, far]) == ()
+    topics = guarded_topics([PEPPER, far])
     assert (topics["/Pepper/command"], topics["/far"]) == (("Pepper",), ("Rover",))
 
 
@@ -63,10 +63,10 @@ def test_publish_on_computed_robot_topic_is_rejected_at_run_time(master: Master)
     try:
         with nep.node("program", master=master.address) as node:
             network = Network(node, "program-1", [PEPPER])
-            network.guard = PublishGuard(guarded([PEPPER]), ["Pepper"])
+            network.guard = PublishGuard(guarded_topics([PEPPER]), ["Pepper"])
             network.publish("/Pepper/command", {})  # a person was asked
             network.publish("/Rover/command", {"op": "alive"})  # it was not there yet
-            network.guard.know(guarded([PEPPER, rover.described]))
+            network.guard.set_topics(guarded_topics([PEPPER, rover.described]))
             with pytest.raises(BehaviourError, match="publish on /Rover/command: this would move Rover"):
                 network.publish("/Rover/command", {"id": "1", "op": "invoke", "action": "turn", "input": {}})
             with pytest.raises(BehaviourError, match="would move Rover, which has not been allowed"):

@@ -7,7 +7,7 @@ import copy
 import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
-from app.blocks.compiler.stack import SHOW, Stack
+from app.blocks.compiler.stack import SHOW_BLOCK_ID, Stack
 from app.blocks.model.program import Program
 from tests.blocks.fakes import play
 from tests.blocks.samples import block, call, define, get, number, robot, say, stack, started, text, workspace
@@ -66,7 +66,7 @@ def test_tried_blocks_keep_their_ids_for_highlight_and_errors() -> None:
 def test_tried_value_block_is_printed() -> None:
     made = Stack("bat", "value", BATTERY).workspace(behaviour())
     assert made is not None
-    assert SHOW in compile_behaviour(made, [robot()]).runnable
+    assert SHOW_BLOCK_ID in compile_behaviour(made, [robot()]).runnable
     sum_ = block("values_arithmetic", "sum", A=number(2), SIGN="+", B=get("n"))
     made = Stack("sum", "value", sum_).workspace(behaviour())
     assert made is not None

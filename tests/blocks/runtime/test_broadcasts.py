@@ -187,9 +187,9 @@ def test_script_that_waits_for_receivers_can_be_paused():
     )  # fmt: skip
     until(lambda: len(run.runtime.scheduler.snapshot().blocks) == 2)
     run.runtime.scheduler.pause()
-    until(lambda: run.runtime.scheduler.snapshot().paused)
+    until(lambda: run.runtime.scheduler.snapshot().is_paused)
     run.names["ready"] = True
-    run.runtime.scheduler.go_on()
+    run.runtime.scheduler.resume()
     run.end()
     assert run.lines == ["after"]
 
@@ -201,7 +201,7 @@ def test_broadcast_needs_a_name(name):
         for p in compile_behaviour(workspace(started(broadcast(name))), []).problems
         if p.severity == "error"
     ]
-    assert problem.sentence == "broadcast needs the name of a message. It is kept but skipped."
+    assert problem.message == "broadcast needs the name of a message. It is kept but skipped."
 
 
 @pytest.mark.parametrize(
@@ -216,8 +216,8 @@ def test_broadcast_without_receiver_is_reported_with_fix():
     saved = workspace(started(broadcast("start quiz") | {"id": "b"}) | {"x": 10, "y": 30})
     (problem,) = compile_behaviour(saved, []).problems
     assert (problem.severity, problem.block_id) == ("warning", "b")
-    assert problem.sentence == "Nothing receives “start quiz”."
-    assert problem.subject in problem.sentence
+    assert problem.message == "Nothing receives “start quiz”."
+    assert problem.subject in problem.message
     fixed = fix(saved, problem.fix_action or "")
     assert fixed is not None
     assert compile_behaviour(fixed, []).problems == ()
@@ -226,5 +226,5 @@ def test_broadcast_without_receiver_is_reported_with_fix():
 
 def test_receiver_without_broadcast_is_reported():
     (problem,) = compile_behaviour(workspace(started(), received("quiz", write(text("x")))), []).problems
-    assert problem.sentence == "Nothing broadcasts “quiz”, so this script doesn't run."
+    assert problem.message == "Nothing broadcasts “quiz”, so this script doesn't run."
     assert problem.severity == "info"

@@ -115,7 +115,9 @@ def test_pause_and_step_enter_function() -> None:
     scheduler = run.runtime.scheduler
     seen, passed = [], []
     for _ in range(4):
-        until(lambda: scheduler.snapshot().paused and scheduler.snapshot().next_block not in (None, *passed))
+        until(
+            lambda: scheduler.snapshot().is_paused and scheduler.snapshot().next_block not in (None, *passed)
+        )
         passed.append(scheduler.snapshot().next_block)
         seen.append((scheduler.snapshot().next_block == "c", len(run.lines)))
         scheduler.step_once()
@@ -172,7 +174,7 @@ def test_call_of_missing_function_is_an_error_with_fix() -> None:
     run = play(saved)
     (problem,) = run.program.errors
     sentence = "The function “greet” is missing. Define it, or delete this block."
-    assert (problem.sentence, problem.block_id, problem.fix) == (sentence, "c", "Define it")
+    assert (problem.message, problem.block_id, problem.fix) == (sentence, "c", "Define it")
     assert run.runtime.error is not None
     assert (run.runtime.error.sentence, run.runtime.error.block) == (sentence, "c")
     fixed = fix(saved, str(problem.fix_action))
@@ -195,7 +197,7 @@ def test_inputs_and_returns_outside_their_function_are_skipped_and_reported() ->
         ),
         [],
     )
-    sentences = [problem.sentence for problem in program.problems]
+    sentences = [problem.message for problem in program.problems]
     assert "“who” only works inside its own function. It is kept but skipped." in sentences
     assert (
         sum(sentence.endswith("can't be used here. It is kept but skipped.") for sentence in sentences) == 2

@@ -9,11 +9,11 @@ import pytest
 
 from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.motions import Motions
-from app.blocks.runtime.scheduler import Stopped
-from app.robots.description.description import Robot, parse, td_for
+from app.blocks.runtime.scheduler import StopProgram
+from app.robots.description.description import Robot, parse, thing_description
 from app.robots.turtle import ROBOT
 
-TURTLE: Robot = parse(td_for(ROBOT.thing_model, "Turtle"))
+TURTLE: Robot = parse(thing_description(ROBOT.thing_model, "Turtle"))
 
 
 class Bench:
@@ -38,9 +38,9 @@ class Bench:
     def do(self, action: str, state: str = "succeeded", **given: object) -> None:
         self.count += 1
         call = RobotCall(f"c{self.count}", "Turtle", action)
-        self.going.note_command(call, TURTLE, given)
+        self.going.record_command(call, TURTLE, given)
         call.state = state
-        self.going.ended(call)
+        self.going.record_final_reply(call)
 
 
 @pytest.fixture
@@ -53,9 +53,9 @@ def test_pause_stops_continuous_motion_and_resume_restarts_it(bench) -> None:
     bench.do("light")
     assert bench.going.stop_all() == ("Turtle",)
     assert bench.stopped == ["Turtle"]
-    bench.going.go_on()
+    bench.going.resume_all()
     assert bench.invoked == [("Turtle", "drive", {"speed": 0.2, "turn": 0})]
-    bench.going.go_on()
+    bench.going.resume_all()
     assert len(bench.invoked) == 1
 
 
@@ -69,7 +69,7 @@ def test_replaced_motion_is_not_resumed(bench) -> None:
     bench.do("drive", speed=0.2)
     bench.do("move", distance=0.1)
     assert bench.going.stop_all() == ()
-    bench.going.go_on()
+    bench.going.resume_all()
     assert bench.invoked == []
 
 
@@ -77,16 +77,16 @@ def test_motion_started_by_single_step_is_paused_at_once(bench) -> None:
     bench.going.stop_all()
     bench.do("drive", speed=0.2)
     assert bench.stopped == ["Turtle"]
-    bench.going.go_on()
+    bench.going.resume_all()
     assert [action for _, action, _ in bench.invoked] == ["drive"]
 
 
 def test_motion_is_suspended_during_slow_motion_delay_and_then_resumed(bench) -> None:
-    with bench.going.slow():
+    with bench.going.suspend():
         pass
     assert bench.stood == []
     bench.do("drive", speed=0.2)
-    with bench.going.slow():
+    with bench.going.suspend():
         assert bench.stood == ["Turtle"]
         assert bench.invoked == []
     assert bench.invoked == [("Turtle", "drive", {"speed": 0.2})]
@@ -95,7 +95,7 @@ def test_motion_is_suspended_during_slow_motion_delay_and_then_resumed(bench) ->
 
 def test_slow_motion_delay_of_another_script_does_not_suspend_motion(bench) -> None:
     bench.do("drive", speed=0.2)
-    thread = threading.Thread(target=lambda: bench.going.slow().__enter__())
+    thread = threading.Thread(target=lambda: bench.going.suspend().__enter__())
     thread.start()
     thread.join()
     assert bench.stood == []
@@ -104,42 +104,42 @@ def test_slow_motion_delay_of_another_script_does_not_suspend_motion(bench) -> N
 @pytest.mark.parametrize("state", ["succeeded", "canceled"])
 def test_motion_accepted_during_slow_motion_delay_is_suspended_and_resumed(bench, state) -> None:
     call = RobotCall("c", "Turtle", "drive")
-    bench.going.note_command(call, TURTLE, {"speed": 0.2})
-    with bench.going.slow():
+    bench.going.record_command(call, TURTLE, {"speed": 0.2})
+    with bench.going.suspend():
         assert bench.stood == ["Turtle"]
         call.state = state
-        bench.going.ended(call)
+        bench.going.record_final_reply(call)
         assert bench.stood == ["Turtle", "Turtle"]
     assert len(bench.invoked) == 1
 
 
 def test_resume_during_slow_motion_delay_does_not_restart_motion_early(bench) -> None:
     bench.do("drive", speed=0.2)
-    with bench.going.slow():
+    with bench.going.suspend():
         bench.going.stop_all()
-        bench.going.go_on()
+        bench.going.resume_all()
         assert bench.invoked == []
     assert len(bench.invoked) == 1
-    with bench.going.slow():
+    with bench.going.suspend():
         bench.going.stop_all()
     assert len(bench.invoked) == 1, "it is paused"
-    bench.going.go_on()
+    bench.going.resume_all()
     assert len(bench.invoked) == 2
 
 
 def test_resumed_motion_still_belongs_to_its_script(bench) -> None:
     bench.do("drive", speed=0.2)
     bench.going.stop_all()
-    there = threading.Thread(target=bench.going.go_on)
+    there = threading.Thread(target=bench.going.resume_all)
     bench.answers = True
     there.start()
     there.join()
-    with bench.going.slow():
+    with bench.going.suspend():
         assert bench.stood == ["Turtle"]
 
 
 def test_motion_is_not_resumed_after_stop(bench) -> None:
     bench.do("drive", speed=0.2)
-    with pytest.raises(Stopped), bench.going.slow():
-        raise Stopped
+    with pytest.raises(StopProgram), bench.going.suspend():
+        raise StopProgram
     assert bench.invoked == []

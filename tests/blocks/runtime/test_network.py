@@ -41,7 +41,7 @@ def network(node, pepper):
 
 def test_invoke_is_answered(network, pepper):
     pokes: list[int] = []
-    network.listen(lambda: pokes.append(1), lambda _: None)
+    network.set_callbacks(lambda: pokes.append(1), lambda _: None)
     call = network.invoke("Pepper", "say", {"text": "Hi"})
     until(lambda: call.done)
     assert (call.state, call.output, call.error) == ("succeeded", {"word": "yes"}, "")
@@ -60,9 +60,9 @@ def test_replies_from_other_robots_and_invalid_replies_are_ignored(network, pepp
     told = {"id": call.id, "op": "invoke", "action": "say", "output": {}, "feedback": {}, "error": None}
     for state in ("dancing", None, ["succeeded"], "accepted"):
         answer.publish({**told, "state": state})
-    network._answer("/Other/answer", {**told, "state": "succeeded"}, pepper._node.id)
+    network._apply_reply("/Other/answer", {**told, "state": "succeeded"}, pepper._node.id)
     answer.publish({"op": "alive", "id": "", "state": "running"})
-    until(lambda: call.heard_s > 0 and call.state == "accepted")
+    until(lambda: call.last_reply_s > 0 and call.state == "accepted")
     answer.publish({**told, "state": "running", "waits_for": "no list"})
     until(lambda: call.state == "running")
     assert call.waits_for == ()
@@ -116,7 +116,7 @@ def test_sensors_events_and_topics_are_received(network, pepper, node):
 
 def test_stop_waits_for_replies_and_names_silent_robots(network, pepper):
     outside: list[str] = []
-    network.listen(lambda: None, outside.append)
+    network.set_callbacks(lambda: None, outside.append)
     assert network.stop_robots(2.0) == ()
     pepper.silent = {"stop"}
     assert network.stop_robots(0.05) == ("Pepper",)
@@ -126,8 +126,8 @@ def test_stop_waits_for_replies_and_names_silent_robots(network, pepper):
 def test_duplicate_replies_to_own_pause_stop_are_not_foreign_stops(network, pepper, node):
     pepper.slow = {"say"}
     outside: list[str] = []
-    network.listen(lambda: None, outside.append)
-    network._rest(pepper.described)
+    network.set_callbacks(lambda: None, outside.append)
+    network._stop_for_pause(pepper.described)
     until(lambda: not network._stops)
     (stop,) = pepper.heard("stop")
     answer = pepper._answer
@@ -146,7 +146,7 @@ def test_stop_reply_on_topic_of_another_robot_is_ignored(network, pepper):
     def lies(robot, command):
         heard(robot, command)
         told = {"id": command["id"], "op": command["op"], "state": "succeeded"}
-        network._answer("/Other/answer", told, pepper._node.id)
+        network._apply_reply("/Other/answer", told, pepper._node.id)
 
     network._send = lies
     assert network.stop_robots(0.3) == ("Pepper",)
@@ -154,7 +154,7 @@ def test_stop_reply_on_topic_of_another_robot_is_ignored(network, pepper):
 
 def test_stop_by_another_program_is_detected(network, pepper, node):
     outside: list[str] = []
-    network.listen(lambda: None, outside.append)
+    network.set_callbacks(lambda: None, outside.append)
     node.new_pub("/Pepper/command", "robot/command").publish({"id": "s", "op": "stop", "from": "person"})
     until(lambda: outside == ["Pepper"])
 
@@ -184,7 +184,10 @@ def test_robots_are_found_by_topic_type(master, node, pepper):
         assert found.owners["Pepper"].node_id == pepper._node.id
         assert [robot.name for robot in find_robots(node, 5.0).robots] == ["Pepper", "Turtle 2"]
         wanted = find_robots(node, 0.2, wanted=["NAO"])
-        assert ([robot.name for robot in wanted.robots], wanted.claims) == (["Pepper", "Turtle 2"], ())
+        assert ([robot.name for robot in wanted.robots], wanted.rejected_claims) == (
+            ["Pepper", "Turtle 2"],
+            (),
+        )
     finally:
         turtle.close()
 

@@ -10,7 +10,7 @@ from app.blocks.runtime.questions import (
     MAX_CHOICES,
     MAX_QUESTION_LENGTH,
     ProgramQuestion,
-    as_value,
+    parse_answer,
 )
 from tests.blocks.fakes import Play, play, until
 from tests.blocks.samples import (
@@ -40,7 +40,7 @@ class Person:
         return self.shown[-1] or ProgramQuestion(0, "")
 
     def answers(self, question: str, words: str) -> None:
-        self.run.runtime.questions.answered(self.sees(question).id, words)
+        self.run.runtime.questions.set_answer(self.sees(question).id, words)
 
 
 def ask(question: object) -> dict[str, object]:
@@ -74,7 +74,7 @@ def test_questions_of_two_scripts_are_asked_one_after_another():
     first = them.shown[-1]
     assert first is not None
     other = {"one": "two", "two": "one"}[first.text]
-    them.run.runtime.questions.answered(first.id + 99, "too early")
+    them.run.runtime.questions.set_answer(first.id + 99, "too early")
     them.answers(first.text, "A")
     them.answers(other, "B")
     them.run.end()
@@ -109,9 +109,9 @@ def test_program_can_be_paused_while_question_is_shown():
     them = Person(workspace(started(ask("Name?"), write(answer()))))
     them.sees("Name?")
     them.run.runtime.scheduler.pause()
-    until(lambda: them.run.runtime.scheduler.snapshot().paused)
+    until(lambda: them.run.runtime.scheduler.snapshot().is_paused)
     them.answers("Name?", "Ada")
-    them.run.runtime.scheduler.go_on()
+    them.run.runtime.scheduler.resume()
     them.run.end()
     assert them.run.lines == ["Ada"]
 
@@ -166,7 +166,7 @@ def test_any_value_can_be_asked_as_question(asked, shown):
     ],
 )
 def test_typed_number_is_converted_to_number(typed, value):
-    assert (type(as_value(typed)), as_value(typed)) == (type(value), value)
+    assert (type(parse_answer(typed)), parse_answer(typed)) == (type(value), value)
 
 
 def test_answer_can_be_compared_and_used_as_count():

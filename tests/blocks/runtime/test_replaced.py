@@ -48,13 +48,13 @@ def test_replaced_command_is_reported_at_its_block_and_script_continues(fight: F
     until(lambda: len(fight.link.calls) == 3)
     fight.link.answer(winner, "succeeded")
     play.end()
-    (news,) = play.runtime.replaced.take_news()
+    (news,) = play.runtime.replacements.take_new()
     assert news.block in {"t", "t2"}  # whichever script began first
-    assert news.sentence == "“turn” was replaced by “turn”"
+    assert news.message == "“turn” was replaced by “turn”"
     assert news.count == 1
     assert fight.link.invoked[2] == ("Pepper", "say", {"text": "on"})
     assert play.runtime.error is None
-    assert play.runtime.replaced.take_news() == ()
+    assert play.runtime.replacements.take_new() == ()
 
 
 def test_repeated_replacements_are_counted(fight: Fight) -> None:
@@ -63,7 +63,7 @@ def test_repeated_replacements_are_counted(fight: Fight) -> None:
         fight.asked(round_ + 1)
         fight.link.answer(fight.link.calls[round_ - 1], "canceled")
     fight.asked(5)
-    news = {each.block: each for each in play.runtime.replaced.take_news()}
+    news = {each.block: each for each in play.runtime.replacements.take_new()}
     assert sum(each.count for each in news.values()) == 3
     assert set(news) == {"t", "t2"}
 
@@ -79,8 +79,8 @@ def test_replacement_names_robot_when_several_are_used(fight: Fight) -> None:
     loser = next(call for call in fight.link.calls if call.robot == "Ada")
     fight.link.answer(loser, "canceled")
     found: list[Replacement] = []
-    until(lambda: bool(found.extend(play.runtime.replaced.take_news()) or found))
-    assert found[0].sentence == "Ada: “turn” was replaced by “turn”"
+    until(lambda: bool(found.extend(play.runtime.replacements.take_new()) or found))
+    assert found[0].message == "Ada: “turn” was replaced by “turn”"
 
 
 def test_canceled_commands_of_other_robots_or_parts_are_not_replacements(fight: Fight) -> None:
@@ -94,7 +94,7 @@ def test_canceled_commands_of_other_robots_or_parts_are_not_replacements(fight: 
     for call in list(fight.link.calls):
         fight.link.answer(call, "canceled")
     play.end()
-    assert play.runtime.replaced.take_news() == ()
+    assert play.runtime.replacements.take_new() == ()
 
 
 def test_restarted_event_script_does_not_replace_itself(fight: Fight) -> None:
@@ -106,7 +106,7 @@ def test_restarted_event_script_does_not_replace_itself(fight: Fight) -> None:
         fight.link.happen(("Pepper", "touched"), {"place": "head", "down": True})
         fight.link.answer(fight.link.calls[count - 1], "canceled")
     fight.asked(3)
-    assert play.runtime.replaced.take_news() == ()
+    assert play.runtime.replacements.take_new() == ()
 
 
 def test_queued_command_is_not_reported_as_replaced(fight: Fight) -> None:
@@ -119,4 +119,4 @@ def test_queued_command_is_not_reported_as_replaced(fight: Fight) -> None:
     for call in list(fight.link.calls):
         fight.link.answer(call, "canceled")
     play.end()
-    assert play.runtime.replaced.take_news() == ()
+    assert play.runtime.replacements.take_new() == ()

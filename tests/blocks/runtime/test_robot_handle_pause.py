@@ -8,13 +8,13 @@ import pytest
 
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.runtime.link import RobotCall
-from app.blocks.runtime.robot_handle import is_unknown, measured_by, rest_of
+from app.blocks.runtime.robot_handle import is_remainder_unknown, remainder_parameter, remaining_input
 from app.robots import simulated
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from tests.blocks.fakes import FakeLink, Play, until
 from tests.blocks.samples import block, number, started, text, workspace, write
 
-PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
+PEPPER = parse(thing_description(simulated.ROBOT.thing_model, "Pepper"))
 
 
 def action(name: str):
@@ -24,7 +24,9 @@ def action(name: str):
 
 
 def held(name: str, **feedback: object) -> RobotCall:
-    return RobotCall("1", "Pepper", name, state="canceled", began=True, held=True, feedback=feedback)
+    return RobotCall(
+        "1", "Pepper", name, state="canceled", has_started=True, is_canceled_by_pause=True, feedback=feedback
+    )
 
 
 @pytest.mark.parametrize(
@@ -42,18 +44,18 @@ def held(name: str, **feedback: object) -> RobotCall:
     ],
 )
 def test_resumed_action_does_only_the_remainder(name, given, feedback, rest) -> None:
-    assert rest_of(action(name), given, held(name, **feedback)) == rest
+    assert remaining_input(action(name), given, held(name, **feedback)) == rest
 
 
 def test_action_not_started_before_pause_is_done_in_full() -> None:
-    call = replace(held("walk"), began=False)
-    assert rest_of(action("walk"), {"distance": 1.0}, call) == {"distance": 1.0}
+    call = replace(held("walk"), has_started=False)
+    assert remaining_input(action("walk"), {"distance": 1.0}, call) == {"distance": 1.0}
 
 
 def test_driving_action_without_progress_feedback_is_not_resumed() -> None:
     drives = replace(action("walk"), feedback=())
-    assert measured_by(drives, {"distance": 1.0}) is None
-    assert rest_of(drives, {"distance": 1.0}, held("walk", to_go=0.5)) is None
+    assert remainder_parameter(drives, {"distance": 1.0}) is None
+    assert remaining_input(drives, {"distance": 1.0}, held("walk", to_go=0.5)) is None
 
 
 @pytest.mark.parametrize(
@@ -68,8 +70,8 @@ def test_driving_action_without_progress_feedback_is_not_resumed() -> None:
 )
 def test_unknown_remainder_is_detected(name, given, feedback, unknown) -> None:
     call = held(name, **feedback)
-    assert is_unknown(action(name), given, call) is unknown
-    assert not is_unknown(action(name), given, replace(call, began=False))
+    assert is_remainder_unknown(action(name), given, call) is unknown
+    assert not is_remainder_unknown(action(name), given, replace(call, has_started=False))
 
 
 class Blind(FakeLink):
@@ -77,7 +79,7 @@ class Blind(FakeLink):
 
     def invoke(self, robot, action, input):
         call = super().invoke(robot, action, input)
-        call.began = True
+        call.has_started = True
         return call
 
     def cancel(self, call) -> None:
@@ -92,13 +94,13 @@ def test_warning_before_and_message_after_skipping_unknown_remainder() -> None:
     link.held = {"walk"}
     run = Play(compile_behaviour(blocks, [PEPPER]), (PEPPER,), link).start()
     until(lambda: bool(link.calls))
-    assert run.runtime.saying.warns(("w",)) == ""
+    assert run.runtime.status_text.warning(("w",)) == ""
     run.runtime.scheduler.pause()
     said = "Pepper doesn't report how much of “walk” is left"
-    until(lambda: run.runtime.saying.warns(("w",)) == f"{said}; Resume skips it")
-    run.runtime.scheduler.go_on()
+    until(lambda: run.runtime.status_text.warning(("w",)) == f"{said}; Resume skips it")
+    run.runtime.scheduler.resume()
     assert run.end().lines == [f"{said}, so it was skipped", "after"]
-    assert run.runtime.saying.warns(("w",)) == ""
+    assert run.runtime.status_text.warning(("w",)) == ""
     assert len(link.calls) == 1
 
 
@@ -111,7 +113,7 @@ def test_no_message_when_remainder_is_resumed() -> None:
     link.calls[0].feedback = {"to_go": 0.25}
     run.runtime.scheduler.pause()
     until(lambda: link.calls[0].done)
-    run.runtime.scheduler.go_on()
+    run.runtime.scheduler.resume()
     until(lambda: len(link.calls) == 2)
     assert link.invoked[1][2]["distance"] == 0.25
     link.answer(link.calls[1], "succeeded")
@@ -119,6 +121,6 @@ def test_no_message_when_remainder_is_resumed() -> None:
 
 
 def test_measured_value_is_found_by_unit() -> None:
-    assert measured_by(action("walk"), {"distance": 1.0, "speed": 0.3}) == "distance"
-    assert measured_by(action("turn"), {"angle": 90, "speed": 40}) == "angle"
-    assert measured_by(action("say"), {"text": "hello"}) is None
+    assert remainder_parameter(action("walk"), {"distance": 1.0, "speed": 0.3}) == "distance"
+    assert remainder_parameter(action("turn"), {"angle": 90, "speed": 40}) == "angle"
+    assert remainder_parameter(action("say"), {"text": "hello"}) is None

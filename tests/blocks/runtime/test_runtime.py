@@ -49,7 +49,7 @@ def test_block_waits_for_its_robot(running):
     until(lambda: bool(link.calls))
     assert link.invoked == [("Pepper", "turn", {"direction": "left", "angle": 30})]
     assert run.runtime.scheduler.snapshot().blocks == ("t",)
-    assert run.runtime.saying.says(["t"]) == "Pepper turns left by 30 °"
+    assert run.runtime.status_text.text(["t"]) == "Pepper turns left by 30 °"
     link.answer(link.calls[0], "succeeded")
     run.end()
     assert link.invoked[1] == ("Pepper", "say", {"text": "done"})
@@ -64,10 +64,10 @@ def test_running_robot_action_is_described_until_done(running):
     until(lambda: len(link.calls) == 2)
     # The other script's block is done meanwhile, and takes nothing away.
     until(lambda: run.runtime.scheduler.snapshot().blocks == ("x",))
-    assert run.runtime.saying.says(["x"]) == "Pepper says “Touch my head.”"
+    assert run.runtime.status_text.text(["x"]) == "Pepper says “Touch my head.”"
     link.answer(link.calls[0], "succeeded")
     run.end()
-    assert run.runtime.saying.says(["l"]) == "Pepper light eyes #37b6ff"
+    assert run.runtime.status_text.text(["l"]) == "Pepper light eyes #37b6ff"
 
 
 def test_rejected_action_is_an_error_on_its_block_with_robot_message():
@@ -87,7 +87,7 @@ def test_canceled_action_is_not_an_error():
 
 
 def test_robot_that_does_not_answer_is_named(monkeypatch):
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.FIRST_ANSWER_S", 0.05)
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.FIRST_REPLY_TIMEOUT_S", 0.05)
     link = FakeLink()
     link.answers = {"say": ("sent", {}, "")}
     run = play(workspace(started(say("Hi") | {"id": "x"})), link)
@@ -97,7 +97,7 @@ def test_robot_that_does_not_answer_is_named(monkeypatch):
 
 
 def test_action_that_never_ends_is_canceled(monkeypatch):
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.MARGIN_S", -29.95)
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.TIMEOUT_MARGIN_S", -29.95)
     link = FakeLink()
     link.held = {"say"}
     run = play(workspace(started(say("Hi"))), link)
@@ -233,7 +233,7 @@ def test_condition_starts_script_only_on_change_to_true(running):
         seen = len(run.lines)
         # two more looks at the condition, and nothing more has happened
         waited = [0]
-        run.runtime.scheduler.poke()
+        run.runtime.scheduler.wake_scripts()
         until(lambda waited=waited: waited.__setitem__(0, waited[0] + 1) or waited[0] > 25)
         assert len(run.lines) == seen == lines
 
@@ -366,10 +366,10 @@ def test_pause_and_single_steps(running):
     run = running(workspace(started(*(write(text(f"{n}")) | {"id": f"w{n}"} for n in range(3)))), paused=True)
     scheduler = run.runtime.scheduler
     for n in range(3):
-        until(lambda: scheduler.snapshot().paused)
+        until(lambda: scheduler.snapshot().is_paused)
         assert scheduler.snapshot().next_block == f"w{n}"
         assert run.lines == [f"{done}" for done in range(n)]
-        assert run.runtime.saying.reading(f"w{n}") == f"write “{n}” to the console"
+        assert run.runtime.status_text.block_text(f"w{n}") == f"write “{n}” to the console"
         scheduler.step_once()
     run.end()
     assert run.lines == ["0", "1", "2"]

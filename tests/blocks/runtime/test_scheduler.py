@@ -19,7 +19,7 @@ class Stage:
 
     def script(self, name: str, work) -> None:
         def body() -> None:
-            self.scheduler.begin()
+            self.scheduler.start_run()
             work(name)
 
         self.threads.append(self.scheduler.start(name, body))
@@ -52,7 +52,7 @@ def test_scripts_take_turns_block_by_block(stage):
     until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
     stage.script("b", stage.steps("b1", "b2", "b3"))
     until(lambda: stage.scheduler.snapshot().blocks == ("a1", "b1"))
-    stage.scheduler.go_on()
+    stage.scheduler.resume()
     stage.join()
     assert stage.did == ["a1", "b1", "a2", "b2", "a3", "b3"]
 
@@ -77,11 +77,11 @@ def test_only_script_with_the_turn_runs(stage):
 def test_pause_holds_each_script_before_its_next_block(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1", "a2"))
-    until(lambda: stage.scheduler.snapshot().paused)
+    until(lambda: stage.scheduler.snapshot().is_paused)
     snapshot = stage.scheduler.snapshot()
-    assert (snapshot.next_block, snapshot.paused, stage.did) == ("a1", True, [])
+    assert (snapshot.next_block, snapshot.is_paused, stage.did) == ("a1", True, [])
     stage.scheduler.step_once()
-    until(lambda: stage.scheduler.snapshot().paused and stage.did == ["a1"])
+    until(lambda: stage.scheduler.snapshot().is_paused and stage.did == ["a1"])
     assert stage.scheduler.snapshot().next_block == "a2"
     stage.scheduler.step_once()
     stage.join()
@@ -91,12 +91,12 @@ def test_pause_holds_each_script_before_its_next_block(stage):
 def test_step_runs_one_block_of_longest_waiting_script(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1", "a2"))
-    until(lambda: "a1" in stage.scheduler.snapshot().blocks and stage.scheduler.snapshot().paused)
+    until(lambda: "a1" in stage.scheduler.snapshot().blocks and stage.scheduler.snapshot().is_paused)
     stage.script("b", stage.steps("b1", "b2"))
-    until(lambda: len(stage.scheduler.snapshot().blocks) == 2 and stage.scheduler.snapshot().paused)
+    until(lambda: len(stage.scheduler.snapshot().blocks) == 2 and stage.scheduler.snapshot().is_paused)
     for expected in (["a1"], ["a1", "b1"], ["a1", "b1", "a2"]):
         stage.scheduler.step_once()
-        until(lambda expected=expected: stage.did == expected and stage.scheduler.snapshot().paused)
+        until(lambda expected=expected: stage.did == expected and stage.scheduler.snapshot().is_paused)
 
 
 def test_wait_clock_stops_while_paused(stage):
@@ -107,13 +107,13 @@ def test_wait_clock_stops_while_paused(stage):
 
     stage.scheduler.pause()
     stage.script("a", work)
-    until(lambda: stage.scheduler.snapshot().next_block == "wait" and stage.scheduler.snapshot().paused)
-    stage.scheduler.go_on()
+    until(lambda: stage.scheduler.snapshot().next_block == "wait" and stage.scheduler.snapshot().is_paused)
+    stage.scheduler.resume()
     stage.scheduler.pause()
     threading.Event().wait(1.2)
     assert stage.did == []
-    until(lambda: stage.scheduler.snapshot().paused)
-    stage.scheduler.go_on()
+    until(lambda: stage.scheduler.snapshot().is_paused)
+    stage.scheduler.resume()
     stage.join()
     assert stage.did == ["waited"]
 
@@ -128,9 +128,9 @@ def test_step_runs_wait_to_its_end(stage):
 
     stage.scheduler.pause()
     stage.script("a", work)
-    until(lambda: stage.scheduler.snapshot().paused)
+    until(lambda: stage.scheduler.snapshot().is_paused)
     stage.scheduler.step_once()
-    until(lambda: stage.scheduler.snapshot().next_block == "next" and stage.scheduler.snapshot().paused)
+    until(lambda: stage.scheduler.snapshot().next_block == "next" and stage.scheduler.snapshot().is_paused)
     assert stage.did == ["waited"]
 
 
@@ -144,10 +144,10 @@ def test_step_during_wait_ends_the_wait(stage):
     stage.script("a", work)
     until(lambda: stage.scheduler.snapshot().blocks == ("wait",))
     stage.scheduler.pause()
-    until(lambda: stage.scheduler.snapshot().paused)
+    until(lambda: stage.scheduler.snapshot().is_paused)
     assert stage.scheduler.snapshot().next_block == "wait"
     stage.scheduler.step_once()
-    until(lambda: stage.scheduler.snapshot().next_block == "next" and stage.scheduler.snapshot().paused)
+    until(lambda: stage.scheduler.snapshot().next_block == "next" and stage.scheduler.snapshot().is_paused)
     assert stage.did == ["waited"]
 
 
@@ -181,9 +181,9 @@ def test_poke_from_another_thread_ends_wait(stage):
         stage.did.append("got it")
 
     stage.script("a", work)
-    until(lambda: not stage.scheduler.snapshot().paused)
+    until(lambda: not stage.scheduler.snapshot().is_paused)
     arrived.append(1)
-    stage.scheduler.poke()
+    stage.scheduler.wake_scripts()
     stage.join()
     assert stage.did == ["got it"]
 
@@ -199,10 +199,10 @@ def test_pause_takes_effect_only_after_running_robot_action(stage):
     stage.script("a", work)
     until(lambda: stage.scheduler.snapshot().blocks == ("move",))
     stage.scheduler.pause()
-    assert not stage.scheduler.snapshot().paused
+    assert not stage.scheduler.snapshot().is_paused
     answered.append(1)
-    stage.scheduler.poke()
-    until(lambda: stage.scheduler.snapshot().paused)
+    stage.scheduler.wake_scripts()
+    until(lambda: stage.scheduler.snapshot().is_paused)
     assert stage.scheduler.snapshot().next_block == "next"
 
 
@@ -229,7 +229,7 @@ def test_stop_ends_script_at_any_point(stage, where):
 def test_stop_ends_paused_script(stage):
     stage.scheduler.pause()
     stage.script("a", stage.steps("a1"))
-    until(lambda: stage.scheduler.snapshot().paused)
+    until(lambda: stage.scheduler.snapshot().is_paused)
     stage.scheduler.stop()
     stage.join()
     assert stage.did == []
@@ -240,16 +240,16 @@ def test_conditions_are_not_checked_while_paused(stage):
 
     def body() -> None:
         while True:
-            stage.scheduler.look()
+            stage.scheduler.acquire_turn()
             looked.append(1)
-            stage.scheduler.rest()
+            stage.scheduler.finish_run()
 
     stage.scheduler.pause()
     stage.threads.append(stage.scheduler.start("hat", body))
     threading.Event().wait(0.05)
-    assert stage.scheduler.snapshot().paused
+    assert stage.scheduler.snapshot().is_paused
     assert looked == []
-    stage.scheduler.go_on()
+    stage.scheduler.resume()
     until(lambda: len(looked) > 3)
 
 
@@ -275,11 +275,11 @@ def test_slow_motion_ends_at_once_when_turned_off(stage):
     until(lambda: stage.scheduler.snapshot().blocks == ("a1",))
     stage.scheduler.set_pace(0.0)
     stage.scheduler.pause()
-    until(lambda: stage.scheduler.snapshot().paused)
+    until(lambda: stage.scheduler.snapshot().is_paused)
     assert stage.did == []
     stage.scheduler.step_once()  # a step does not wait for the rest of the minute
-    until(lambda: stage.scheduler.snapshot().paused and stage.did == ["a1"])
-    stage.scheduler.go_on()
+    until(lambda: stage.scheduler.snapshot().is_paused and stage.did == ["a1"])
+    stage.scheduler.resume()
     stage.join()
     assert stage.did == ["a1", "a2", "a3"]
 
@@ -287,9 +287,9 @@ def test_slow_motion_ends_at_once_when_turned_off(stage):
 def test_interrupted_action_is_held_until_resume_or_its_step(stage):
     def work(_name: str) -> None:
         stage.scheduler.step("drive")
-        stage.scheduler.wait_for(stage.scheduler.holds)
+        stage.scheduler.wait_for(stage.scheduler.is_script_paused)
         stage.did.append("held")
-        stage.scheduler.hold()
+        stage.scheduler.wait_while_paused()
         stage.did.append("rest")
         stage.scheduler.step("next")
         stage.did.append("next")
@@ -297,11 +297,11 @@ def test_interrupted_action_is_held_until_resume_or_its_step(stage):
     stage.script("a", work)
     until(lambda: "drive" in stage.scheduler.snapshot().blocks)
     stage.scheduler.pause()
-    until(lambda: stage.did == ["held"] and stage.scheduler.snapshot().paused)
+    until(lambda: stage.did == ["held"] and stage.scheduler.snapshot().is_paused)
     assert stage.scheduler.snapshot().next_block == "drive"
     stage.scheduler.step_once()
-    until(lambda: stage.did == ["held", "rest"] and stage.scheduler.snapshot().paused)
+    until(lambda: stage.did == ["held", "rest"] and stage.scheduler.snapshot().is_paused)
     assert stage.scheduler.snapshot().next_block == "next"
-    stage.scheduler.go_on()
+    stage.scheduler.resume()
     stage.join()
     assert stage.did == ["held", "rest", "next"]

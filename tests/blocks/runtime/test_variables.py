@@ -10,12 +10,12 @@ import pytest
 from app.blocks.compiler.compiler import compile_behaviour
 from app.blocks.model.program import Program, Variable
 from app.blocks.runtime.variables import (
-    MAX_CHARACTERS,
     MAX_ITEMS,
     MAX_TEXT_LENGTH,
+    MAX_TOTAL_CHARACTERS,
     VariableValue,
     VariableWatch,
-    brief,
+    display_value,
 )
 from tests.blocks.samples import block, get, number, started, workspace, write
 
@@ -41,7 +41,7 @@ from tests.blocks.samples import block, get, number, started, workspace, write
     ],
 )
 def test_value_summary(value: object, kind: str, text: str) -> None:
-    told = brief("v", value)
+    told = display_value("v", value)
     assert (told.kind, told.text) == (kind, text)
     assert VariableValue.from_json(json.loads(json.dumps(told.to_json()))) == told
 
@@ -56,23 +56,23 @@ def test_summary_reads_only_what_is_shown() -> None:
                 yield pair
 
     message = Counted({str(each): each for each in range(100_000)})
-    assert len(brief("v", message).text) == MAX_TEXT_LENGTH
+    assert len(display_value("v", message).text) == MAX_TEXT_LENGTH
     assert Counted.asked < MAX_TEXT_LENGTH
-    assert len(brief("v", "x" * 10**6).text) == MAX_TEXT_LENGTH
+    assert len(display_value("v", "x" * 10**6).text) == MAX_TEXT_LENGTH
 
 
 def test_self_containing_and_deeply_nested_lists_are_truncated() -> None:
     itself: list[object] = [1]
     itself.append(itself)
-    assert brief("v", itself).text.startswith("[1, [1, [1,")
+    assert display_value("v", itself).text.startswith("[1, [1, [1,")
     deep: list[object] = []
     for _ in range(50_000):
         deep = [deep]
-    assert "…" in brief("v", deep).text
+    assert "…" in display_value("v", deep).text
 
 
 def test_long_list_reports_first_items_and_length() -> None:
-    told = brief("v", list(range(5000)))
+    told = display_value("v", list(range(5000)))
     assert (len(told.items), told.length, told.items[-1]) == (MAX_ITEMS, 5000, "99")
 
 
@@ -104,7 +104,7 @@ def test_large_changes_are_reported_in_parts_without_loss() -> None:
     while more := watched.changes():
         rest += more
     assert 0 < len(first) < 60
-    assert sum(len("".join(each.items)) for each in first) < 2 * MAX_CHARACTERS
+    assert sum(len("".join(each.items)) for each in first) < 2 * MAX_TOTAL_CHARACTERS
     assert {each.id for each in (*first, *rest)} == {f"id v{each}" for each in range(60)}
 
 
@@ -132,8 +132,8 @@ def test_list_modified_during_read_is_harmless() -> None:
 def test_user_can_set_only_program_variables() -> None:
     watched, names = watch(score=0)
     names["wait"] = wait = object()
-    watched.put("score", "ten")
-    watched.put("wait", 1)
+    watched.set_value("score", "ten")
+    watched.set_value("wait", 1)
     assert names["score"] == "ten"
     assert names["wait"] is wait
 

@@ -27,16 +27,16 @@ class Queued(FakeLink):
 
 
 def test_queued_action_shows_awaited_action_then_its_activity(monkeypatch) -> None:
-    monkeypatch.setattr("app.blocks.runtime.robot_handle.MARGIN_S", -29.5)  # the limit: half a second
+    monkeypatch.setattr("app.blocks.runtime.robot_handle.TIMEOUT_MARGIN_S", -29.5)  # the limit: half a second
     link = Queued()
     run = begin(link)
     until(lambda: bool(link.calls))
-    said = lambda: run.runtime.saying.says(("x",))  # noqa: E731
+    said = lambda: run.runtime.status_text.text(("x",))  # noqa: E731
     until(lambda: said() == "Pepper is waiting for “look”")
     begun = time.monotonic()
     until(lambda: time.monotonic() > begun + 0.7)  # longer than its limit, which has not begun
     assert not run.runtime.finished.is_set()
-    link.calls[0].began = True
+    link.calls[0].has_started = True
     link.calls[0].state = "running"
     until(lambda: said() == "Pepper says “Hi”")
     link.answer(link.calls[0], "succeeded")
@@ -51,7 +51,7 @@ def test_robot_without_heartbeat_is_an_error_at_the_block(monkeypatch) -> None:
     until(lambda: bool(link.calls))
     heard_until = time.monotonic() + 0.8
     while time.monotonic() < heard_until:  # it beats: nothing is wrong
-        link.calls[0].heard_s = time.monotonic()
+        link.calls[0].last_reply_s = time.monotonic()
         assert not run.runtime.finished.wait(0.02)
     run.end(3.0)
     error = run.runtime.error

@@ -13,7 +13,7 @@ from app.blocks.runtime.find_robots import find_robots
 from app.blocks.runtime.link import RobotCall
 from app.blocks.runtime.network import Network
 from app.robots.description.description import Robot
-from app.robots.identity import hearing
+from app.robots.identity import subscriber_nodes
 from nep.masters.master import Master
 from tests.blocks.fakes import until
 from tests.blocks.wire_robot import WireRobot
@@ -57,7 +57,7 @@ class Program:
         return not call.done
 
     def check_ended(self, call: RobotCall, states: Sequence[str]) -> None:
-        assert (call.done, call.state, call.began) == (True, states[-1], "running" in states)
+        assert (call.done, call.state, call.has_started) == (True, states[-1], "running" in states)
 
     def knows(self, publisher: nep.Publisher) -> bool:
         message = nep.Message("/Pepper/answer", b"", "json", "robot/answer", publisher=publisher._spec.id)
@@ -65,7 +65,7 @@ class Program:
 
     def hearing_commands(self) -> int:
         self.network._lookup()
-        return len(hearing(self.network._view, "/Pepper/command"))
+        return len(subscriber_nodes(self.network._view, "/Pepper/command"))
 
     def watch(self, sensor: str) -> AbstractContextManager[object]:
         return nullcontext(self.network.sensor("Pepper", sensor))
@@ -79,7 +79,7 @@ class Program:
         return not missing
 
     def stop_says(self) -> str:
-        return self.network.stop_words("Pepper")
+        return self.network.stop_error("Pepper")
 
     def robots(self) -> Mapping[str, tuple[str, str]]:
         found = find_robots(self._node, 30.0)
@@ -88,11 +88,11 @@ class Program:
         }
 
     def claim(self, topic: str) -> str:
-        (claim,) = find_robots(self._node, 30.0).claims
+        (claim,) = find_robots(self._node, 30.0).rejected_claims
         return claim
 
     def claims_nothing(self) -> bool:
-        return not find_robots(self._node, 30.0).claims
+        return not find_robots(self._node, 30.0).rejected_claims
 
 
 class TestAProgram(WhoseWordsCount):
@@ -135,7 +135,7 @@ def test_forged_stop_reply_from_foreign_node_is_ignored(
     network: Network, pepper: WireRobot, evil: nep.Node
 ) -> None:
     outside: list[str] = []
-    network.listen(lambda: None, outside.append)
+    network.set_callbacks(lambda: None, outside.append)
     forged = evil.new_pub("/Pepper/answer", "robot/answer")
     forged.publish(answer("somebody's", "succeeded", "stop"))
     told = nep.Message("/Pepper/answer", b"", "json", "robot/answer", publisher=forged._spec.id)
@@ -150,7 +150,7 @@ def test_rejected_stop_is_reported_with_robot_message(network: Network, pepper: 
     say_ = pepper._say
     pepper._say = lambda command, state, error="": say_(command, "failed", "the brake is stuck")  # type: ignore[method-assign]
     assert network.stop_robots(30.0) == ("Pepper",)
-    assert network.stop_words("Pepper") == "Pepper may still move: the brake is stuck"
+    assert network.stop_error("Pepper") == "Pepper may still move: the brake is stuck"
 
 
 def test_events_from_foreign_nodes_are_ignored_but_sensor_values_are_accepted(
@@ -190,7 +190,7 @@ def test_restarted_robot_is_trusted_after_runner_confirms_it(
         until(lambda: bool(new.heard("invoke")))
         network._lookup()
         assert call.state == "sent"
-        network.know({"Pepper": new._node.id})
+        network.update_owners({"Pepper": new._node.id})
         second = network.invoke("Pepper", "say", {"text": "Hi"})
         until(lambda: second.done)
     finally:

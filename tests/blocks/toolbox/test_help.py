@@ -22,7 +22,7 @@ def test_every_block_has_help(described) -> None:
     for text in (str(told["title"]), str(told["example"]), str(told["more"])):
         assert "%" not in text
         assert "…" not in text
-    shown = {argument.name for argument in described.arguments if not argument.silent}
+    shown = {argument.name for argument in described.arguments if not argument.is_display_only}
     assert len(told["gaps"]) >= len(shown)  # type: ignore[arg-type]
 
 

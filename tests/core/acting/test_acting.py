@@ -6,20 +6,20 @@ import json
 from pathlib import Path
 
 import nep
-from app.core.run.acting.acting import FILE, call_words, result_words
+from app.core.run.acting.acting import FILE, call_text, result_text
 from app.core.run.acting.arming import Target
 from app.core.run.acting.sending import SendOrder, SendResult
-from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.shelf import SavedMessage
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from tests.core.waiting import tick_until
 
-STILL = KeptMessage("a", "Stand still", "/cmd_vel", "json", '{"x": 0, "id": {new id}}', (), 20.0)
+STILL = SavedMessage("a", "Stand still", "/cmd_vel", "json", '{"x": 0, "id": {new id}}', (), 20.0)
 
 
 def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
     acting = session.acting
-    acting.shelf.put(STILL)
+    acting.shelf.set_message(STILL)
     with nep.node("robot") as node:
         heard = node.new_sub("/cmd_vel", "json")
         node.new_server("sum", lambda asked: {"sum": asked["a"] + asked["b"]}, threads=1)
@@ -27,20 +27,24 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert acting.send(STILL) == ""
         assert acting.arming.targets == (Target("topic", "/cmd_vel"),)
         (armed,) = acting.sent.records
-        assert (armed.asker, armed.words) == ("switch", "armed for 5 min")
+        assert (armed.origin, armed.result_text) == ("switch", "armed for 5 min")
         is_there, first = heard.listen(timeout_s=20.0)
         assert is_there
         tick_until(session, lambda: "a" in acting.last)
-        assert result_words(acting.last["a"]) == "received by 1"
+        assert result_text(acting.last["a"]) == "received by 1"
         assert acting.call("sum", '{"a": 2, "b": 3}', 20.0) == ""
-        tick_until(session, lambda: acting.calls.waiting is None)
-        assert acting.calls.records[-1].answer == {"sum": 5}
-        assert call_words(acting.calls.records[-1]).startswith("replied in ")
+        tick_until(session, lambda: acting.calls.in_flight is None)
+        assert acting.calls.records[-1].reply == {"sum": 5}
+        assert call_text(acting.calls.records[-1]).startswith("replied in ")
         assert acting.shelf.requests["sum"] == '{"a": 2, "b": 3}'
         sent, called = list(acting.sent.records)[1:]
-        assert (sent.asker, sent.name, sent.words) == ("publish", "/cmd_vel", "Stand still, received by 1")
+        assert (sent.origin, sent.name, sent.result_text) == (
+            "publish",
+            "/cmd_vel",
+            "Stand still, received by 1",
+        )
         assert json.loads(sent.text) == first
-        assert (called.asker, called.name, called.is_bad) == ("service", "sum", False)
+        assert (called.origin, called.name, called.is_error) == ("service", "sum", False)
         assert called.text == '{"a": 2, "b": 3}'
         assert acting.sent.total == 2
         assert acting.repeat(sent.number) == acting.repeat(called.number) == ""
@@ -61,7 +65,7 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
         assert acting.repeat(sent.number) == "Sending to /cmd_vel is not armed. Arm it first."
         assert not acting.arming.is_on
         assert heard.receive(0.1) is None
-        tick_until(session, lambda: any(" sent" in each.words for each in acting.sent.records))
+        tick_until(session, lambda: any(" sent" in each.result_text for each in acting.sent.records))
     said = [each.text for each in session.console.records]
     assert "armed for 5 min" in said
     assert "/cmd_vel: Stand still, received by 1" in said
@@ -71,13 +75,13 @@ def test_messages_and_calls_are_sent_and_stop_disarms(session: Session) -> None:
 def test_invalid_message_is_rejected_with_reason_and_arms_nothing(session: Session) -> None:
     acting = session.acting
     for message, sentence in (
-        (KeptMessage("b", "No topic", " "), "Choose a topic first."),
+        (SavedMessage("b", "No topic", " "), "Choose a topic first."),
         (
-            KeptMessage("b", "Wrong", "/t", "json", '{"a": }'),
+            SavedMessage("b", "Wrong", "/t", "json", '{"a": }'),
             "Line 1, column 6: a value is missing after the colon.",
         ),
-        (KeptMessage("b", "Open", "/t", "json", '{"a": {yaw}}'), "Fill in “yaw” first."),
-        (KeptMessage("b", "Picture", "/t", "image"), "Messages of type image can't be edited by hand."),
+        (SavedMessage("b", "Open", "/t", "json", '{"a": {yaw}}'), "Fill in “yaw” first."),
+        (SavedMessage("b", "Picture", "/t", "image"), "Messages of type image can't be edited by hand."),
     ):
         assert acting.send(message) == sentence
     assert acting.call("sum", '{"a"', 1.0) == "Line 1, column 5: a colon is missing after the name."
@@ -86,7 +90,7 @@ def test_invalid_message_is_rejected_with_reason_and_arms_nothing(session: Sessi
 
 def test_shelf_is_saved_to_file_and_damage_is_reported(tmp_path: Path) -> None:
     first = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
-    first.acting.shelf.put(STILL)
+    first.acting.shelf.set_message(STILL)
     first.acting.check()
     first.close()
     path = tmp_path / FILE
@@ -108,7 +112,7 @@ def test_shelf_file_of_newer_version_is_not_overwritten(tmp_path: Path) -> None:
     data = json.dumps({"format": 99, "messages": []})
     path.write_text(data, "utf-8")
     session = Session(Settings(tmp_path), address="127.0.0.1:1", start_processes=False)
-    session.acting.shelf.put(STILL)
+    session.acting.shelf.set_message(STILL)
     session.acting.check()
     session.close()
     assert path.read_text("utf-8") == data
@@ -117,7 +121,7 @@ def test_shelf_file_of_newer_version_is_not_overwritten(tmp_path: Path) -> None:
 def test_send_results_are_described() -> None:
     order = SendOrder("a", "Drive", "/cmd_vel", "json", dict)
     for result, words in (
-        (SendResult(order, "sent", heard=2), "received by 2"),
+        (SendResult(order, "sent", subscriber_count=2), "received by 2"),
         (SendResult(order, "sent"), "no subscribers"),
         (SendResult(order, "began"), "started"),
         (SendResult(order, "ended", count=412, skipped=3), "412 sent, 3 late messages skipped"),
@@ -125,4 +129,4 @@ def test_send_results_are_described() -> None:
         (SendResult(order, "failed", "it is closed", count=2), "2 sent, it is closed"),
         (SendResult(order, "ended"), "0 sent"),
     ):
-        assert result_words(result) == words
+        assert result_text(result) == words

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.core.run.acting.arming import MAX_NAMES, MAX_S, MIN_S, Arming, Target
+from app.core.run.acting.arming import MAX_S, MAX_TARGETS, MIN_S, Arming, Target
 
 TOPIC = Target("topic", "/cmd_vel")
 
@@ -16,12 +16,12 @@ def test_nothing_is_allowed_before_arming_and_naming_a_target() -> None:
     arming, _now = made()
     done: list[int] = []
     assert not arming.allow(TOPIC)
-    assert not arming.if_armed(arming.turn, TOPIC, lambda: done.append(1))
+    assert not arming.run_if_armed(arming.turn, TOPIC, lambda: done.append(1))
     arming.arm()
     assert not arming.allows(TOPIC)
     assert arming.allow(TOPIC)
-    assert arming.if_armed(arming.turn, TOPIC, lambda: done.append(2))
-    assert not arming.if_armed(arming.turn, Target("service", "/cmd_vel"), lambda: done.append(3))
+    assert arming.run_if_armed(arming.turn, TOPIC, lambda: done.append(2))
+    assert not arming.run_if_armed(arming.turn, Target("service", "/cmd_vel"), lambda: done.append(3))
     assert done == [2]
 
 
@@ -30,11 +30,11 @@ def test_arming_expires_and_sending_does_not_extend_it() -> None:
     arming.arm(60)
     arming.allow(TOPIC)
     now[0] += 59
-    assert arming.if_armed(arming.turn, TOPIC, lambda: None)
-    assert arming.left_s == 1
+    assert arming.run_if_armed(arming.turn, TOPIC, lambda: None)
+    assert arming.remaining_s == 1
     now[0] += 1
     assert not arming.is_on
-    assert not arming.if_armed(arming.turn, TOPIC, lambda: None)
+    assert not arming.run_if_armed(arming.turn, TOPIC, lambda: None)
 
 
 def test_request_of_previous_arming_is_rejected_after_rearming() -> None:
@@ -46,17 +46,17 @@ def test_request_of_previous_arming_is_rejected_after_rearming() -> None:
     assert not arming.disarm()
     arming.arm()
     arming.allow(TOPIC)
-    assert not arming.if_armed(turn, TOPIC, lambda: None)
-    assert arming.if_armed(arming.turn, TOPIC, lambda: None)
+    assert not arming.run_if_armed(turn, TOPIC, lambda: None)
+    assert arming.run_if_armed(arming.turn, TOPIC, lambda: None)
 
 
 def test_target_count_and_duration_are_limited_and_targets_can_be_removed() -> None:
     arming, _now = made()
     for seconds, left in ((-1, MIN_S), (1e9, MAX_S), (300, 300)):
         arming.arm(seconds)
-        assert arming.left_s == left
-    names = [Target("topic", f"/t{number}") for number in range(MAX_NAMES + 1)]
-    assert [arming.allow(each) for each in names] == [True] * MAX_NAMES + [False]
+        assert arming.remaining_s == left
+    names = [Target("topic", f"/t{number}") for number in range(MAX_TARGETS + 1)]
+    assert [arming.allow(each) for each in names] == [True] * MAX_TARGETS + [False]
     arming.forbid(names[0])
     assert not arming.allows(names[0])
     assert arming.allow(names[-1])

@@ -9,7 +9,7 @@ import pytest
 
 import nep
 from app.core.run.acting.arming import Arming, Target
-from app.core.run.acting.calling import ANSWERS_KEPT, HISTORY_KEPT, CallRecord, ServiceCalls
+from app.core.run.acting.calling import MAX_RECORDS, MAX_REPLIES, CallRecord, ServiceCalls
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually
@@ -53,13 +53,13 @@ def bench(request) -> Iterator[Bench]:
 def test_reply_is_recorded_with_duration_and_json(bench) -> None:
     bench.node.new_server("/sum", lambda asked: {"sum": asked["a"] + 1, "raw": [1.5]}, threads=1)
     bench.call({"a": 2})
-    waiting = bench.calls.waiting
+    waiting = bench.calls.in_flight
     assert waiting is not None
     record = bench.end()
-    assert (record.state, record.answer) == ("answered", {"sum": 3, "raw": [1.5]})
-    assert record.took_s > 0
+    assert (record.state, record.reply) == ("answered", {"sum": 3, "raw": [1.5]})
+    assert record.duration_s > 0
     assert record.text == '{\n  "sum": 3,\n  "raw": [\n    1.5\n  ]\n}'
-    assert bench.calls.waiting is None
+    assert bench.calls.in_flight is None
 
 
 def test_server_exception_is_recorded_as_rejection(bench) -> None:
@@ -69,28 +69,28 @@ def test_server_exception_is_recorded_as_rejection(bench) -> None:
     bench.node.new_server("/sum", refuse, threads=1)
     bench.call()
     record = bench.end()
-    assert (record.state, record.sentence) == ("failed", "rejected: no face in sight")
+    assert (record.state, record.error) == ("failed", "rejected: no face in sight")
 
 
 def test_call_without_server_fails(bench) -> None:
     bench.call(timeout_s=0.1)
-    assert bench.end().sentence == "no server"
+    assert bench.end().error == "no server"
 
 
 def test_call_times_out_and_can_be_canceled(bench) -> None:
     go_on = threading.Event()
     bench.node.new_server("/sum", lambda _asked: go_on.wait(30), threads=2)
     bench.call(timeout_s=0.2)
-    assert bench.end().sentence == "no reply within 0.2 s"
+    assert bench.end().error == "no reply within 0.2 s"
     bench.call()
     with pytest.raises(NepError, match="Wait for the reply of /sum first"):
         bench.call()
     bench.now += 3
-    assert bench.calls.waited_s == 3
-    bench.calls.give_up()
+    assert bench.calls.elapsed_s == 3
+    bench.calls.cancel()
     last = bench.calls.records[-1]
-    assert (last.state, last.took_s) == ("canceled", 3)
-    assert bench.calls.waiting is None
+    assert (last.state, last.duration_s) == ("canceled", 3)
+    assert bench.calls.in_flight is None
     go_on.set()
 
 
@@ -99,7 +99,7 @@ def test_call_is_not_made_when_disarmed(bench) -> None:
     bench.node.new_server("/sum", asked.append, threads=1)
     bench.arming.disarm()
     bench.call()
-    assert bench.end().sentence == "not called: no longer armed"
+    assert bench.end().error == "not called: no longer armed"
     assert asked == []
 
 
@@ -111,7 +111,7 @@ def test_call_without_master_times_out_and_is_not_made_later(bench) -> None:
     assert bench.calls.tick() == []
     bench.now += 2.1
     (record,) = bench.calls.tick()
-    assert record.sentence == "no master was found within 2 s"
+    assert record.error == "no master was found within 2 s"
     (job,) = bench.waiting
     job(bench.node)
     assert bench.calls.tick() == []
@@ -122,7 +122,7 @@ def test_unencodable_request_fails_with_reason(bench) -> None:
     bench.call({"a": object()})
     record = bench.end()
     assert record.state == "failed"
-    assert record.sentence
+    assert record.error
 
 
 def test_call_history_and_stored_replies_are_bounded(bench) -> None:
@@ -130,12 +130,12 @@ def test_call_history_and_stored_replies_are_bounded(bench) -> None:
     bench.call()
     first = bench.end()
     bench.arming.disarm()
-    for _each in range(HISTORY_KEPT + 5):
+    for _each in range(MAX_RECORDS + 5):
         bench.call()
         bench.calls.tick()
     records = bench.calls.records
-    assert len(records) == HISTORY_KEPT
+    assert len(records) == MAX_RECORDS
     assert first.number not in {each.number for each in records}
-    assert sum(each.is_kept for each in records) == ANSWERS_KEPT
+    assert sum(each.is_kept for each in records) == MAX_REPLIES
     bench.calls.clear()
     assert list(bench.calls.records) == []

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from app.core.run.acting.json_text import MAX_LETTERS, JsonText, pretty, value_typed
+from app.core.run.acting.json_text import MAX_LENGTH, JsonText, format_json, parse_typed_value
 from nep.errors import NepError
 
 LINES = """{
@@ -32,8 +32,8 @@ def test_json_error_is_reported_with_its_position() -> None:
     fault = JsonText(LINES).fault
     assert fault is not None
     assert (fault.line, fault.column) == (4, 17)
-    assert fault.sentence.startswith("Line 4, column 17: ")
-    assert JsonText("x" * (MAX_LETTERS + 1)).fault is not None
+    assert fault.message.startswith("Line 4, column 17: ")
+    assert JsonText("x" * (MAX_LENGTH + 1)).fault is not None
 
 
 @pytest.mark.parametrize(
@@ -47,23 +47,23 @@ def test_json_error_is_reported_with_its_position() -> None:
     ],
 )
 def test_repaired_text_is_valid_json(text, value) -> None:
-    assert JsonText(fixed(text)).filled({"yaw": 2}) == value
+    assert JsonText(fixed(text)).fill({"yaw": 2}) == value
 
 
 def test_placeholders_are_filled_only_outside_strings() -> None:
     read = JsonText('{"say": "a {name}", "to": {name}, "yaw": { yaw }, "again": [{name}]}')
     assert read.fault is None
-    assert read.to_fill == ("name", "yaw")
-    made = read.filled({"name": 'Ai"ko', "yaw": -12.5})
+    assert read.manual_placeholders == ("name", "yaw")
+    made = read.fill({"name": 'Ai"ko', "yaw": -12.5})
     assert made == {"say": "a {name}", "to": 'Ai"ko', "yaw": -12.5, "again": ['Ai"ko']}
     with pytest.raises(NepError, match="Fill in “yaw” first"):
-        read.filled({"name": "Aiko"})
+        read.fill({"name": "Aiko"})
 
 
 def test_id_and_time_placeholders_get_new_values_each_time() -> None:
     read = JsonText('{"id": {new id}, "at": {now}}')
-    assert read.to_fill == ()
-    one, other = read.filled({}), read.filled({})
+    assert read.manual_placeholders == ()
+    one, other = read.fill({}), read.fill({})
     assert isinstance(one, dict)
     assert isinstance(other, dict)
     assert one["id"] != other["id"]
@@ -72,9 +72,9 @@ def test_id_and_time_placeholders_get_new_values_each_time() -> None:
 
 def test_number_is_rejected_as_object_key() -> None:
     read = JsonText("{{name}: 1}")
-    assert read.filled({"name": "x"}) == {"x": 1}
+    assert read.fill({"name": "x"}) == {"x": 1}
     with pytest.raises(NepError, match="column 2"):
-        read.filled({"name": 3})
+        read.fill({"name": 3})
 
 
 @pytest.mark.parametrize(
@@ -83,13 +83,13 @@ def test_number_is_rejected_as_object_key() -> None:
      ("0,2", 0.2), ('"0,2"', "0,2"), ("[1,2]", [1, 2]), ("1.234,5", "1.234,5"), ("007", "007"), ("+3", "+3")],
 )  # fmt: skip
 def test_typed_value_is_json_or_falls_back_to_text(text, value) -> None:
-    assert value_typed(text) == value
+    assert parse_typed_value(text) == value
 
 
 def test_truncated_json_is_reported_with_line_and_column() -> None:
     value = {"a": [1, -2.5e-3, True, None], "b": {"c": 'x "y" \\ {z}', "ü": "\n"}, "d": [], "e": {}}
-    text = pretty(value)
-    assert JsonText(text).filled({}) == json.loads(text) == value
+    text = format_json(value)
+    assert JsonText(text).fill({}) == json.loads(text) == value
     for place in range(len(text)):
         cut = text[:place]
         fault = JsonText(cut).fault
@@ -97,5 +97,5 @@ def test_truncated_json_is_reported_with_line_and_column() -> None:
         lines = cut.split("\n")
         assert 1 <= fault.line <= len(lines)
         assert 1 <= fault.column <= len(lines[fault.line - 1]) + 1
-        assert fault.sentence
+        assert fault.message
         JsonText(fixed(cut))

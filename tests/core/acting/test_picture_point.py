@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.run.acting.picture_point import TYPES, PicturePoint, topic_of
+from app.core.run.acting.picture_point import TYPES, PicturePoint, default_topic
 from nep.messages.codecs import codec_for
 
 POINT = PicturePoint(16, 8, 320, 240, 1_795_164_093_000_000_007, "middle")
@@ -22,8 +22,10 @@ def test_json_point_has_all_known_fields() -> None:
     }
     untimed = PicturePoint(0, 0, 1, 1, None)
     assert untimed.payload("/c", "json")["stamp"] is None
-    assert untimed.share == (0.5, 0.5)
-    assert PicturePoint(319, 239, 320, 240, None).share == pytest.approx((0.99844, 0.99792), abs=1e-5)
+    assert untimed.relative_position == (0.5, 0.5)
+    assert PicturePoint(319, 239, 320, 240, None).relative_position == pytest.approx(
+        (0.99844, 0.99792), abs=1e-5
+    )
 
 
 def test_ros_point_types_have_their_fields() -> None:
@@ -39,5 +41,5 @@ def test_ros_point_types_have_their_fields() -> None:
 
 
 def test_point_topic_is_below_picture_topic() -> None:
-    assert topic_of("/robot/camera") == "/robot/camera/point"
-    assert topic_of("camera/") == "camera/point"
+    assert default_topic("/robot/camera") == "/robot/camera/point"
+    assert default_topic("camera/") == "camera/point"

@@ -9,7 +9,7 @@ import pytest
 import nep
 from app.core.run.acting import sending
 from app.core.run.acting.arming import Arming, Target
-from app.core.run.acting.sending import MAX_AGE_S, MAX_CONCURRENT, Outbox, Repeated, SendOrder
+from app.core.run.acting.sending import MAX_AGE_S, MAX_CONCURRENT, Outbox, RepeatedMessage, SendOrder
 from nep.errors import NepError
 from nep.nodes.node import Node
 from tests.nep.programs import eventually
@@ -60,7 +60,7 @@ def test_message_is_sent_once_and_receivers_are_counted(bench) -> None:
     bench.outbox.send(order())
     assert heard.listen(timeout_s=5.0) == (True, {"x": 1})
     (result,) = bench.outbox.pop_results()
-    assert (result.kind, result.heard) == ("sent", 1)
+    assert (result.kind, result.subscriber_count) == ("sent", 1)
 
 
 def test_message_is_not_sent_when_disarmed(bench) -> None:
@@ -68,7 +68,7 @@ def test_message_is_not_sent_when_disarmed(bench) -> None:
     bench.outbox.send(order())
     bench.arm("/other")
     bench.outbox.send(order())
-    assert [(each.kind, each.sentence) for each in bench.outbox.pop_results()] == [
+    assert [(each.kind, each.message) for each in bench.outbox.pop_results()] == [
         ("failed", "not sent: no longer armed")
     ] * 2
     assert heard.receive(0.0) is None
@@ -86,7 +86,7 @@ def test_message_delayed_by_missing_master_is_not_sent_when_expired_or_disarmed(
     first(bench.node)
     bench.now += MAX_AGE_S + 1
     second(bench.node)
-    said = [each.sentence for each in bench.outbox.pop_results()]
+    said = [each.message for each in bench.outbox.pop_results()]
     assert said == ["not sent: no longer armed", "not sent: no master was running"]
     assert heard.receive(0.0) is None
 
@@ -97,21 +97,21 @@ def test_message_delayed_by_missing_master_is_not_sent_when_expired_or_disarmed(
 def test_invalid_message_fails_with_reason(bench, topic, msg_type, payload) -> None:
     bench.arm(topic)
     bench.outbox.send(order(topic, msg_type, payload))
-    bench.outbox.begin(order(topic, msg_type, payload), 10)
+    bench.outbox.start(order(topic, msg_type, payload), 10)
     results = bench.outbox.pop_results()
     assert [each.kind for each in results] == ["failed", "failed"]
-    assert all(each.sentence for each in results)
+    assert all(each.message for each in results)
     assert bench.outbox.all_repeated == ()
 
 
 def test_message_repeats_until_ended(bench) -> None:
     heard = bench.node.new_sub("/cmd_vel", "json")
     bench.arm("/cmd_vel")
-    assert bench.outbox.begin(order(), 50)
+    assert bench.outbox.start(order(), 50)
     for _each in range(3):
         assert heard.listen(timeout_s=20.0) == (True, {"x": 1})
-    bench.outbox.end("a")
-    assert not bench.outbox.is_going("a")
+    bench.outbox.stop("a")
+    assert not bench.outbox.is_sending("a")
     began, ended = bench.outbox.pop_results()
     assert (began.kind, ended.kind) == ("began", "ended")
     more = 0
@@ -123,9 +123,9 @@ def test_message_repeats_until_ended(bench) -> None:
 
 def test_disarming_ends_repetition_without_polling(bench) -> None:
     bench.arm("/cmd_vel")
-    bench.outbox.begin(order(), 50)
+    bench.outbox.start(order(), 50)
     bench.arming.disarm()
-    eventually(lambda: not bench.outbox.is_going("a"))
+    eventually(lambda: not bench.outbox.is_sending("a"))
     assert kinds(bench) == ["began", "ended"]
 
 
@@ -140,20 +140,20 @@ def test_repeated_message_that_raises_ends_and_others_continue(bench) -> None:
             raise NepError("Fill in “yaw” first.")
         return value
 
-    bench.outbox.begin(SendOrder("b", "Bad", "/bad", "json", once), 50)
-    bench.outbox.begin(order("/good", id="g"), 50)
-    eventually(lambda: not bench.outbox.is_going("b"))
+    bench.outbox.start(SendOrder("b", "Bad", "/bad", "json", once), 50)
+    bench.outbox.start(order("/good", id="g"), 50)
+    eventually(lambda: not bench.outbox.is_sending("b"))
     while heard.receive(0.0) is not None:
         pass
     assert heard.listen(timeout_s=20.0)[0]
     failed = next(each for each in bench.outbox.pop_results() if each.kind == "failed")
-    assert (failed.sentence, failed.count) == ("Fill in “yaw” first.", 1)
+    assert (failed.message, failed.count) == ("Fill in “yaw” first.", 1)
 
 
 def test_number_and_rate_of_repeated_messages_are_limited(bench) -> None:
     names = [f"/t{number}" for number in range(MAX_CONCURRENT + 1)]
     bench.arm(*names)
-    begun = [bench.outbox.begin(order(name, id=name), 1e-9) for name in names]
+    begun = [bench.outbox.start(order(name, id=name), 1e-9) for name in names]
     assert begun == [True] * MAX_CONCURRENT + [False]
     assert {each.rate_hz for each in bench.outbox.all_repeated} == {0.1}
 
@@ -161,7 +161,7 @@ def test_number_and_rate_of_repeated_messages_are_limited(bench) -> None:
 def test_late_repetition_skips_missed_sends_without_a_burst(bench, monkeypatch) -> None:
     now = [100.0]
     monkeypatch.setattr(sending.time, "monotonic", lambda: now[0])
-    each = Repeated(order(), 10.0, 1, None, None, 100.0, since_s=100.0)  # type: ignore[arg-type]
+    each = RepeatedMessage(order(), 10.0, 1, None, None, 100.0, since_s=100.0)  # type: ignore[arg-type]
     assert (Outbox._schedule_next(each), round(each.due_s, 6)) == (0, 100.1)
     now[0] = 100.55  # 100.1 is due; those of 100.2 to 100.5 have gone by
     assert Outbox._schedule_next(each) == 4

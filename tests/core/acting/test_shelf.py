@@ -10,15 +10,15 @@ from app.core.run.acting.sending import MAX_HZ
 from app.core.run.acting.shelf import (
     MAX_MESSAGES,
     MAX_REQUESTS,
-    KeptMessage,
     NewerShelfError,
+    SavedMessage,
     Shelf,
-    read_shelf,
-    shelf_text,
+    encode_shelf,
+    parse_shelf,
 )
 from nep.errors import NepError
 
-LOOK = KeptMessage("a", "Look at Aiko", "/robot_action", "json", '{"yaw": {yaw}}', (("yaw", "-12.5"),), 10.0)
+LOOK = SavedMessage("a", "Look at Aiko", "/robot_action", "json", '{"yaw": {yaw}}', (("yaw", "-12.5"),), 10.0)
 
 
 def test_kept_message_payload_is_built_from_its_values() -> None:
@@ -26,14 +26,14 @@ def test_kept_message_payload_is_built_from_its_values() -> None:
     assert LOOK.with_value("yaw", "left").payload() == {"yaw": "left"}
     with pytest.raises(NepError, match="Fill in “yaw” first"):
         LOOK.with_value("yaw", " ").payload()
-    assert KeptMessage("b", "Word", "/words", "string", "{yes").payload() == "{yes"
+    assert SavedMessage("b", "Word", "/words", "string", "{yes").payload() == "{yes"
 
 
 def test_shelf_survives_save_and_load() -> None:
-    shelf = Shelf([LOOK, KeptMessage("b", "Wörter\ud800", "/words", "string", "a\nb")])
-    shelf.remember("/sum", '{"a": 1}')
-    data = shelf_text(shelf)
-    read, unread = read_shelf(data)
+    shelf = Shelf([LOOK, SavedMessage("b", "Wörter\ud800", "/words", "string", "a\nb")])
+    shelf.set_request("/sum", '{"a": 1}')
+    data = encode_shelf(shelf)
+    read, unread = parse_shelf(data)
     assert unread == 0
     assert read.messages[0] == LOOK
     assert read.messages[1].text == "a\nb"
@@ -41,26 +41,26 @@ def test_shelf_survives_save_and_load() -> None:
 
 
 def test_copies_are_inserted_below_and_deleted_message_is_restored() -> None:
-    other = KeptMessage("b", "Stand still", "/cmd_vel")
+    other = SavedMessage("b", "Stand still", "/cmd_vel")
     shelf = Shelf([LOOK, other])
     made = shelf.copy("a")
     assert made is not None
     assert [each.name for each in shelf.messages] == ["Look at Aiko", "Look at Aiko 2", "Stand still"]
     assert shelf.remove("a") == LOOK
-    assert shelf.put_back() == LOOK
+    assert shelf.restore() == LOOK
     assert shelf.messages[0] == LOOK
-    assert shelf.put_back() is None
+    assert shelf.restore() is None
     assert shelf.remove("nobody") is None
 
 
 def test_shelf_is_bounded() -> None:
     shelf = Shelf()
-    kept = [shelf.put(KeptMessage(str(number), "", "/t")) for number in range(MAX_MESSAGES + 1)]
+    kept = [shelf.set_message(SavedMessage(str(number), "", "/t")) for number in range(MAX_MESSAGES + 1)]
     assert kept == [True] * MAX_MESSAGES + [False]
     assert shelf.copy("0") is None
-    assert shelf.put(KeptMessage("0", "other", "/t"))
+    assert shelf.set_message(SavedMessage("0", "other", "/t"))
     for number in range(MAX_REQUESTS + 5):
-        shelf.remember(f"/s{number}", "{}")
+        shelf.set_request(f"/s{number}", "{}")
     assert len(shelf.requests) == MAX_REQUESTS
     assert "/s0" not in shelf.requests
 
@@ -68,18 +68,18 @@ def test_shelf_is_bounded() -> None:
 @pytest.mark.parametrize("data", [b"", b"{", b"[]", b"\xff\xfe", b'{"messages": 3}', b"[" * 100_000])
 def test_invalid_shelf_file_is_rejected(data) -> None:
     with pytest.raises(NepError):
-        read_shelf(data)
+        parse_shelf(data)
 
 
 def test_shelf_of_newer_version_raises_its_own_error() -> None:
     with pytest.raises(NewerShelfError):
-        read_shelf(json.dumps({"format": 2, "messages": []}).encode())
+        parse_shelf(json.dumps({"format": 2, "messages": []}).encode())
 
 
 def test_damaged_messages_are_skipped_and_counted() -> None:
     good = {"id": "a", "name": "Stop", "topic": "/cmd_vel", "type": "json", "text": "{}", "values": {"x": 1}}
     told = [good, None, 3, {}, {**good, "id": 7}, {**good, "id": "b", "rate_hz": 1e308}, {**good, "id": ""}]
-    shelf, unread = read_shelf(json.dumps({"messages": told, "requests": {"/sum": 3}}).encode())
+    shelf, unread = parse_shelf(json.dumps({"messages": told, "requests": {"/sum": 3}}).encode())
     assert [each.id for each in shelf.messages] == ["a", "b"]
     assert unread == 5
     assert shelf.messages[0].values == ()

@@ -20,7 +20,7 @@ def beside() -> Iterator[BackgroundWorker[str]]:
 
 def test_result_is_taken_once(beside) -> None:
     found: list[str | None] = []
-    beside.ask("a", lambda: threading.current_thread().name)
+    beside.submit("a", lambda: threading.current_thread().name)
     until(lambda: bool(found.append(beside.pop_result("a")) or found[-1]))
     assert found[-1] == "test beside"
     assert beside.pop_result("a") is None
@@ -33,10 +33,10 @@ def test_only_newest_pending_job_runs(beside) -> None:
         go.wait(10)
         return "slow"
 
-    beside.ask("a", slow)
+    beside.submit("a", slow)
     until(lambda: not beside._pending)
     for number in range(5):
-        beside.ask("b", lambda number=number: did.append(number) or str(number))
+        beside.submit("b", lambda number=number: did.append(number) or str(number))
     go.set()
     until(lambda: did == [4])
     until(lambda: beside.pop_result("b") == "4")
@@ -47,35 +47,35 @@ def test_job_failure_is_raised_on_take_and_next_job_runs(beside) -> None:
     def fail() -> str:
         raise ValueError("no such luck")
 
-    beside.ask("a", fail)
+    beside.submit("a", fail)
     until(lambda: bool(beside._failed))
     with pytest.raises(ValueError, match="no such luck"):
         beside.pop_result("a")
-    beside.ask("a", lambda: "well")
+    beside.submit("a", lambda: "well")
     until(lambda: beside.pop_result("a") == "well")
 
 
 def test_close_ends_thread_and_drops_pending_jobs(beside) -> None:
-    beside.ask("a", lambda: "x")
+    beside.submit("a", lambda: "x")
     until(lambda: beside.pop_result("a") == "x")
     beside.close()
-    beside.ask("a", lambda: "y")
+    beside.submit("a", lambda: "y")
     assert beside.pop_result("a") is None
     assert not any(thread.name == "test beside" for thread in threading.enumerate())
 
 
 def test_no_thread_is_started_without_jobs() -> None:
     beside: BackgroundWorker[str] = BackgroundWorker("never")
-    beside.forget("a")
+    beside.discard("a")
     beside.close()
     assert beside._thread is None
 
 
 def test_finish_waits_for_pending_and_running_jobs_of_owner(beside, monkeypatch) -> None:
     go, did = threading.Event(), []
-    beside.ask("a", lambda: (go.wait(60) and did.append("first")) or "first")
+    beside.submit("a", lambda: (go.wait(60) and did.append("first")) or "first")
     until(lambda: beside._current_owner == "a")
-    beside.ask("a", lambda: did.append("second") or "second")
+    beside.submit("a", lambda: did.append("second") or "second")
     assert beside.finish("b"), "nothing of another is waited for"
     monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 0.01)
     assert not beside.finish("a"), "and not for ever"
@@ -90,8 +90,8 @@ def test_failure_is_cleared_by_next_success(beside) -> None:
     def fail() -> str:
         raise ValueError("no such luck")
 
-    beside.ask("a", fail)
+    beside.submit("a", fail)
     assert beside.finish("a")
-    beside.ask("a", lambda: "well")
+    beside.submit("a", lambda: "well")
     assert beside.finish("a")
     assert beside.pop_result("a") == "well"

@@ -30,8 +30,8 @@ def deep(levels: int) -> dict[str, object]:
 
 def test_backpack_is_restored_at_next_start_newest_first(tmp_path: Path) -> None:
     first = Backpack(tmp_path)
-    first.put([WAIT])
-    first.put([SAY, deep(600)])
+    first.add([WAIT])
+    first.add([SAY, deep(600)])
     again = Backpack(tmp_path)
     again.reload_if_changed()
     assert types(again) == ["robot_pepper_do_say", "control_wait", "control_wait"]
@@ -41,15 +41,15 @@ def test_backpack_is_restored_at_next_start_newest_first(tmp_path: Path) -> None
 
 def test_two_studios_share_backpack_without_loss(tmp_path: Path) -> None:
     one, other = Backpack(tmp_path), Backpack(tmp_path)
-    one.put([WAIT])
-    other.put([SAY])  # has not looked since
+    one.add([WAIT])
+    other.add([SAY])  # has not looked since
     one.reload_if_changed()
     assert types(one) == types(other) == ["robot_pepper_do_say", "control_wait"]
     before = one.revision
     one.reload_if_changed()
     assert one.revision == before
     (gone,) = one.remove([item.id for item in one.items if item.block["type"] == "control_wait"])
-    other.put([deep(1)])
+    other.add([deep(1)])
     assert types(other) == ["control_wait", "robot_pepper_do_say"]
     one.restore([gone])
     assert types(one) == ["control_wait", "robot_pepper_do_say", "control_wait"], "where it was"
@@ -58,7 +58,7 @@ def test_two_studios_share_backpack_without_loss(tmp_path: Path) -> None:
 
 def test_emptied_backpack_can_be_restored(tmp_path: Path) -> None:
     backpack = Backpack(tmp_path)
-    backpack.put([WAIT, SAY])
+    backpack.add([WAIT, SAY])
     gone = backpack.empty()
     assert (types(backpack), len(gone)) == ([], 2)
     backpack.restore(gone)
@@ -77,9 +77,9 @@ def test_invalid_backpack_file_is_set_aside_and_reported_once(tmp_path: Path, co
     kept = tmp_path / "backpack.damaged-2.json"
     assert kept.read_bytes() == content
     assert (tmp_path / "backpack.damaged.json").read_text() == "an earlier one"
-    assert str(kept) in backpack.take_trouble()
-    assert backpack.take_trouble() == ""
-    backpack.put([WAIT])
+    assert str(kept) in backpack.take_problem()
+    assert backpack.take_problem() == ""
+    backpack.add([WAIT])
     assert types(backpack) == ["control_wait"]
 
 
@@ -95,11 +95,11 @@ def test_unknown_backpack_items_are_counted_and_preserved(tmp_path: Path) -> Non
     backpack = Backpack(tmp_path)
     backpack.reload_if_changed()
     assert types(backpack) == ["control_wait"]
-    assert "4 items" in backpack.take_trouble()
-    backpack.put([SAY])
+    assert "4 items" in backpack.take_problem()
+    backpack.add([SAY])
     backpack.empty()
     assert json.loads((tmp_path / "backpack.json").read_text())["items"] == strange
-    assert backpack.take_trouble() == ""
+    assert backpack.take_problem() == ""
 
 
 def test_backpack_limits_reject_new_items_without_loss(
@@ -108,11 +108,11 @@ def test_backpack_limits_reject_new_items_without_loss(
     monkeypatch.setattr(module, "MAX_STACKS", 3)
     monkeypatch.setattr(module, "MAX_BYTES", 2000)
     backpack = Backpack(tmp_path)
-    backpack.put([WAIT, WAIT])
+    backpack.add([WAIT, WAIT])
     with pytest.raises(BackpackError, match="remove something first"):
-        backpack.put([SAY, SAY])
+        backpack.add([SAY, SAY])
     with pytest.raises(BackpackError, match="at most 0 MB"):
-        backpack.put([{"type": "x" * 3000}])
+        backpack.add([{"type": "x" * 3000}])
     assert types(backpack) == ["control_wait"] * 2
     again = Backpack(tmp_path)
     again.reload_if_changed()
@@ -126,19 +126,19 @@ def test_unreadable_or_unwritable_backpack_is_left_unchanged(tmp_path: Path) -> 
     (tmp_path / "backpack.json").mkdir()
     backpack = Backpack(tmp_path)
     backpack.reload_if_changed()
-    assert "can't read " in backpack.take_trouble()
+    assert "can't read " in backpack.take_problem()
     with pytest.raises(BackpackError, match="can't read "):
-        backpack.put([WAIT])
+        backpack.add([WAIT])
     (tmp_path / "backpack.json").rmdir()
     (tmp_path / "file").write_text("")
     with pytest.raises(BackpackError, match="can't save "):
-        Backpack(tmp_path / "file").put([WAIT])
+        Backpack(tmp_path / "file").add([WAIT])
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes are POSIX's")
 def test_backpack_file_is_private_to_its_owner(tmp_path: Path) -> None:
     backpack = Backpack(tmp_path)
-    backpack.put([WAIT])
+    backpack.add([WAIT])
     assert backpack.path.stat().st_mode & 0o077 == 0
 
 
@@ -146,6 +146,6 @@ def test_long_held_lock_does_not_block_backpack(tmp_path: Path) -> None:
     lock = FileLock(tmp_path / "backpack.json")
     assert lock.acquire()
     backpack = Backpack(tmp_path)
-    backpack.put([WAIT])
+    backpack.add([WAIT])
     lock.release()
     assert types(backpack) == ["control_wait"]

@@ -14,7 +14,7 @@ import pytest
 from app import resources
 from app.core.documents.document import Document
 from app.core.documents.file_format import BehaviourFile, parse_file, read_file, write_file
-from app.core.documents.journal import Journal, left_behind
+from app.core.documents.journal import Journal, unsaved_work
 from app.errors import DocumentError
 
 ROOT = Path(__file__).parents[3]
@@ -61,7 +61,7 @@ def test_full_disk_keeps_old_file_and_unsaved_work(tmp_path: Path) -> None:
     assert told["dirty"] is True
     assert path.read_bytes() == before
     assert [each.name for each in tmp_path.iterdir() if each.suffix == ".part"] == [], "no half file is left"
-    (left,) = left_behind(tmp_path / "journal")
+    (left,) = unsaved_work(tmp_path / "journal")
     assert "x" * 200000 in json.dumps(left.workspace), "the journal has the work of before the limit"
 
 
@@ -155,6 +155,6 @@ def test_file_is_intact_after_100_kills_while_saving(tmp_path: Path) -> None:
     assert path.stat().st_size > 0
     journals = list((tmp_path / "journal").glob("*.json"))
     assert journals, "some died between an edit and its save"
-    left = left_behind(tmp_path / "journal")
+    left = unsaved_work(tmp_path / "journal")
     assert {each.journal for each in left} == set(journals), "a journal is whole, too"
     assert all(each.workspace["blocks"] for each in left)

@@ -37,11 +37,11 @@ def test_shadow_text_change_counts_as_changed_block() -> None:
 
 def test_reordered_blocks_are_reported_as_moved() -> None:
     then, now = stack(block("a", "", block("b"))), stack(block("b", "", block("a")))
-    assert difference(then, now) == Difference(2, moved=True)
+    assert difference(then, now) == Difference(2, is_rearranged=True)
 
 
 def test_invalid_workspace_can_be_compared() -> None:
-    assert difference({}, {"blocks": 7}) == Difference(0, moved=True)
+    assert difference({}, {"blocks": 7}) == Difference(0, is_rearranged=True)
 
 
 def test_very_long_stack_can_be_compared() -> None:

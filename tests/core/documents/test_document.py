@@ -13,8 +13,8 @@ import pytest
 
 from app.core.documents import file_format
 from app.core.documents.background_worker import BackgroundWorker
-from app.core.documents.document import Compiled, Document, read
-from app.core.documents.journal import Journal, left_behind
+from app.core.documents.document import CompiledProgram, Document, read
+from app.core.documents.journal import Journal, unsaved_work
 from app.core.storage.atomic_file import MAX_BYTES
 from app.errors import DocumentError
 from app.robots import rize
@@ -77,14 +77,14 @@ def test_slow_disk_does_not_block_and_newest_edit_is_journalled(
     on_a_slow_disk: Document, slow: SlowJournal, journals: Path
 ) -> None:
     document = on_a_slow_disk
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     assert slow.began.wait(60)
     for number in range(5):
-        document.edited(_many(number + 1))
+        document.apply_edit(_many(number + 1))
     assert document.edits == 6
     assert not list(journals.glob("*.json")), "and yet nothing is there"
     slow.goes.set()
-    assert document.is_kept
+    assert document.is_on_disk
     (file,) = journals.glob("*.json")
     assert json.loads(file.read_bytes())["workspace"] == _many(5)
     assert slow.wrote == 2, "what is outdated is not written"
@@ -103,7 +103,7 @@ def test_work_discarded_during_journal_write_does_not_reappear(
     monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 60.0)
     document = on_a_slow_disk
     document.path = tmp_path / "mine.nepb"
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     assert slow.began.wait(60)
     document.dirty = False
     threading.Timer(0.05, slow.goes.set).start()
@@ -116,18 +116,18 @@ def test_hanging_disk_is_reported_when_the_window_closes(
     on_a_slow_disk: Document, slow: SlowJournal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.core.documents.background_worker.JOIN_TIMEOUT_S", 0.01)
-    on_a_slow_disk.edited(STARTED)
+    on_a_slow_disk.apply_edit(STARTED)
     assert slow.began.wait(60)
-    assert not on_a_slow_disk.keep_again()
+    assert not on_a_slow_disk.retry_journal()
     slow.goes.set()
-    assert on_a_slow_disk.keep_again()
+    assert on_a_slow_disk.retry_journal()
 
 
 def test_old_journal_is_kept_while_new_one_cannot_be_written(document: Document, journals: Path) -> None:
-    document.edited(STARTED)
-    assert document.is_kept
+    document.apply_edit(STARTED)
+    assert document.is_on_disk
     _as_if_dead(journals)
-    (unsaved,) = left_behind(journals)
+    (unsaved,) = unsaved_work(journals)
     full = journals.parent / "full"
     full.write_text("no folder")
     after = Document(lambda: Journal(full))
@@ -144,24 +144,24 @@ def _as_if_dead(journals: Path) -> None:
 
 
 def test_edit_is_journalled(document: Document, journals: Path) -> None:
-    document.edited(STARTED)
-    assert document.is_kept
+    document.apply_edit(STARTED)
+    assert document.is_on_disk
     (file,) = journals.glob("*.json")
     assert json.loads(file.read_bytes())["workspace"] == STARTED
     assert document.dirty
 
 
 def test_identical_blocks_are_not_an_edit(document: Document) -> None:
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     edits = document.edits
-    document.edited(json.loads(json.dumps(STARTED)))
+    document.apply_edit(json.loads(json.dumps(STARTED)))
     assert document.edits == edits
 
 
 def test_saved_behaviour_reopens_unchanged_and_its_journal_is_deleted(
     document: Document, journals: Path, tmp_path: Path
 ) -> None:
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     path = tmp_path / "Grüße.nepb"
     document.save(path)
     assert not document.dirty
@@ -179,7 +179,7 @@ def test_save_without_file_explains_what_to_do(document: Document) -> None:
 def test_failed_save_keeps_document_dirty_and_journalled(
     document: Document, journals: Path, tmp_path: Path
 ) -> None:
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     (tmp_path / "folder.nepb").mkdir()
     with pytest.raises(DocumentError, match="save it in another folder"):
         document.save(tmp_path / "folder.nepb")
@@ -203,7 +203,7 @@ def test_failed_save_keeps_document_dirty_and_journalled(
 def test_invalid_file_is_rejected_with_reason_and_changes_nothing(
     document: Document, tmp_path: Path, data: bytes, reason: str
 ) -> None:
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     path = tmp_path / "bad.nepb"
     path.write_bytes(data)
     with pytest.raises(DocumentError, match=reason):
@@ -212,7 +212,7 @@ def test_invalid_file_is_rejected_with_reason_and_changes_nothing(
 
 
 def test_truncated_file_opens_completely_or_not_at_all(document: Document, tmp_path: Path) -> None:
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     path = tmp_path / "a.nepb"
     document.save(path)
     whole = path.read_bytes()
@@ -232,7 +232,7 @@ def test_oversized_file_is_rejected_without_reading(document: Document, tmp_path
 
 def test_behaviour_too_large_to_reopen_is_not_saved(document: Document, tmp_path: Path) -> None:
     path = tmp_path / "large.nepb"
-    document.edited({"blocks": {"x": "y" * MAX_BYTES}})
+    document.apply_edit({"blocks": {"x": "y" * MAX_BYTES}})
     with pytest.raises(DocumentError, match="at most 10 MB can be read; use smaller images"):
         document.save(path)
     assert not path.exists()
@@ -245,16 +245,16 @@ def test_stack_too_long_for_json_is_rejected_with_reason_and_stays_open(
     for number in range(6000):
         block = {"type": "control_wait", "id": str(number), "next": {"block": block}}
     stack = {"blocks": {"languageVersion": 0, "blocks": [block]}}
-    document.edited(stack)
+    document.apply_edit(stack)
     assert document.workspace is stack
     until(lambda: document.journal_error is not None)
-    assert not document.is_kept
+    assert not document.is_on_disk
     assert document.journal_error is not None
     assert "split it into several scripts" in document.journal_error
     with pytest.raises(DocumentError, match="split it into several scripts"):
         document.save(tmp_path / "long.nepb")
-    document.edited(STARTED)
-    assert document.is_kept
+    document.apply_edit(STARTED)
+    assert document.is_on_disk
     assert document.journal_error is None
 
 
@@ -264,11 +264,11 @@ def test_missing_file_is_rejected_with_reason(document: Document, tmp_path: Path
 
 
 def test_example_opens_without_its_file_path(document: Document, tmp_path: Path) -> None:
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     path = tmp_path / "Example.nepb"
     document.save(path)
     document.new()
-    document.example(path)
+    document.open_example(path)
     assert document.path is None
     assert document.workspace == STARTED
     assert not document.dirty
@@ -276,10 +276,10 @@ def test_example_opens_without_its_file_path(document: Document, tmp_path: Path)
 
 def test_recovered_work_stays_journalled(document: Document, journals: Path) -> None:
     document.others = {"description": "what it does"}
-    document.edited(STARTED)
-    assert document.is_kept
+    document.apply_edit(STARTED)
+    assert document.is_on_disk
     _as_if_dead(journals)
-    (unsaved,) = left_behind(journals)
+    (unsaved,) = unsaved_work(journals)
     after = Document(lambda: Journal(journals))
     after.recover(unsaved)
     assert after.workspace == STARTED
@@ -292,7 +292,7 @@ def test_recovered_work_stays_journalled(document: Document, journals: Path) -> 
 def test_close_keeps_journal_of_unsaved_work_only(document: Document, journals: Path) -> None:
     document.close()
     assert list(journals.glob("*")) == []
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     document.close()
     assert len(list(journals.glob("*.json"))) == 1
 
@@ -300,7 +300,7 @@ def test_close_keeps_journal_of_unsaved_work_only(document: Document, journals: 
 def test_unwritable_journal_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     document = Document(lambda: Journal(tmp_path / "file"))
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     assert document.journal_error is not None
     assert "save the file now" in document.journal_error
 
@@ -309,10 +309,10 @@ def test_failed_journal_write_is_retried_successfully(tmp_path: Path) -> None:
     folder = tmp_path / "full"
     folder.write_text("no folder")
     document = Document(lambda: Journal(folder))
-    document.edited(STARTED)
-    assert not document.keep_again()
+    document.apply_edit(STARTED)
+    assert not document.retry_journal()
     folder.unlink()
-    assert document.keep_again()
+    assert document.retry_journal()
     assert document.journal_error is None
     (file,) = folder.glob("*.json")
     assert json.loads(file.read_bytes())["workspace"] == STARTED
@@ -321,12 +321,12 @@ def test_failed_journal_write_is_retried_successfully(tmp_path: Path) -> None:
 def test_journal_error_is_cleared_after_save(tmp_path: Path) -> None:
     (tmp_path / "full").write_text("no folder")
     document = Document(lambda: Journal(tmp_path / "full"))
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     assert document.journal_error is not None
     document.save(tmp_path / "Mine.nepb")
     assert document.journal_error is None
-    assert document.keep_again()
-    document.edited(EMPTY)
+    assert document.retry_journal()
+    document.apply_edit(EMPTY)
     assert document.journal_error is not None
     document.new()
     assert document.journal_error is None
@@ -346,7 +346,7 @@ def test_free_space_advice_appears_only_for_full_disk(
     def refuse(*_given: object, **_named: object) -> None:
         raise OSError(number, os.strerror(number))
 
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     monkeypatch.setattr(file_format, "write_atomically", refuse)
     with pytest.raises(DocumentError) as raised:
         document.save(tmp_path / "Mine.nepb")
@@ -357,14 +357,14 @@ def test_file_includes_descriptions_of_robots_used_by_its_blocks(document: Docum
     pepper, other = rize.robot("Pepper"), rize.robot("Other")
     block = {"type": "robot_rize_do_say", "id": "b", "fields": {"ROBOT": "Pepper"}}
     document.set_connected([pepper, other])
-    document.edited({"blocks": {"blocks": [block]}})
+    document.apply_edit({"blocks": {"blocks": [block]}})
     document.save(tmp_path / "a.nepb")
     assert list(document.robots) == ["Pepper"]
     document.set_connected([])
-    assert [robot.name for robot in document.absent] == ["Pepper"]
+    assert [robot.name for robot in document.absent_robots] == ["Pepper"]
     later = Document(lambda: Journal(tmp_path / "other"))
     later.open(tmp_path / "a.nepb")
-    assert [robot.name for robot in later.absent] == ["Pepper"]
+    assert [robot.name for robot in later.absent_robots] == ["Pepper"]
 
 
 def test_robot_description_is_parsed_once_until_it_changes(
@@ -373,34 +373,34 @@ def test_robot_description_is_parsed_once_until_it_changes(
     pepper = rize.robot("Pepper")
     block = {"type": "robot_rize_do_say", "id": "b", "fields": {"ROBOT": "Pepper"}}
     document.set_connected([pepper])
-    document.edited({"blocks": {"blocks": [block]}})
+    document.apply_edit({"blocks": {"blocks": [block]}})
     document.set_connected([])
-    assert [robot.name for robot in document.absent] == ["Pepper"]
+    assert [robot.name for robot in document.absent_robots] == ["Pepper"]
     with monkeypatch.context() as patched:
         patched.setattr("app.core.documents.document.parse", None)  # reading it now would fail
-        document.edited({"blocks": {"blocks": [{**block, "x": 9}]}})
-        assert [robot.name for robot in document.absent] == ["Pepper"]
+        document.apply_edit({"blocks": {"blocks": [{**block, "x": 9}]}})
+        assert [robot.name for robot in document.absent_robots] == ["Pepper"]
     document.robots["Pepper"] = {**pepper.source, "title": "Salt"}
-    assert [robot.name for robot in document.absent] == ["Salt"]
+    assert [robot.name for robot in document.absent_robots] == ["Salt"]
     deep: dict[str, object] = {}
     for _level in range(100_000):
         deep = {"deep": deep}
     document.robots["Pepper"] = deep
-    assert document.absent == ()
+    assert document.absent_robots == ()
     document.robots["Pepper"] = {"deep": deep}
-    assert document.absent == ()
+    assert document.absent_robots == ()
     while deep:  # from the outside: Python takes such a thing apart in levels, too
         deep = deep.popitem()[1]  # type: ignore[assignment]
 
 
 def test_program_is_compiled_once_per_edit_and_robot_change(document: Document) -> None:
-    document.edited(STARTED)
+    document.apply_edit(STARTED)
     first = document.program()
     assert document.program() is first
     document.set_connected([rize.robot("Pepper")])
     second = document.program()
     assert second is not first
-    document.edited(EMPTY)
+    document.apply_edit(EMPTY)
     assert document.program() is not second
 
 
@@ -419,25 +419,25 @@ def _many(count: int) -> dict[str, object]:
 
 
 def test_long_behaviour_is_compiled_in_background(document: Document) -> None:
-    compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
+    compiler: BackgroundWorker[CompiledProgram] = BackgroundWorker("test compiler")
     document.compiler = compiler
-    document.edited(_many(800))
-    assert document.newest() is None, "nothing waits for it"
-    until(lambda: document.newest() is not None)
-    first = document.newest()
+    document.apply_edit(_many(800))
+    assert document.newest_program() is None, "nothing waits for it"
+    until(lambda: document.newest_program() is not None)
+    first = document.newest_program()
     document._compile_s = 1.0
-    document.edited(_many(801))
-    assert document.newest() is first, "the one before, meanwhile"
-    until(lambda: document.newest() is not first)
-    assert document.newest() is document.program()
+    document.apply_edit(_many(801))
+    assert document.newest_program() is first, "the one before, meanwhile"
+    until(lambda: document.newest_program() is not first)
+    assert document.newest_program() is document.program()
     compiler.close()
 
 
 def test_short_behaviour_is_compiled_at_once(document: Document) -> None:
-    compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
+    compiler: BackgroundWorker[CompiledProgram] = BackgroundWorker("test compiler")
     document.compiler = compiler
-    document.edited(STARTED)
-    assert document.newest() is document.program()
+    document.apply_edit(STARTED)
+    assert document.newest_program() is document.program()
     assert compiler._thread is None
 
 
@@ -445,13 +445,13 @@ def test_long_file_opened_in_untouched_tab_does_not_block_the_window(
     document: Document, tmp_path: Path
 ) -> None:
     other = Document(lambda: Journal(tmp_path / "other"))
-    other.edited(_many(800))
+    other.apply_edit(_many(800))
     other.save(tmp_path / "long.nepb")
-    compiler: BackgroundWorker[Compiled] = BackgroundWorker("test compiler")
+    compiler: BackgroundWorker[CompiledProgram] = BackgroundWorker("test compiler")
     document.compiler = compiler
-    assert document.newest() is not None, "an empty one is compiled at once"
+    assert document.newest_program() is not None, "an empty one is compiled at once"
     document.open(tmp_path / "long.nepb")
-    before = document.newest()
-    until(lambda: document.newest() is not before)
-    assert document.newest() is document.program()
+    before = document.newest_program()
+    until(lambda: document.newest_program() is not before)
+    assert document.newest_program() is document.program()
     compiler.close()

@@ -30,7 +30,7 @@ def locale(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from tools import words
 
     folder = tmp_path_factory.mktemp("locale")
-    shutil.copytree(words.LOCALE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.mo"))
+    shutil.copytree(words.LOCALE_FOLDER, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("*.mo"))
     words.compile_all(folder)
     return folder
 
@@ -83,9 +83,9 @@ def test_example_compiles_in_another_language(path: Path, language: str) -> None
     assert len(set(texts(example))) == len(set(texts(english))), "what differs still differs"
     assert len(set(names(example))) == len(names(english))
     assert example.name != english.name
-    assert example.others["description"] != english.others["description"]
+    assert example.unknown_fields["description"] != english.unknown_fields["description"]
     if language == i18n.PSEUDO:
-        said = [example.name, str(example.others["description"]), *texts(example), *names(example)]
+        said = [example.name, str(example.unknown_fields["description"]), *texts(example), *names(example)]
         assert [untranslated(each) for each in said if untranslated(each)] == []
 
 
@@ -106,7 +106,7 @@ def test_translatable_example_texts_are_not_published_or_compared_with_data(path
 def run(name: str, link: FakeLink) -> Play:
     (path,) = [path for path in EXAMPLES if path.stem == name]
     document = Document(Journal)
-    document.example(path)
+    document.open_example(path)
     pepper = parse(document.robots["Pepper"])
     document.set_connected([pepper])
     return Play(document.program(), (pepper,), link).start()
@@ -165,8 +165,8 @@ def test_user_file_is_never_translated(language: str, tmp_path: Path) -> None:
     for opened in (documents.open(own), documents.copy(own, "Greeting, before")):
         assert opened.name.startswith("Greeting")
         assert opened.workspace == read_file(own).workspace
-    assert documents.example(EXAMPLES[0]).name == "Saludo"
-    documents.end()
+    assert documents.open_example(EXAMPLES[0]).name == "Saludo"
+    documents.close_all()
 
 
 def test_translation_keeps_distinct_names_distinct() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.documents.journal import Journal, left_behind
+from app.core.documents.journal import Journal, unsaved_work
 
 WORKSPACE: dict[str, object] = {"blocks": {"blocks": [{"type": "events_started", "id": "é\ud800"}]}}
 TEXT = json.dumps(WORKSPACE, ensure_ascii=False)
@@ -31,14 +31,14 @@ def _killed_writer(folder: Path) -> None:
 def test_unsaved_work_of_running_process_is_not_offered(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.write("Greeting", None, TEXT, {})
-    assert left_behind(tmp_path) == []
+    assert unsaved_work(tmp_path) == []
     journal.discard()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_unsaved_work_of_killed_process_is_offered(tmp_path: Path) -> None:
     _killed_writer(tmp_path)
-    (unsaved,) = left_behind(tmp_path)
+    (unsaved,) = unsaved_work(tmp_path)
     assert unsaved.name == "Greeting"
     assert unsaved.path == Path("/a/greeting.nepb")
     assert unsaved.workspace == {"blocks": 1}
@@ -65,7 +65,7 @@ def test_unsaved_work_is_offered_when_its_pid_was_reused(tmp_path: Path) -> None
     entry = json.loads(file.read_bytes())
     entry["born_s"] -= 1000
     file.write_text(json.dumps(entry))
-    (unsaved,) = left_behind(tmp_path)
+    (unsaved,) = unsaved_work(tmp_path)
     assert unsaved.workspace == WORKSPACE
 
 
@@ -73,12 +73,12 @@ def test_damaged_journal_is_skipped_and_kept(tmp_path: Path) -> None:
     _killed_writer(tmp_path)
     (good,) = tmp_path.glob("*.json")
     (tmp_path / "bad.json").write_bytes(good.read_bytes()[:40])
-    assert len(left_behind(tmp_path)) == 1
+    assert len(unsaved_work(tmp_path)) == 1
     assert (tmp_path / "bad.json").exists()
 
 
 def test_missing_journal_folder_has_no_unsaved_work(tmp_path: Path) -> None:
-    assert left_behind(tmp_path / "none") == []
+    assert unsaved_work(tmp_path / "none") == []
 
 
 def test_unwritable_journal_folder_raises_on_write_only(tmp_path: Path) -> None:
@@ -87,4 +87,4 @@ def test_unwritable_journal_folder_raises_on_write_only(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"[Nn]ot a directory|cannot find|exists"):
         journal.write("a", None, "{}", {})
     journal.discard()
-    assert left_behind(tmp_path / "file" / "journal") == []
+    assert unsaved_work(tmp_path / "file" / "journal") == []

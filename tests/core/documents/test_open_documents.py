@@ -10,8 +10,8 @@ import pytest
 
 from app.core.documents.document import Document
 from app.core.documents.file_format import BehaviourFile, write_file
-from app.core.documents.journal import Journal, left_behind
-from app.core.documents.open_documents import CLOSED_KEPT, Documents
+from app.core.documents.journal import Journal, unsaved_work
+from app.core.documents.open_documents import MAX_CLOSED, Documents
 from app.errors import DocumentError
 from app.robots import rize
 
@@ -45,7 +45,7 @@ def opened(journals: Path) -> Iterator[Opens]:
     made = Opens(journals)
     yield made
     for each in made.all:
-        each.end()
+        each.close_all()
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def documents(opened: Opens) -> Documents:
 
 def all_kept(documents: Documents) -> bool:
     """Waits for the journals."""
-    return all(document.is_kept for document in documents)
+    return all(document.is_on_disk for document in documents)
 
 
 def file(folder: Path, name: str, blocks: dict[str, object] = STARTED) -> Path:
@@ -107,9 +107,9 @@ def test_invalid_file_changes_no_tab(documents, tmp_path) -> None:
 def test_new_behaviours_have_unique_names(documents) -> None:
     first = documents.new()
     assert documents.new() is first, "an untouched one is taken as it is"
-    documents.current.edited(STARTED)
+    documents.current.apply_edit(STARTED)
     documents.new()
-    documents.current.edited(STARTED)
+    documents.current.apply_edit(STARTED)
     documents.new()
     assert names(documents) == ["New behaviour", "New behaviour 2", "New behaviour 3"]
     assert len({document.key for document in documents}) == 3
@@ -119,11 +119,11 @@ def test_each_tab_has_its_own_blocks_journal_and_dirty_state(documents, journals
     documents.open(file(tmp_path, "A"))
     documents.open(file(tmp_path, "B"))
     first, second = documents
-    first.edited(OTHER)
+    first.apply_edit(OTHER)
     assert (first.dirty, second.dirty) == (True, False)
     assert (first.workspace, second.workspace) == (OTHER, STARTED)
     assert all_kept(documents)
-    assert [journal.name for journal in journals.glob("*.json")] == [first.journal]
+    assert [journal.name for journal in journals.glob("*.json")] == [first.journal_name]
 
 
 def test_tab_navigation_wraps_around_and_tabs_can_be_moved(documents, tmp_path) -> None:
@@ -139,13 +139,13 @@ def test_tab_navigation_wraps_around_and_tabs_can_be_moved(documents, tmp_path) 
 def test_close_shows_next_tab_and_last_close_opens_empty_behaviour(documents, tmp_path) -> None:
     for name in "ABC":
         documents.open(file(tmp_path, name))
-    documents.show(documents.with_path(tmp_path / "B.nepb"))
+    documents.show(documents.find_by_path(tmp_path / "B.nepb"))
     documents.close(documents.current)
     assert documents.current.name == "C"
     documents.close(documents.current)
     documents.close(documents.current)
     assert names(documents) == ["New behaviour"]
-    assert documents.current.blank
+    assert documents.current.is_blank
 
 
 def test_closed_tabs_reopen_newest_first(documents, tmp_path) -> None:
@@ -164,10 +164,10 @@ def test_save_over_file_of_another_tab_keeps_that_tab_as_unsaved(documents, jour
     first = documents.open(path)
     documents.open(file(tmp_path, "B", OTHER))
     documents.current.save(path)
-    documents.saved(documents.current)
+    documents.on_saved(documents.current)
     assert (first.path, first.dirty, first.workspace) == (None, True, STARTED)
     assert all_kept(documents)
-    assert (journals / first.journal).is_file()
+    assert (journals / first.journal_name).is_file()
 
 
 def test_every_tab_knows_connected_robots_including_later_tabs(documents, tmp_path) -> None:
@@ -185,14 +185,14 @@ def test_tabs_are_restored_with_unsaved_work(opened, documents, journals, tmp_pa
     for name in "AB":
         documents.open(file(tmp_path, name))
     documents.show(next(iter(documents)))
-    documents.current.edited(OTHER)
+    documents.current.apply_edit(OTHER)
     documents.new()
-    documents.current.edited(STARTED)
-    kept = json.loads(json.dumps(documents.kept()))
-    documents.end()
+    documents.current.apply_edit(STARTED)
+    kept = json.loads(json.dumps(documents.tabs_state()))
+    documents.close_all()
     as_if_dead(journals)
     after = opened()
-    taken = after.put_back(kept, left_behind(journals), ended_well=True)
+    taken = after.restore_tabs(kept, unsaved_work(journals), ended_well=True)
     assert names(after) == ["A", "New behaviour", "B"]
     assert [document.dirty for document in after] == [True, True, False]
     assert next(iter(after)).workspace == OTHER
@@ -206,13 +206,13 @@ def test_after_crash_files_reopen_as_saved_and_unsaved_work_awaits_recovery(
     opened, documents, journals, tmp_path
 ) -> None:
     documents.open(file(tmp_path, "A"))
-    documents.current.edited(OTHER)
-    kept = documents.kept()
+    documents.current.apply_edit(OTHER)
+    kept = documents.tabs_state()
     assert all_kept(documents)
     as_if_dead(journals)
     after = opened()
-    left = left_behind(journals)
-    assert after.put_back(kept, left, ended_well=False) == set()
+    left = unsaved_work(journals)
+    assert after.restore_tabs(kept, left, ended_well=False) == set()
     assert (names(after), after.current.workspace, after.current.dirty) == (["A"], STARTED, False)
     after.recover(left[0])
     assert (names(after), after.current.workspace, after.current.dirty) == (["A"], OTHER, True)
@@ -227,50 +227,50 @@ def test_after_crash_files_reopen_as_saved_and_unsaved_work_awaits_recovery(
     ],
 )
 def test_invalid_tab_settings_open_nothing(documents, kept) -> None:
-    documents.put_back(kept, [], ended_well=True)
+    documents.restore_tabs(kept, [], ended_well=True)
     assert names(documents) == ["New behaviour"]
 
 
 def test_damaged_file_is_not_reopened(opened, documents, tmp_path) -> None:
     path = file(tmp_path, "A")
     documents.open(path)
-    kept = documents.kept()
+    kept = documents.tabs_state()
     path.write_text("{")
     after = opened()
-    after.put_back(kept, [], ended_well=True)
-    assert after.current.blank
+    after.restore_tabs(kept, [], ended_well=True)
+    assert after.current.is_blank
 
 
 def test_close_leaves_no_journal_of_saved_work(documents, journals, tmp_path) -> None:
     documents.open(file(tmp_path, "A"))
-    documents.current.edited(OTHER)
+    documents.current.apply_edit(OTHER)
     documents.current.save()
     documents.close(documents.current)
-    documents.end()
+    documents.close_all()
     assert list(journals.glob("*")) == []
 
 
 def test_recovered_work_does_not_replace_newer_work(opened, documents, journals, tmp_path) -> None:
     path = file(tmp_path, "A")
     documents.open(path)
-    documents.current.edited(OTHER)
+    documents.current.apply_edit(OTHER)
     assert all_kept(documents)
     as_if_dead(journals)
     after = opened()
-    left = left_behind(journals)
+    left = unsaved_work(journals)
     after.open(path)
     newer = {"blocks": {"blocks": [{"type": "events_started", "id": "newer"}]}}
-    after.current.edited(newer)
+    after.current.apply_edit(newer)
     after.recover(left[0])
     assert [document.workspace for document in after] == [newer, OTHER]
     assert all(document.dirty for document in after)
 
 
 def test_number_of_remembered_closed_tabs_is_limited(documents, tmp_path) -> None:
-    for number in range(CLOSED_KEPT + 2):
+    for number in range(MAX_CLOSED + 2):
         documents.open(file(tmp_path, f"F{number}"))
         documents.close(documents.current)
     again = 0
     while documents.reopen() is not None:
         again += 1
-    assert again == CLOSED_KEPT
+    assert again == MAX_CLOSED

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from app.blocks import compile_behaviour
-from app.blocks.fixes.replace_robot import asked_of, can_do, use_robot
+from app.blocks.fixes.replace_robot import block_types_by_robot, supports_blocks, with_robot_replaced
 from app.core.documents.document import Document
 from app.core.documents.journal import Journal
-from app.core.documents.problems import Mend, listed
+from app.core.documents.problems import Fix, problem_lines
 from app.robots import simulated
-from app.robots.description.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, thing_description
 from tests.blocks.samples import block, say, started, text, workspace
 from tests.blocks.samples import robot as sample
 
@@ -16,7 +16,7 @@ MODELS = {"pepper"}
 
 
 def pepper(name: str) -> Robot:
-    return parse(td_for(simulated.ROBOT.thing_model, name))
+    return parse(thing_description(simulated.ROBOT.thing_model, name))
 
 
 def speaks(robot: str, count: int = 3) -> dict[str, object]:
@@ -26,15 +26,15 @@ def speaks(robot: str, count: int = 3) -> dict[str, object]:
 
 def lines(saved, missing: list[Robot], connected: list[Robot]):
     program = compile_behaviour(saved, connected, absent=missing, name="Test")
-    return listed(program.problems, saved, missing, connected, MODELS, program.absent)
+    return problem_lines(program.problems, saved, missing, connected, MODELS, program.absent)
 
 
 def test_all_blocks_of_missing_robot_are_one_problem() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [])
-    assert line.problem.sentence == "Pepper is not connected, so 3 blocks will be skipped."
+    assert line.problem.message == "Pepper is not connected, so 3 blocks will be skipped."
     assert line.problem.subject == "3 blocks"
     assert line.problem.block_id, "a press leads to the first"
-    assert line.fixes == (Mend("Start a virtual Pepper", "robot.virtual:Pepper"),)
+    assert line.fixes == (Fix("Start a virtual Pepper", "robot.virtual:Pepper"),)
 
 
 def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
@@ -46,32 +46,32 @@ def test_missing_robot_problem_counts_nested_and_unstarted_blocks() -> None:
     program = compile_behaviour(saved, [], absent=missing, name="Test")
     (line,) = lines(saved, missing, [])
     assert len(program.absent) == 3
-    assert line.blocks == 3
-    assert line.problem.sentence == "Nao 3 is not connected, so 3 blocks will be skipped."
+    assert line.block_count == 3
+    assert line.problem.message == "Nao 3 is not connected, so 3 blocks will be skipped."
 
 
 def test_problem_button_describes_its_action() -> None:
     """Nobody is told that a real robot is connected when a virtual one starts."""
     (line,) = lines(speaks("Nao 3"), [pepper("Nao 3")], [])
-    assert line.fixes == (Mend("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
+    assert line.fixes == (Fix("Start a virtual Nao 3", "robot.virtual:Nao 3"),)
     (line,) = lines(speaks("Nao 3"), [], [])
-    assert line.fixes == (Mend("Show the robots", "connect:Nao 3"),)
+    assert line.fixes == (Fix("Show the robots", "connect:Nao 3"),)
 
 
 def test_problem_with_one_block_names_it() -> None:
     (line,) = lines(speaks("Pepper", 1), [pepper("Pepper")], [])
-    assert line.problem.sentence == "Pepper is not connected, so say will be skipped."
+    assert line.problem.message == "Pepper is not connected, so say will be skipped."
 
 
 def test_connected_robot_with_same_abilities_is_suggested_first() -> None:
     (line,) = lines(speaks("Pepper"), [pepper("Pepper")], [pepper("Pepper 2")])
-    assert [fix.words for fix in line.fixes] == ["Use Pepper 2", "Start a virtual Pepper"]
+    assert [fix.label for fix in line.fixes] == ["Use Pepper 2", "Start a virtual Pepper"]
     assert line.fixes[0].action == "robot.use:Pepper:Pepper 2"
 
 
 def test_robot_of_unknown_model_can_only_be_connected() -> None:
     (line,) = lines(workspace(started(say("Hi"))), [sample("Pepper")], [])
-    assert [fix.words for fix in line.fixes] in (["Show the robots"], ["Start a virtual Pepper"])
+    assert [fix.label for fix in line.fixes] in (["Show the robots"], ["Start a virtual Pepper"])
 
 
 def test_two_missing_robots_are_two_problems() -> None:
@@ -79,7 +79,7 @@ def test_two_missing_robots_are_two_problems() -> None:
         started(*(block("robot_pepper_do_say", ROBOT=name, TEXT=text("x")) for name in ("A", "B", "A")))
     )
     found = lines(both, [pepper("A"), pepper("B")], [])
-    assert [(line.blocks, line.fixes[0].action) for line in found] == [
+    assert [(line.block_count, line.fixes[0].action) for line in found] == [
         (2, "robot.virtual:A"),
         (1, "robot.virtual:B"),
     ]
@@ -88,7 +88,7 @@ def test_two_missing_robots_are_two_problems() -> None:
 def test_using_another_robot_fixes_the_problem_and_can_be_undone(tmp_path) -> None:
     document = Document(lambda: Journal(tmp_path))
     document.set_connected([pepper("Pepper")])
-    document.edited(speaks("Pepper"))
+    document.apply_edit(speaks("Pepper"))
     document.set_connected([pepper("Pepper 2")])
     before, fixes = document.workspace, document.fixes
     assert document.problems()
@@ -116,11 +116,15 @@ def test_robot_of_another_model_is_suggested_only_if_it_supports_every_block() -
     other = sample("Rosie")
     said = workspace(started(block("robot_pepper_do_say", ROBOT="Pepper", TEXT=text("x"))))
     walks = workspace(started(block("robot_pepper_do_walk", ROBOT="Pepper")))
-    assert can_do(asked_of(said).get("Pepper", ()), "pepper", other)
-    assert not can_do(asked_of(walks).get("Pepper", ()), "pepper", other)
+    assert supports_blocks(block_types_by_robot(said).get("Pepper", ()), "pepper", other)
+    assert not supports_blocks(block_types_by_robot(walks).get("Pepper", ()), "pepper", other)
     both = workspace(started(*said_and_walks()))
-    assert not can_do(asked_of(both).get("Pepper", ()), "pepper", other), "one of two is not enough"
-    assert not can_do(asked_of(said).get("Nobody", ()), "pepper", other), "nothing asks it"
-    made = use_robot(said, "Pepper", "pepper", other)
+    assert not supports_blocks(block_types_by_robot(both).get("Pepper", ()), "pepper", other), (
+        "one of two is not enough"
+    )
+    assert not supports_blocks(block_types_by_robot(said).get("Nobody", ()), "pepper", other), (
+        "nothing asks it"
+    )
+    made = with_robot_replaced(said, "Pepper", "pepper", other)
     program = compile_behaviour(made, [other], name="Test")
     assert (program.problems, program.robots) == ((), ("Rosie",))

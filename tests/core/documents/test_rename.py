@@ -13,8 +13,8 @@ from app.core.documents.document import Document
 from app.core.documents.file_format import BehaviourFile, read_file, write_file
 from app.core.documents.journal import Journal
 from app.core.documents.open_documents import Documents
-from app.core.documents.rename import rename_file, why_not
-from app.core.documents.versions import keep_earlier, versions_of
+from app.core.documents.rename import name_problem, rename_file
+from app.core.documents.versions import save_version, versions_of
 from app.core.storage.settings import Settings
 from app.errors import DocumentError
 from tests.core.documents.test_open_documents import OTHER, STARTED
@@ -30,7 +30,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def opened(tmp_path: Path) -> Iterator[Documents]:
     made = Documents(lambda: Document(lambda: Journal(tmp_path / "journal")))
     yield made
-    made.end()
+    made.close_all()
 
 
 def file(path: Path) -> Path:
@@ -46,7 +46,7 @@ def test_renamed_file_keeps_its_content(opened: Documents, tmp_path: Path) -> No
     assert (document.name, document.path, document.dirty) == ("Quiz", tmp_path / "Quiz.nepb", False)
     assert not old.exists()
     assert (tmp_path / "Quiz.nepb").read_bytes() == content
-    assert not document.changed_outside
+    assert not document.is_changed_externally
     document.save()
     assert read_file(tmp_path / "Quiz.nepb").name == "Quiz"
     assert json.loads((tmp_path / "Quiz.nepb").read_text("utf-8"))["name"] == "Quiz"
@@ -55,11 +55,11 @@ def test_renamed_file_keeps_its_content(opened: Documents, tmp_path: Path) -> No
 def test_unsaved_work_and_earlier_versions_follow_rename(opened: Documents, tmp_path: Path) -> None:
     old = file(tmp_path / "Greeting.nepb")
     document = opened.open(old)
-    keep_earlier(old)
-    document.edited(OTHER)
+    save_version(old)
+    document.apply_edit(OTHER)
     opened.rename(document, "Quiz")
     assert document.dirty
-    assert document.is_kept
+    assert document.is_on_disk
     journal = json.loads(next((tmp_path / "journal").glob("*.json")).read_text("utf-8"))
     assert (journal["name"], journal["path"]) == ("Quiz", str(tmp_path / "Quiz.nepb"))
     assert [each.name for each in versions_of(tmp_path / "Quiz.nepb")] == ["Quiz"]
@@ -68,7 +68,7 @@ def test_unsaved_work_and_earlier_versions_follow_rename(opened: Documents, tmp_
 
 def test_rename_of_unsaved_behaviour_changes_only_its_name(opened: Documents) -> None:
     document = opened.new()
-    document.edited(OTHER)
+    document.apply_edit(OTHER)
     opened.rename(document, "Quiz: what?")
     assert (document.name, document.path) == ("Quiz: what?", None)
 
@@ -110,8 +110,8 @@ def test_missing_file_cannot_be_renamed_and_no_file_is_created(opened: Documents
     ],
 )
 def test_names_invalid_on_some_system_are_rejected(name: str, words: str, tmp_path: Path) -> None:
-    assert re.search(words, why_not(name, tmp_path / "A.nepb"))
-    assert bool(why_not(name, None)) == (not name.strip()), "without a file any name will do"
+    assert re.search(words, name_problem(name, tmp_path / "A.nepb"))
+    assert bool(name_problem(name, None)) == (not name.strip()), "without a file any name will do"
 
 
 def test_recent_files_entry_is_renamed_in_place(tmp_path: Path) -> None:

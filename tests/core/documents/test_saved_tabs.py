@@ -9,7 +9,7 @@ import pytest
 
 from app.core.documents.document import Document
 from app.core.documents.file_format import BehaviourFile, write_file
-from app.core.documents.journal import Journal, Unsaved, left_behind
+from app.core.documents.journal import Journal, UnsavedWork, unsaved_work
 from app.core.documents.open_documents import Documents
 from app.core.documents.saved_tabs import SavedTabs
 from app.core.storage.settings import Settings
@@ -26,8 +26,8 @@ class Start:
         self.documents = Documents(lambda: Document(lambda: Journal(self.journals)))
         self.tabs = SavedTabs(Settings(folder), self.documents, self.complaints.append)
 
-    def come_back(self) -> list[Unsaved]:
-        return self.tabs.come_back(left_behind(self.journals) if self.journals.exists() else [])
+    def come_back(self) -> list[UnsavedWork]:
+        return self.tabs.restore(unsaved_work(self.journals) if self.journals.exists() else [])
 
     def work(self) -> None:
         """One file is open and is not saved."""
@@ -35,7 +35,7 @@ class Start:
         write_file(path, BehaviourFile("A", STARTED, {}))
         assert self.come_back() == []
         self.documents.open(path)
-        self.documents.current.edited(OTHER)
+        self.documents.current.apply_edit(OTHER)
         self.tabs.save()
         assert all_kept(self.documents)
 
@@ -51,14 +51,14 @@ def start(tmp_path: Path) -> Iterator[Callable[[], Start]]:
 
     yield begin
     for each in made:
-        each.documents.end()
+        each.documents.close_all()
 
 
 def test_after_clean_exit_unsaved_work_is_restored_without_asking(start) -> None:
     first = start()
     first.work()
     first.tabs.save(ended_well=True)
-    first.documents.end()
+    first.documents.close_all()
     as_if_dead(first.journals)
     after = start()
     assert after.come_back() == []
@@ -88,7 +88,7 @@ def test_tabs_of_second_window_are_not_restored(start, tmp_path: Path) -> None:
     start().work()
     second = start()
     second.documents.new()
-    second.documents.current.edited(STARTED)
+    second.documents.current.apply_edit(STARTED)
     second.tabs.save(ended_well=True)
     kept = Settings(tmp_path).get("tabs", {})
     assert [Path(each["path"]).name for each in kept["tabs"]] == ["A.nepb"]
@@ -111,11 +111,11 @@ def test_after_crash_tabs_keep_their_order_and_the_current_tab(start) -> None:
         write_file(first.folder / f"{name}.nepb", BehaviourFile(name, STARTED, {}))
     assert first.come_back() == []
     first.documents.open(first.folder / "A.nepb")
-    first.documents.new().edited(OTHER)
-    first.documents.open(first.folder / "B.nepb").edited(OTHER)
+    first.documents.new().apply_edit(OTHER)
+    first.documents.open(first.folder / "B.nepb").apply_edit(OTHER)
     middle = first.documents.neighbour(-1)
     first.documents.show(middle)
-    first.tabs.follow()
+    first.tabs.save_if_changed()
     assert names(first.documents) == ["A", "New behaviour", "B"]
     assert all_kept(first.documents)
     as_if_dead(first.journals)
@@ -133,22 +133,22 @@ def test_tab_of_new_behaviour_is_saved_from_first_edit(start) -> None:
     first = start()
     assert first.come_back() == []
     blank = first.documents.current
-    first.tabs.follow()
-    blank.edited(OTHER)
-    first.tabs.edited(blank, was_blank=True)
+    first.tabs.save_if_changed()
+    blank.apply_edit(OTHER)
+    first.tabs.on_edited(blank, was_blank=True)
     kept = Settings(first.folder).get("tabs", {})
-    assert [tab["journal"] for tab in kept["tabs"]] == [blank.journal]
+    assert [tab["journal"] for tab in kept["tabs"]] == [blank.journal_name]
 
 
 def test_switching_tabs_does_not_write_settings_at_once(start) -> None:
     first = start()
     first.work()
     made = first.documents.new()
-    made.edited(OTHER)
-    first.tabs.follow()
+    made.apply_edit(OTHER)
+    first.tabs.save_if_changed()
     before = Settings(first.folder).get("tabs", {})
     assert before["current"] == 1
     first.documents.show(first.documents.neighbour(-1))
     assert Settings(first.folder).get("tabs", {}) == before
-    first.tabs.follow()
+    first.tabs.save_if_changed()
     assert Settings(first.folder).get("tabs", {})["current"] == 0

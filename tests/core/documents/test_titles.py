@@ -11,8 +11,8 @@ from app.core.documents.document import Document
 from app.core.documents.file_format import BehaviourFile, write_file
 from app.core.documents.journal import Journal
 from app.core.documents.open_documents import Documents
-from app.core.documents.titles import recent_titles, told_apart
-from app.core.storage.settings import RecentFile, Settings, kept_folder
+from app.core.documents.titles import recent_titles, unique_titles
+from app.core.storage.settings import RecentFile, Settings, closed_tabs_folder
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +39,7 @@ def test_copied_file_is_titled_by_its_file_name(tmp_path) -> None:
     copy.save()
     assert json.loads((tmp_path / "Greeting for class 3.nepb").read_text("utf-8"))["name"] == copy.name
     assert first.name == "Greeting"
-    opened.end()
+    opened.close_all()
 
 
 def test_files_of_same_name_show_their_folder(tmp_path) -> None:
@@ -50,26 +50,32 @@ def test_files_of_same_name_show_their_folder(tmp_path) -> None:
     assert [opened.title(each) for each in opened] == ["Greeting — class 3", "Greeting — class 4"]
     opened.close(there)
     assert opened.title(here) == "Greeting"
-    opened.end()
+    opened.close_all()
 
 
 def test_titles_include_as_many_folders_as_needed() -> None:
     paths = [Path("/a/2025/tasks/Quiz.nepb"), Path("/a/2026/tasks/Quiz.nepb"), Path("/b/Quiz.nepb")]
-    assert told_apart([("Quiz", each) for each in paths] + [("quiz", None), ("Other", Path("/b/Other"))]) == [
+    assert unique_titles(
+        [("Quiz", each) for each in paths] + [("quiz", None), ("Other", Path("/b/Other"))]
+    ) == [
         "Quiz — 2025/tasks",
         "Quiz — 2026/tasks",
         "Quiz — b",
         "quiz",
         "Other",
     ]
-    assert told_apart([("Quiz", Path("/Quiz.nepb")), ("Quiz", Path("/x/Quiz.nepb"))])[1] == "Quiz — x"
+    assert unique_titles([("Quiz", Path("/Quiz.nepb")), ("Quiz", Path("/x/Quiz.nepb"))])[1] == "Quiz — x"
 
 
 def test_example_opened_again_gets_a_unique_name(tmp_path) -> None:
     opened = documents(tmp_path)
     path = file(tmp_path / "example.nepb", "Tour guide")
-    assert [opened.example(path).name for _ in range(3)] == ["Tour guide", "Tour guide 2", "Tour guide 3"]
-    opened.end()
+    assert [opened.open_example(path).name for _ in range(3)] == [
+        "Tour guide",
+        "Tour guide 2",
+        "Tour guide 3",
+    ]
+    opened.close_all()
 
 
 def test_recent_files_have_the_same_titles_as_tabs(tmp_path) -> None:
@@ -86,10 +92,10 @@ def test_recent_files_have_the_same_titles_as_tabs(tmp_path) -> None:
 def test_work_closed_without_file_keeps_its_name(tmp_path) -> None:
     document = Document(lambda: Journal(tmp_path / "journal"))
     document.new("Quiz")
-    document.save(kept_folder() / "Quiz 2026-11-23 08.00.nepb")
+    document.save(closed_tabs_folder() / "Quiz 2026-11-23 08.00.nepb")
     assert document.name == "Quiz"
     settings = Settings(tmp_path / "home")
-    settings.add_recent(kept_folder() / "Quiz 2026-11-23 08.00.nepb", "Quiz")
+    settings.add_recent(closed_tabs_folder() / "Quiz 2026-11-23 08.00.nepb", "Quiz")
     assert isinstance(settings.recent[0], RecentFile)
     assert settings.recent[0].name == "Quiz"
     again = Document(lambda: Journal(tmp_path / "journal"))

@@ -10,10 +10,10 @@ import pytest
 
 from app.core.documents import versions
 from app.core.documents.versions import (
-    bring_here,
     free_path,
-    keep_earlier,
+    move_old_versions,
     namesakes_of,
+    save_version,
     stamp_of,
     versions_of,
 )
@@ -29,11 +29,11 @@ def folder(tmp_path: Path) -> Path:
 def test_earlier_version_is_restored(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
-    kept = keep_earlier(path, folder)
+    kept = save_version(path, folder)
     path.write_bytes(b"two")
     assert kept is not None
     assert kept.copy.parent == folder
-    kept.put_back()
+    kept.restore()
     assert path.read_bytes() == b"one"
 
 
@@ -41,7 +41,7 @@ def test_versions_of_the_same_second_do_not_overwrite_each_other(tmp_path: Path,
     path = tmp_path / "Round.nepb"
     for text in (b"one", b"two"):
         path.write_bytes(text)
-        keep_earlier(path, folder, lambda: 0.0)
+        save_version(path, folder, lambda: 0.0)
     assert {copy.read_bytes() for copy in folder.iterdir()} == {b"one", b"two"}
 
 
@@ -50,7 +50,7 @@ def test_empty_or_missing_file_has_no_version(tmp_path: Path, folder: Path, cont
     path = tmp_path / "Round.nepb"
     if content is not None:
         path.write_bytes(content)
-    assert keep_earlier(path, folder) is None
+    assert save_version(path, folder) is None
     assert not folder.exists()
 
 
@@ -59,27 +59,27 @@ def test_save_is_rejected_when_previous_version_cannot_be_kept(tmp_path: Path, f
     path.write_bytes(b"one")
     folder.write_bytes(b"in the way")
     with pytest.raises(DocumentError, match="was not saved: its previous version can't be kept"):
-        keep_earlier(path, folder)
+        save_version(path, folder)
 
 
 def test_restoring_deleted_version_raises_and_keeps_the_file(tmp_path: Path, folder: Path) -> None:
     path = tmp_path / "Round.nepb"
     path.write_bytes(b"one")
-    kept = keep_earlier(path, folder)
+    kept = save_version(path, folder)
     assert kept is not None
     kept.copy.unlink()
     path.write_bytes(b"two")
     with pytest.raises(DocumentError, match="can't restore "):
-        kept.put_back()
+        kept.restore()
     assert path.read_bytes() == b"two"
 
 
 def test_only_newest_versions_are_kept(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(versions, "COPIES_KEPT", 2)
+    monkeypatch.setattr(versions, "MAX_COPIES", 2)
     path = tmp_path / "Round.nepb"
     for number in range(4):
         path.write_bytes(b"%d" % number)
-        kept = keep_earlier(path, folder, lambda: 0.0)
+        kept = save_version(path, folder, lambda: 0.0)
         assert kept is not None
         os.utime(kept.copy, ns=(number * 10**9, number * 10**9))
     assert {copy.read_bytes() for copy in folder.iterdir()} == {b"2", b"3"}
@@ -104,7 +104,7 @@ def kept(path: Path, folder: Path, text: bytes, written_s: float, replaced_s: fl
     """A version that was written then, and written over later."""
     path.write_bytes(text)
     os.utime(path, (written_s, written_s))
-    assert keep_earlier(path, folder, lambda: replaced_s) is not None
+    assert save_version(path, folder, lambda: replaced_s) is not None
 
 
 def test_versions_are_listed_newest_first_with_their_times(tmp_path: Path, folder: Path) -> None:
@@ -143,15 +143,15 @@ def test_newest_versions_and_a_sample_of_older_ones_are_kept(tmp_path: Path, fol
     for when in times:
         kept(path, folder, str(when).encode(), when - hour, when)
     found = [each.replaced_s for each in versions_of(path, folder)]
-    assert len(found) == versions.OF_ONE_FILE
-    assert found[: versions.NEWEST] == times[: -versions.NEWEST - 1 : -1]
+    assert len(found) == versions.MAX_COPIES_PER_FILE
+    assert found[: versions.PROTECTED_COPIES] == times[: -versions.PROTECTED_COPIES - 1 : -1]
     assert len(set(times[:20]) & set(found)) >= 19, "one of nearly each day"
 
 
 def test_total_size_of_versions_is_limited(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(versions, "BYTES_KEPT", 25)
+    monkeypatch.setattr(versions, "MAX_BYTES", 25)
     path = tmp_path / "Round.nepb"
     for number in range(4):
         kept(path, folder, b"%010d" % number, number * 100, number * 1000)
@@ -166,13 +166,13 @@ def test_versions_are_migrated_once_to_data_folder(tmp_path: Path) -> None:
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"first")
     os.utime(document, (1_000_000, 1_000_000))
-    kept = keep_earlier(document, old)
+    kept = save_version(document, old)
     assert kept is not None
-    bring_here(old, new)
+    move_old_versions(old, new)
     assert not old.exists()
     (version,) = versions_of(document, new)
     assert (version.copy.read_bytes(), version.written_s) == (b"first", 1_000_000)
-    bring_here(old, new)
+    move_old_versions(old, new)
     assert len(versions_of(document, new)) == 1
 
 
@@ -180,9 +180,9 @@ def test_versions_that_cannot_be_migrated_are_kept(tmp_path: Path) -> None:
     old, new = tmp_path / "config" / "earlier", tmp_path / "data"
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"first")
-    assert keep_earlier(document, old) is not None
+    assert save_version(document, old) is not None
     new.write_text("in the way")
-    bring_here(old, new / "earlier")
+    move_old_versions(old, new / "earlier")
     assert len(versions_of(document, old)) == 1
 
 
@@ -194,7 +194,7 @@ def test_versions_are_stored_in_data_folder_not_in_settings_folder(
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     (tmp_path / "Round.nepb").write_bytes(b"one")
-    kept = keep_earlier(tmp_path / "Round.nepb")
+    kept = save_version(tmp_path / "Round.nepb")
     assert kept is not None
     assert kept.copy.is_relative_to(tmp_path / "data" / "nep-studio")
     assert not (tmp_path / "config").exists()

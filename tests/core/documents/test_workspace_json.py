@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from app.core.documents.workspace_json import LONG_CHARACTERS, WorkspaceJson
+from app.core.documents.workspace_json import LONG_TEXT_LENGTH, WorkspaceJson
 from app.core.storage import deep_json
 
 ONE = {"blocks": {"blocks": [{"type": "events_started", "id": "\u00e9\ud800"}]}}
@@ -41,22 +41,22 @@ def test_texts_are_compared_without_parsing(parsed: list[str]) -> None:
     one, same, other = WorkspaceJson(text), WorkspaceJson(text), WorkspaceJson("{}")
     assert one.blocks  # the compiler has looked into it
     del parsed[:]
-    assert one.same_as(same)
-    assert not one.same_as(other)
+    assert one.is_equal_to(same)
+    assert not one.is_equal_to(other)
     assert parsed == []
 
 
 def test_differently_formatted_json_is_equal() -> None:
-    assert WorkspaceJson(json.dumps(ONE, indent=2)).same_as(WorkspaceJson.of(ONE))
-    assert not WorkspaceJson.of({}).same_as(WorkspaceJson(json.dumps(ONE)))
+    assert WorkspaceJson(json.dumps(ONE, indent=2)).is_equal_to(WorkspaceJson.from_blocks(ONE))
+    assert not WorkspaceJson.from_blocks({}).is_equal_to(WorkspaceJson(json.dumps(ONE)))
 
 
 def test_has_blocks_does_not_parse_long_text(parsed: list[str]) -> None:
     assert not WorkspaceJson("{}").has_blocks
     assert not WorkspaceJson('{"blocks": {"blocks": []}}').has_blocks
-    assert WorkspaceJson.of(ONE).has_blocks
+    assert WorkspaceJson.from_blocks(ONE).has_blocks
     del parsed[:]
-    assert WorkspaceJson(json.dumps(ONE) + " " * LONG_CHARACTERS).has_blocks
+    assert WorkspaceJson(json.dumps(ONE) + " " * LONG_TEXT_LENGTH).has_blocks
     assert parsed == []
 
 

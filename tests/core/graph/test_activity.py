@@ -36,41 +36,41 @@ def facts(*topics: Topic, calls: int = 0, generation: str = "native", network: s
 def test_node_without_traffic_for_a_minute_is_quiet() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, 1)), 0.0)
-    assert quiet.quiet(QUIET_S - 1) == frozenset()
-    assert quiet.quiet(QUIET_S) == {"1", "2", "3", "4"}
+    assert quiet.quiet_keys(QUIET_S - 1) == frozenset()
+    assert quiet.quiet_keys(QUIET_S) == {"1", "2", "3", "4"}
     quiet.update(facts(heard(2, 1), calls=1), 30.0)
-    assert quiet.quiet(QUIET_S) == {"2", "4"}
-    assert quiet.quiet(30.0 + QUIET_S) == {"1", "2", "3", "4"}
+    assert quiet.quiet_keys(QUIET_S) == {"2", "4"}
+    assert quiet.quiet_keys(30.0 + QUIET_S) == {"1", "2", "3", "4"}
 
 
 def test_restarted_counter_counts_as_traffic() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(2**64 - 1, 5)), 0.0)
     quiet.update(facts(heard(0, 5)), 50.0)
-    assert quiet.quiet(70.0) == {"2", "3", "4"}
+    assert quiet.quiet_keys(70.0) == {"2", "3", "4"}
 
 
 def test_node_without_counters_is_not_quiet() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, None), generation="B"), 0.0)
-    assert quiet.quiet(QUIET_S) == {"1", "3"}
+    assert quiet.quiet_keys(QUIET_S) == {"1", "3"}
     other = QuietNodes()
     other.update(facts(generation="native", network="ros2"), 0.0)
-    assert other.quiet(QUIET_S) == frozenset()
+    assert other.quiet_keys(QUIET_S) == frozenset()
 
 
 def test_internal_nep_messages_do_not_count_as_traffic() -> None:
     quiet = QuietNodes()
     quiet.update(facts(heard(1, 1, "/nep/log")), 0.0)
     quiet.update(facts(heard(9, 9, "/nep/log")), 50.0)
-    assert "1" in quiet.quiet(QUIET_S)
+    assert "1" in quiet.quiet_keys(QUIET_S)
 
 
 def test_node_that_left_is_forgotten() -> None:
     quiet = QuietNodes()
     quiet.update(facts(), 0.0)
     quiet.update(GraphFacts(), 1.0)
-    assert quiet.quiet(1000.0) == frozenset()
+    assert quiet.quiet_keys(1000.0) == frozenset()
 
 
 def test_call_rate_is_averaged_over_a_minute() -> None:

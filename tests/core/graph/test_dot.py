@@ -9,7 +9,7 @@ GRAPH = NodeGraph(
     (
         DrawnNode("k1", 'say "hi"', "host:a", "program"),
         DrawnNode("k2", "gone", "host:a", "program", is_gone=True),
-        DrawnNode("host:b", "b", "host:b", "group", members=3),
+        DrawnNode("host:b", "b", "host:b", "group", member_count=3),
     ),
     (
         GraphLine("topic", ("k1",), ("k2", "host:b"), ("/t",)),

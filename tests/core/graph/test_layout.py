@@ -40,15 +40,15 @@ LAB = graph({"g": "abcd", "h": "ef", "i": "x"}, "ab bc cd de ef fa xa ax")
 
 def test_all_nodes_are_placed_inside_their_groups_without_overlap() -> None:
     found = arrange(LAB)
-    assert found.places.keys() == set("abcdefx")
+    assert found.positions.keys() == set("abcdefx")
     assert overlapping(found) == []
     for node in LAB.nodes:
-        x, y = found.places[node.key]
+        x, y = found.positions[node.key]
         left, top, wide, high = found.groups[node.group]
         assert left + 76 < x < left + wide - 76
         assert top + 24 + 30 < y < top + high - 24
     assert not found.is_plain
-    assert len({*found.places.values()}) == 7
+    assert len({*found.positions.values()}) == 7
 
 
 def test_lines_start_and_end_at_node_edges() -> None:
@@ -56,7 +56,7 @@ def test_lines_start_and_end_at_node_edges() -> None:
     assert found.routes.keys() == {(line.key, *line.key[1], *line.key[2]) for line in LAB.lines}
     for (_line, source, target), points in found.routes.items():
         for (x, y), key in ((points[0], source), (points[-1], target)):
-            across, down = abs(x - found.places[key][0]), abs(y - found.places[key][1])
+            across, down = abs(x - found.positions[key][0]), abs(y - found.positions[key][1])
             assert across == pytest.approx(76, abs=1) or down == pytest.approx(24, abs=1)
 
 
@@ -69,13 +69,13 @@ def test_node_positions_are_stable_when_nodes_join_and_leave() -> None:
     more = graph({"g": "abcdkm", "h": "ef", "i": "x", "j": "n"}, "ab bc cd de ef fa xa ax ak km na")
     second = arrange(more, first)
     untouched = [key for key in "ef" if "h" in second.groups]
-    assert all(second.places[key] == first.places[key] for key in "abcd")
+    assert all(second.positions[key] == first.positions[key] for key in "abcd")
     assert overlapping(second) == []
     assert untouched
     fewer = arrange(graph({"g": "abkm", "h": "e", "j": "n"}, "ab ak"), second)
-    assert all(fewer.places[key] == second.places[key] for key in "abkmen")
+    assert all(fewer.positions[key] == second.positions[key] for key in "abkmen")
     back = arrange(more, fewer)
-    assert all(back.places[key] == second.places[key] for key in "abcdefx")
+    assert all(back.positions[key] == second.positions[key] for key in "abcdefx")
 
 
 def test_nodes_that_join_one_by_one_do_not_overlap() -> None:
@@ -85,7 +85,7 @@ def test_nodes_that_join_one_by_one_do_not_overlap() -> None:
         found = arrange(graph({"g": names[:count], "h": names[:count].upper()}, ""), found)
         assert overlapping(found) == []
     assert found is not None
-    places = [*found.places.values()]
+    places = [*found.positions.values()]
     assert all(
         abs(a[0] - b[0]) >= 152 or abs(a[1] - b[1]) >= 48
         for number, a in enumerate(places)
@@ -96,20 +96,20 @@ def test_nodes_that_join_one_by_one_do_not_overlap() -> None:
 def test_mostly_new_graph_gets_a_new_layout() -> None:
     first = arrange(graph({"g": "a"}))
     second = arrange(graph({"g": "abcdef"}, "ab bc cd de ef"), first)
-    xs = [second.places[key][0] for key in "abcdef"]
+    xs = [second.positions[key][0] for key in "abcdef"]
     assert xs == sorted(xs)
     assert len({*xs}) == 6
 
 
 def test_group_with_quiet_nodes_has_a_footer() -> None:
     plain, told = arrange(graph({"g": "a"})), arrange(graph({"g": "a"}, quiet=2))
-    assert told.groups["g"][3] == plain.groups["g"][3] + LayoutSizes().foot
+    assert told.groups["g"][3] == plain.groups["g"][3] + LayoutSizes().footer
 
 
 def test_empty_graph_and_single_node_have_a_layout() -> None:
     assert arrange(NodeGraph()) == GraphLayout()
     assert arrange(NodeGraph()).bounds(LayoutSizes()) == (0.0, 0.0, 0.0, 0.0)
-    assert arrange(graph({"": "a"})).places.keys() == {"a"}
+    assert arrange(graph({"": "a"})).positions.keys() == {"a"}
 
 
 def test_excess_lines_are_omitted_and_counted() -> None:
@@ -118,8 +118,8 @@ def test_excess_lines_are_omitted_and_counted() -> None:
     all_to_all = GraphLine("topic", tuple(keys), tuple(keys), ("/clock",))
     one = GraphLine("topic", ("n0",), ("n1",), ("/one",))
     found = arrange(NodeGraph(nodes, (all_to_all, one), (), 120))
-    assert found.left_out == 120 * 119
-    assert found.left_out > MAX_ROUTES
+    assert found.omitted_routes == 120 * 119
+    assert found.omitted_routes > MAX_ROUTES
     assert [key[1:] for key in found.routes] == [("n0", "n1")]
 
 
@@ -133,7 +133,7 @@ def test_failed_layout_falls_back_to_rows_and_straight_lines(
     monkeypatch.setattr(layout_module.graphlay, "layout", fails)
     found = arrange(LAB)
     assert found.is_plain
-    assert found.places.keys() == set("abcdefx")
+    assert found.positions.keys() == set("abcdefx")
     assert overlapping(found) == []
     assert all(len(points) == 2 for points in found.routes.values())
     assert "layout library failed" in caplog.text
@@ -141,7 +141,7 @@ def test_failed_layout_falls_back_to_rows_and_straight_lines(
     placed = arrange(LAB)
     monkeypatch.setattr(layout_module.graphlay, "reroute", fails)
     straight = arrange(LAB, placed)
-    assert straight.places == placed.places
+    assert straight.positions == placed.positions
     assert straight.routes.keys() == placed.routes.keys()
 
 
@@ -159,24 +159,24 @@ def test_layout_thread_processes_only_the_newest_graph() -> None:
     asked: list[int] = []
 
     def slow(wanted: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout:
-        asked.append(wanted.nodes_there)
+        asked.append(wanted.node_count)
         began.set()
         assert go_on.wait(20)
         return arrange(wanted, before, sizes)
 
     thread = LayoutThread(slow)
     try:
-        thread.ask(LAB, None, LayoutSizes())
+        thread.submit(LAB, None, LayoutSizes())
         assert began.wait(20)
         for count in (8, 9):
-            thread.ask(replace(LAB, nodes_there=count), None, LayoutSizes())
+            thread.submit(replace(LAB, node_count=count), None, LayoutSizes())
         assert thread.is_busy
         assert thread.pop_result() is None
         go_on.set()
         eventually(lambda: not thread.is_busy)
         made = thread.pop_result()
         assert made is not None
-        assert made[0].nodes_there == 9
+        assert made[0].node_count == 9
         assert asked == [7, 9]
         assert thread.pop_result() is None
     finally:
@@ -190,12 +190,12 @@ def test_layout_thread_continues_after_error_and_closes_at_once(caplog: pytest.L
         return arrange(wanted, before, sizes)
 
     thread = LayoutThread(fails)
-    thread.ask(NodeGraph(), None, LayoutSizes())
+    thread.submit(NodeGraph(), None, LayoutSizes())
     eventually(lambda: not thread.is_busy)
-    thread.ask(LAB, None, LayoutSizes())
+    thread.submit(LAB, None, LayoutSizes())
     eventually(lambda: thread.pop_result() is not None)
     thread.close()
-    thread.ask(LAB, None, LayoutSizes())
+    thread.submit(LAB, None, LayoutSizes())
     assert not thread.is_busy
     LayoutThread().close()
     assert "nothing" in caplog.text

@@ -50,13 +50,13 @@ def test_layout_thread_falls_back_to_rows_when_process_fails(monkeypatch: pytest
 
     monkeypatch.setattr(layout_thread, "LayoutProcess", Broken)
     thread = LayoutThread()
-    thread.ask(LARGE, None, LayoutSizes())
+    thread.submit(LARGE, None, LayoutSizes())
     eventually(lambda: not thread.is_busy)
     made = thread.pop_result()
     thread.close()
     assert made is not None
     assert made[1].is_plain
-    assert made[1].places.keys() == {*KEYS}
+    assert made[1].positions.keys() == {*KEYS}
 
 
 def test_close_kills_running_layout_process(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,7 +72,7 @@ def test_close_kills_running_layout_process(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(layout_thread, "LayoutProcess", Endless)
     thread = LayoutThread()
-    thread.ask(LARGE, None, LayoutSizes())
+    thread.submit(LARGE, None, LayoutSizes())
     assert works.wait(20)
     thread.close()
     assert ended.is_set()

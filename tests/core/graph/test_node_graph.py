@@ -6,8 +6,8 @@ import pytest
 
 from app.core.graph.node_graph import (
     WEB_GROUP,
-    GraphChoices,
     GraphFacts,
+    GraphOptions,
     GroupBy,
     NodeGraph,
     node_graph,
@@ -103,19 +103,19 @@ def lines(graph: NodeGraph) -> dict[tuple[str, ...], tuple[str, str]]:
 
 
 def test_lines_connect_publishers_with_subscribers_and_clients_with_servers() -> None:
-    graph = node_graph(facts(), GraphChoices())
+    graph = node_graph(facts(), GraphOptions())
     assert lines(graph) == {
         ("/Pepper/odom", "/Pepper/touch"): ("pepper_driver", "blackboard"),
         ("/blackboard",): ("blackboard", "bridge-lab-to-ros2+greeting+studio"),
         ("robot_action",): ("RIZE+greeting", "pepper_driver"),
         ("remember_face",): ("studio", "blackboard"),
     }
-    assert (graph.nodes_there, graph.topics_there, graph.services_there) == (6, 4, 1)
+    assert (graph.node_count, graph.topic_count, graph.service_count) == (6, 4, 1)
 
 
 def test_node_kinds_and_names() -> None:
-    graph = node_graph(facts(), GraphChoices())
-    assert {each.name: (each.kind, each.joins) for each in graph.nodes} == {
+    graph = node_graph(facts(), GraphOptions())
+    assert {each.name: (each.kind, each.bridged_network) for each in graph.nodes} == {
         "pepper_driver": ("program", ""),
         "blackboard": ("program", ""),
         "greeting": ("behaviour", ""),
@@ -127,17 +127,17 @@ def test_node_kinds_and_names() -> None:
 
 def test_nodes_are_grouped_by_computer_with_address_or_by_robot_or_not() -> None:
     found = facts()
-    by_computer = node_graph(found, GraphChoices()).groups
-    assert [(each.key, each.address, each.members) for each in by_computer] == [
+    by_computer = node_graph(found, GraphOptions()).groups
+    assert [(each.key, each.address, each.member_count) for each in by_computer] == [
         ("host:lab-pc", "", 5),
         ("host:pepper", "192.168.1.24", 1),
     ]
-    by_robot = node_graph(found, GraphChoices(group_by="robot"))
-    assert [(each.key, each.icon, each.members) for each in by_robot.groups] == [
+    by_robot = node_graph(found, GraphOptions(group_by="robot"))
+    assert [(each.key, each.icon, each.member_count) for each in by_robot.groups] == [
         ("robot:", "box", 5),
         ("robot:Pepper", "bot", 1),
     ]
-    assert node_graph(found, GraphChoices(group_by="nothing")).groups == ()
+    assert node_graph(found, GraphOptions(group_by="nothing")).groups == ()
 
 
 @pytest.mark.parametrize(
@@ -145,12 +145,12 @@ def test_nodes_are_grouped_by_computer_with_address_or_by_robot_or_not() -> None
     ["", "tcp://127.0.0.1:4", "ipc:///tmp/x", "tcp://[::1", "rubbish", "tcp://0.0.0.0:1", "tcp://:1"],
 )
 def test_unreachable_endpoint_is_not_shown_as_address(endpoint: str) -> None:
-    graph = node_graph(facts(topics=(topic("/a", "1", "2", endpoint=endpoint),)), GraphChoices())
+    graph = node_graph(facts(topics=(topic("/a", "1", "2", endpoint=endpoint),)), GraphOptions())
     assert {each.address for each in graph.groups} == {""}
 
 
 def test_internal_topics_and_services_are_drawn_on_request() -> None:
-    choices = GraphChoices(shows_own=True)
+    choices = GraphOptions(shows_internal=True)
     found = lines(node_graph(facts(), choices))
     assert ("/nep/log",) in found
     assert ("/nep/parameters/1",) in found
@@ -158,49 +158,49 @@ def test_internal_topics_and_services_are_drawn_on_request() -> None:
 
 
 def test_collapsed_group_is_one_box_with_all_lines_of_its_nodes() -> None:
-    graph = node_graph(facts(), GraphChoices(toggled=frozenset({"host:lab-pc"})))
-    assert {(each.kind, each.key, each.members) for each in graph.nodes} == {
+    graph = node_graph(facts(), GraphOptions(toggled=frozenset({"host:lab-pc"})))
+    assert {(each.kind, each.key, each.member_count) for each in graph.nodes} == {
         ("group", "host:lab-pc", 5),
         ("program", "|pepper|pepper_driver", 1),
     }
     assert {line.topics for line in graph.lines} == {("/Pepper/odom", "/Pepper/touch"), ("robot_action",)}
-    again = node_graph(facts(), GraphChoices(starts_closed=True, toggled=frozenset({"host:pepper"})))
+    again = node_graph(facts(), GraphOptions(starts_collapsed=True, toggled=frozenset({"host:pepper"})))
     assert again == graph
 
 
 def test_quiet_nodes_are_hidden_and_counted_until_their_group_shows_them() -> None:
-    choices = GraphChoices(quiet=frozenset({"4", "5"}))
+    choices = GraphOptions(quiet=frozenset({"4", "5"}))
     graph = node_graph(facts(), choices)
     assert {each.name for each in graph.nodes} == {
         "pepper_driver", "blackboard", "greeting", "bridge-lab-to-ros2",
     }  # fmt: skip
-    assert graph.quiet_hidden == 2
-    assert [each.quiet for each in graph.groups] == [2, 0]
-    shown = node_graph(facts(), replace(choices, quiet_shown=frozenset({"host:lab-pc"})))
+    assert graph.hidden_quiet_count == 2
+    assert [each.quiet_count for each in graph.groups] == [2, 0]
+    shown = node_graph(facts(), replace(choices, quiet_visible_groups=frozenset({"host:lab-pc"})))
     assert {each.name for each in shown.nodes if each.is_quiet} == {"studio", "RIZE"}
-    assert node_graph(facts(), replace(choices, hides_quiet=False)).quiet_hidden == 0
+    assert node_graph(facts(), replace(choices, hides_quiet=False)).hidden_quiet_count == 0
 
 
 def test_group_of_only_quiet_nodes_stays_visible() -> None:
-    graph = node_graph(facts(), GraphChoices(quiet=frozenset({"1"})))
+    graph = node_graph(facts(), GraphOptions(quiet=frozenset({"1"})))
     box = graph.node("host:pepper")
     assert box is not None
-    assert (box.kind, box.members, box.quiet) == ("group", 1, 1)
+    assert (box.kind, box.member_count, box.quiet_count) == ("group", 1, 1)
 
 
 def test_restarted_node_keeps_its_key_and_duplicate_name_gets_another_key() -> None:
-    first = node_graph(facts(), GraphChoices())
+    first = node_graph(facts(), GraphOptions())
     restarted = tuple(replace(each, id="99") if each.name == "blackboard" else each for each in NODES)
-    second = node_graph(facts(restarted, ()), GraphChoices())
+    second = node_graph(facts(restarted, ()), GraphOptions())
     assert {each.key for each in first.nodes} == {each.key for each in second.nodes}
-    twins = node_graph(facts((*NODES, node("77", "blackboard")), ()), GraphChoices())
+    twins = node_graph(facts((*NODES, node("77", "blackboard")), ()), GraphOptions())
     keys = [each.key for each in twins.nodes if each.name == "blackboard"]
     assert sorted(keys) == ["|lab-pc|blackboard", "|lab-pc|blackboard|2"]
 
 
 def test_wildcard_subscriber_is_connected_to_all_matching_topics() -> None:
     wide = PatternInfo("/Pepper/*", "json", (SubscriberInfo(9, "5", 1, 0),))
-    found = lines(node_graph(facts(patterns=(wide,)), GraphChoices()))
+    found = lines(node_graph(facts(patterns=(wide,)), GraphOptions()))
     assert found["/Pepper/odom", "/Pepper/touch"] == ("pepper_driver", "RIZE+blackboard")
 
 
@@ -211,17 +211,17 @@ def test_web_pages_have_a_group_and_titles_known_to_the_server(group_by: GroupBy
         replace(node("8", "web_lab:8080_50002"), language="web"),
     )
     known = {"web_lab:8080_50001": PageNode("buttons.html", "192.168.1.52, Safari", "tablet")}
-    graph = node_graph(replace(facts((*NODES, *pages)), pages=known), GraphChoices(group_by=group_by))
+    graph = node_graph(replace(facts((*NODES, *pages)), pages=known), GraphOptions(group_by=group_by))
     drawn = [(each.name, each.page) for each in graph.nodes if each.kind == "page"]
     assert drawn == [("buttons.html", known["web_lab:8080_50001"]), ("lab:8080_50002", None)]
     (group,) = [each for each in graph.groups if each.key == WEB_GROUP]
-    assert (group.icon, group.members, graph.pages_there) == ("globe", 2, 2)
+    assert (group.icon, group.member_count, graph.page_count) == ("globe", 2, 2)
 
 
 def test_empty_facts_give_empty_graph() -> None:
-    assert node_graph(GraphFacts(), GraphChoices()) == NodeGraph()
+    assert node_graph(GraphFacts(), GraphOptions()) == NodeGraph()
 
 
 def test_topic_of_unknown_node_has_no_line() -> None:
-    graph = node_graph(facts(topics=(topic("/ghost", "89", "2"),)), GraphChoices())
-    assert graph.topics_there == 0
+    graph = node_graph(facts(topics=(topic("/ghost", "89", "2"),)), GraphOptions())
+    assert graph.topic_count == 0

@@ -4,7 +4,7 @@ import pytest
 
 from app.core.graph.layout import GraphLayout
 from app.core.graph.node_graph import DrawnNode, GraphLine, NodeGraph
-from app.core.graph.walk import Arrow, GraphChoice, step
+from app.core.graph.walk import Arrow, GraphSelection, move_selection
 
 GRAPH = NodeGraph(
     tuple(DrawnNode(key, key, "", "program") for key in "abcd"),
@@ -18,10 +18,10 @@ GRAPH = NodeGraph(
 PLACES = GraphLayout({"a": (0, 0), "b": (200, -100), "c": (200, 0), "d": (200, 100)})
 
 
-def walked(begin: GraphChoice | None, *arrows: Arrow) -> list[str]:
+def walked(begin: GraphSelection | None, *arrows: Arrow) -> list[str]:
     found = []
     for arrow in arrows:
-        begin = step(GRAPH, PLACES, begin, arrow)
+        begin = move_selection(GRAPH, PLACES, begin, arrow)
         assert begin is not None
         found.append(begin.key)
     return found
@@ -29,49 +29,49 @@ def walked(begin: GraphChoice | None, *arrows: Arrow) -> list[str]:
 
 def test_first_arrow_key_selects_the_leftmost_node() -> None:
     assert walked(None, "down") == ["a"]
-    assert walked(GraphChoice("node", "gone"), "right") == ["a"]
-    assert walked(GraphChoice("topic", "/gone", "a"), "right") == ["a"]
-    assert step(NodeGraph(), GraphLayout(), None, "right") is None
+    assert walked(GraphSelection("node", "gone"), "right") == ["a"]
+    assert walked(GraphSelection("topic", "/gone", "a"), "right") == ["a"]
+    assert move_selection(NodeGraph(), GraphLayout(), None, "right") is None
 
 
 def test_right_key_follows_a_line_and_left_key_goes_back() -> None:
-    assert walked(GraphChoice("node", "a"), "right", "right") == ["/two", "c"]
-    assert walked(GraphChoice("node", "a"), "right", "left") == ["/two", "a"]
-    assert walked(GraphChoice("node", "b"), "left", "left") == ["/two", "a"]
-    assert walked(GraphChoice("node", "b"), "left", "right") == ["/two", "b"]
-    assert walked(GraphChoice("node", "c"), "right", "right") == ["ask", "a"]
+    assert walked(GraphSelection("node", "a"), "right", "right") == ["/two", "c"]
+    assert walked(GraphSelection("node", "a"), "right", "left") == ["/two", "a"]
+    assert walked(GraphSelection("node", "b"), "left", "left") == ["/two", "a"]
+    assert walked(GraphSelection("node", "b"), "left", "right") == ["/two", "b"]
+    assert walked(GraphSelection("node", "c"), "right", "right") == ["ask", "a"]
 
 
 def test_up_and_down_keys_select_each_topic_of_a_node_once() -> None:
-    at = GraphChoice("topic", "/two", "a")
+    at = GraphSelection("topic", "/two", "a")
     assert walked(at, "down", "down", "down", "down") == ["/with", "/both", "/three", "/three"]
     assert walked(at, "up") == ["/two"]
 
 
 def test_up_and_down_keys_move_between_nodes() -> None:
-    assert walked(GraphChoice("node", "b"), "down", "down", "down", "up") == ["c", "d", "d", "c"]
+    assert walked(GraphSelection("node", "b"), "down", "down", "down", "up") == ["c", "d", "d", "c"]
 
 
 def test_node_without_lines_stays_selected() -> None:
-    assert walked(GraphChoice("node", "b"), "right") == ["b"]
+    assert walked(GraphSelection("node", "b"), "right") == ["b"]
 
 
 def test_bidirectional_line_leads_to_the_other_node() -> None:
-    at = GraphChoice("topic", "/both", "a")
+    at = GraphSelection("topic", "/both", "a")
     assert walked(at, "right") == ["d"]
     assert walked(at, "left") == ["a"]
 
 
 @pytest.mark.parametrize("arrow", ["left", "right", "up", "down"])
 def test_arrow_keys_always_select_an_existing_element(arrow: Arrow) -> None:
-    choices = [GraphChoice("node", key) for key in "abcd"]
+    choices = [GraphSelection("node", key) for key in "abcd"]
     choices += [
-        GraphChoice("topic", topic, origin, outward)
+        GraphSelection("topic", topic, origin, outward)
         for topic in ("/two", "/with", "/three", "/both", "ask")
         for origin in ("", "a", "b", "gone")
         for outward in (True, False)
     ]
     for choice in choices:
-        found = step(GRAPH, PLACES, choice, arrow)
+        found = move_selection(GRAPH, PLACES, choice, arrow)
         assert found is not None
-        assert found.key in PLACES.places or GRAPH.line_of(found.key) is not None
+        assert found.key in PLACES.positions or GRAPH.line_of(found.key) is not None

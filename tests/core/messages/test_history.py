@@ -95,17 +95,17 @@ def test_shallow_history_needs_no_extra_room_and_no_past_messages() -> None:
         lambda _topic: Watching(log), lambda: 0, lambda topic, room: log.append(f"{topic} {room}")
     )
     shallow, deep = MessageHistory(), MessageHistory()
-    feed.join("/a", shallow, deep=False)
+    feed.register("/a", shallow, deep=False)
     assert log == []
-    feed.join("/a", deep)
+    feed.register("/a", deep)
     assert log == ["/a 8192"]
     feed.add({"/a": Batch([message(1)])})
     assert numbers(shallow) == numbers(deep) == [1]
-    feed.leave("/a", deep)
-    feed.leave("/a", deep)
+    feed.unregister("/a", deep)
+    feed.unregister("/a", deep)
     assert log == ["/a 8192", "/a None"]
     feed.add({"/a": Batch([message(2)])})
     assert (numbers(shallow), numbers(deep)) == ([1, 2], [1])
-    feed.leave("/a", shallow)
+    feed.unregister("/a", shallow)
     assert log == ["/a 8192", "/a None", "closed"]
     assert feed.topics == ()

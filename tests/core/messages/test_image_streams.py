@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from app.core.messages.image_streams import Images, Rate
-from app.core.messages.picture import decode, once_more
+from app.core.messages.picture import decode, reuse_picture
 from app.core.network.watches import Watches
 from nep.messages.message import Message
 from tests.ui import fakes
@@ -80,15 +80,15 @@ def test_picture_is_decoded_again_for_another_size(
     first, second = (Message("/camera", data, "image", "image", seq=n) for n in (1, 2))
     shown, error = decode(first, 1.0, fit)
     assert shown is not None, error
-    again = once_more(shown, second, 2.0, fit)
+    again = reuse_picture(shown, second, 2.0, fit)
     assert again is not None
     assert (again.bgra is shown.bgra, again.seq, again.received_s) == (True, 2, 2.0)
-    assert once_more(shown, first, 2.0, fit) is None, "it is wanted in another size, and is to be decoded"
-    assert once_more(None, second, 2.0, fit) is None
-    whole = once_more(shown, second, 2.0, None)
-    assert (whole is not None) == shown.whole
+    assert reuse_picture(shown, first, 2.0, fit) is None, "it is wanted in another size, and is to be decoded"
+    assert reuse_picture(None, second, 2.0, fit) is None
+    whole = reuse_picture(shown, second, 2.0, None)
+    assert (whole is not None) == shown.is_full_resolution
     other = Message("/camera", data + b"x", "image", "image", seq=3)
-    assert once_more(shown, other, 3.0, fit) is None
+    assert reuse_picture(shown, other, 3.0, fit) is None
 
 
 @pytest.mark.parametrize("place", [0, 1, 5_000, 199_999])
@@ -99,10 +99,10 @@ def test_single_changed_byte_gives_a_new_picture(place: int) -> None:
     assert shown is not None, error
     data = bytearray(200_000)
     same = Message("/camera", bytes(data), "image", "image", seq=2, extension=shape)
-    assert once_more(shown, same, 2.0, None) is not None
+    assert reuse_picture(shown, same, 2.0, None) is not None
     data[place] = 1
     other = Message("/camera", bytes(data), "image", "image", seq=2, extension=shape)
-    assert once_more(shown, other, 2.0, None) is None
+    assert reuse_picture(shown, other, 2.0, None) is None
 
 
 def test_picture_is_decoded_for_its_stream(images: Images) -> None:
@@ -218,29 +218,29 @@ def large(seq: int, value: int = 9) -> Message:
 
 def test_picture_is_decoded_at_display_size_and_again_when_enlarged(images: Images) -> None:
     stream = images.stream("/camera")
-    stream.want((160, 120))
+    stream.set_size((160, 120))
     images.offer([large(1)])
     until(lambda: stream.picture is not None)
     assert stream.picture is not None
     assert stream.picture.bgra.shape == (120, 160, 4)
-    stream.want(None)
-    until(lambda: stream.picture is not None and stream.picture.whole)
+    stream.set_size(None)
+    until(lambda: stream.picture is not None and stream.picture.is_full_resolution)
     assert stream.picture.seq == 1
-    stream.want((100, 80))  # the next one is smaller; this one is good enough
-    assert stream.picture.whole
+    stream.set_size((100, 80))  # the next one is smaller; this one is good enough
+    assert stream.picture.is_full_resolution
     images.offer([large(2)])
     until(lambda: stream.picture is not None and stream.picture.seq == 2)
-    assert not stream.picture.whole
+    assert not stream.picture.is_full_resolution
 
 
 def test_largest_requested_size_of_two_panels_is_decoded(images: Images) -> None:
     small, whole = images.stream("/camera"), images.stream("/camera")
-    small.want((160, 120))
+    small.set_size((160, 120))
     images.offer([large(1)])
     until(lambda: small.picture is not None and whole.picture is not None)
     assert small.picture is whole.picture
     assert small.picture is not None
-    assert small.picture.whole
+    assert small.picture.is_full_resolution
 
 
 def test_held_picture_stays_and_is_decoded_in_full_on_demand_while_arrivals_are_counted(
@@ -248,19 +248,19 @@ def test_held_picture_stays_and_is_decoded_in_full_on_demand_while_arrivals_are_
 ) -> None:
     stream, other = images.stream("/camera"), images.stream("/camera")
     for each in (stream, other):
-        each.want((160, 120))
+        each.set_size((160, 120))
     images.offer([large(1)])
     until(lambda: stream.picture is not None)
-    stream.hold(True)
+    stream.set_frozen(True)
     images.offer([large(2)])
     until(lambda: other.picture is not None and other.picture.seq == 2)
     assert stream.picture is not None
     assert stream.picture.seq == 1
-    stream.want(None)
-    until(lambda: stream.picture is not None and stream.picture.whole)
+    stream.set_size(None)
+    until(lambda: stream.picture is not None and stream.picture.is_full_resolution)
     assert stream.picture.seq == 1
     until(lambda: stream.arriving_hz is not None)
-    stream.hold(False)
+    stream.set_frozen(False)
     images.offer([large(3)])
     until(lambda: stream.picture is not None and stream.picture.seq == 3)
 
@@ -285,20 +285,20 @@ def test_suspended_stream_decodes_nothing_and_keeps_its_picture(images: Images, 
     stream, other = images.stream("/camera"), images.stream("/camera")
     images.offer([jpeg((1, 2, 3), seq=1)])
     until(lambda: stream.picture is not None and other.picture is not None)
-    assert not stream.awaits_picture
+    assert not stream.is_awaiting_picture
     stream.suspend()
     stream.suspend()
     images.offer([jpeg((1, 2, 3), seq=2)])
     until(lambda: other.picture is not None and other.picture.seq == 2)
-    assert (stream.picture is not None and stream.picture.seq, stream.awaits_picture) == (1, True)
+    assert (stream.picture is not None and stream.picture.seq, stream.is_awaiting_picture) == (1, True)
     other.suspend()
     assert watched == [], "nobody looks"
     stream.resume()
     assert watched == ["/camera"]
-    assert stream.awaits_picture, "what it has may be old"
+    assert stream.is_awaiting_picture, "what it has may be old"
     images.offer([jpeg((1, 2, 3), seq=3)])
     until(lambda: stream.picture is not None and stream.picture.seq == 3)
-    assert not stream.awaits_picture
+    assert not stream.is_awaiting_picture
     stream.close()
     stream.resume()
     assert watched == [], "a stream that was closed stays closed"
@@ -322,17 +322,17 @@ def test_resumed_stream_is_not_reported_as_silent(kind: type[Images]) -> None:
 
 def test_held_picture_of_suspended_stream_can_be_enlarged_after_resume(images: Images) -> None:
     stream = images.stream("/camera")
-    stream.want((160, 120))
+    stream.set_size((160, 120))
     images.offer([large(1)])
     until(lambda: stream.picture is not None)
     assert stream.picture is not None
-    assert not stream.picture.whole
-    stream.hold(True)
+    assert not stream.picture.is_full_resolution
+    stream.set_frozen(True)
     stream.suspend()
-    stream.want(None)
+    stream.set_size(None)
     stream.resume()
-    until(lambda: stream.picture is not None and stream.picture.whole)
-    assert (stream.picture.seq, stream.awaits_picture) == (1, True)
+    until(lambda: stream.picture is not None and stream.picture.is_full_resolution)
+    assert (stream.picture.seq, stream.is_awaiting_picture) == (1, True)
 
 
 def test_streams_are_not_silent_while_source_is_paused(images: Images) -> None:
@@ -344,7 +344,7 @@ def test_streams_are_not_silent_while_source_is_paused(images: Images) -> None:
     until(lambda: stream.picture is not None)
     now[0] += 5.0
     assert stream.silent_s == 5.0
-    images.stand_still()
+    images.restart_silence()
     assert stream.silent_s == 0.0
     now[0] += 1.5
     assert (stream.silent_s, stream.age_s) == (1.5, 6.5)

@@ -49,7 +49,7 @@ def test_picture_without_target_size_is_decoded_in_full() -> None:
         5,
         7.0,
     )
-    assert picture.whole
+    assert picture.is_full_resolution
     assert picture.pixel(0, 0) == (200, 20, 10)
     assert picture.pixel(31, 23) == (40, 180, 30)
     assert picture.pixel(32, 0) is None
@@ -63,7 +63,7 @@ def test_small_view_gets_downscaled_picture(kind: str) -> None:
     assert picture is not None
     assert (picture.width, picture.height) == (640, 480)
     assert picture.bgra.shape == (120, 160, 4)
-    assert not picture.whole
+    assert not picture.is_full_resolution
     assert picture.pixel(3, 3) is None  # nobody decoded it
     red = (200, 20, 10) if kind == "rgb8" else (10, 20, 200)
     assert np.abs(picture.bgra[60, 10, :3].astype(int) - red).max() < 6
@@ -73,7 +73,7 @@ def test_small_view_gets_downscaled_picture(kind: str) -> None:
 def test_view_larger_than_half_size_gets_full_picture() -> None:
     picture, _ = decode(encoded(scene(640, 480), "jpg"), 0.0, (321, 241))
     assert picture is not None
-    assert picture.whole
+    assert picture.is_full_resolution
 
 
 def test_grey_and_depth_pictures_have_pixel_values() -> None:

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from app.core.messages.picture import decode
-from app.core.messages.picture_look import COLOUR_MAPS, PLAIN, PictureLook, in_colours, restored, toned
+from app.core.messages.picture_look import (
+    COLOUR_MAPS,
+    PLAIN,
+    PictureLook,
+    apply_colour_map,
+    apply_tones,
+    parse_look,
+)
 from nep.messages.message import Message
 
 ENCODINGS = {("uint8", 1): "mono8", ("uint16", 1): "mono16", ("uint8", 3): "bgr8"}
@@ -20,21 +27,21 @@ def message(array: np.ndarray) -> Message:
 
 def test_default_appearance_returns_picture_unchanged() -> None:
     picture = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
-    assert toned(PLAIN, picture) is picture
+    assert apply_tones(PLAIN, picture) is picture
 
 
 def test_brightness_and_contrast_are_applied_and_clipped() -> None:
     grey = np.array([[0, 64, 128, 192, 255]], np.uint8)
-    assert toned(PictureLook(brightness=0.5), grey).tolist() == [[128, 192, 255, 255, 255]]
-    assert toned(PictureLook(brightness=-1), grey).tolist() == [[0, 0, 0, 0, 0]]
-    assert toned(PictureLook(contrast=2), grey).tolist() == [[0, 1, 129, 255, 255]]
-    assert toned(PictureLook(contrast=0.1), grey).tolist() == [[115, 121, 128, 134, 140]]
+    assert apply_tones(PictureLook(brightness=0.5), grey).tolist() == [[128, 192, 255, 255, 255]]
+    assert apply_tones(PictureLook(brightness=-1), grey).tolist() == [[0, 0, 0, 0, 0]]
+    assert apply_tones(PictureLook(contrast=2), grey).tolist() == [[0, 1, 129, 255, 255]]
+    assert apply_tones(PictureLook(contrast=0.1), grey).tolist() == [[115, 121, 128, 134, 140]]
 
 
 @pytest.mark.parametrize("name", COLOUR_MAPS)
 def test_pixel_colours_match_the_colour_scale(name) -> None:
     depth = np.array([[100, 600, 1100]], np.uint16)
-    bgra, scale = in_colours(PictureLook(colours=name), depth)
+    bgra, scale = apply_colour_map(PictureLook(colours=name), depth)
     assert (scale.low, scale.high) == (100.0, 1100.0)
     assert bgra[0, 0, 2::-1].tolist() == scale.colours[0].tolist()
     assert bgra[0, 1, 2::-1].tolist() == scale.colours[127].tolist()
@@ -43,7 +50,7 @@ def test_pixel_colours_match_the_colour_scale(name) -> None:
 
 def test_custom_range_clips_values_outside() -> None:
     depth = np.array([[0.0, 1.0, 2.0, 9.0, np.nan, np.inf]], np.float32)
-    bgra, scale = in_colours(PictureLook(colours="grey", low=1.0, high=3.0), depth)
+    bgra, scale = apply_colour_map(PictureLook(colours="grey", low=1.0, high=3.0), depth)
     assert (scale.low, scale.high) == (1.0, 3.0)
     assert bgra[0, :, 0].tolist() == [0, 0, 127, 255, 0, 0]
 
@@ -58,15 +65,15 @@ def test_custom_range_clips_values_outside() -> None:
     ],
 )
 def test_unusual_values_have_a_colour_scale(numbers, ends) -> None:
-    bgra, scale = in_colours(PLAIN, numbers)
+    bgra, scale = apply_colour_map(PLAIN, numbers)
     assert bgra.shape == (*numbers.shape, 4)
     assert (scale.low, scale.high) == ends
 
 
 def test_contradictory_range_collapses_to_its_given_limit() -> None:
-    _bgra, scale = in_colours(PictureLook(low=50.0), np.array([[1, 2]], np.uint16))
+    _bgra, scale = apply_colour_map(PictureLook(low=50.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == 50.0
-    _bgra, scale = in_colours(PictureLook(high=-5.0), np.array([[1, 2]], np.uint16))
+    _bgra, scale = apply_colour_map(PictureLook(high=-5.0), np.array([[1, 2]], np.uint16))
     assert scale.low == scale.high == -5.0
 
 
@@ -89,7 +96,7 @@ def test_decoded_picture_has_its_appearance_and_colour_scale() -> None:
 @pytest.mark.parametrize(
     ("saved", "look"),
     [
-        (PictureLook(0.25, 2.0, "turbo", 1.0, 9.0).saved(), PictureLook(0.25, 2.0, "turbo", 1.0, 9.0)),
+        (PictureLook(0.25, 2.0, "turbo", 1.0, 9.0).to_json(), PictureLook(0.25, 2.0, "turbo", 1.0, 9.0)),
         (None, PLAIN),
         ({"brightness": 7, "contrast": 0, "colours": "none such"}, PictureLook(1.0, 0.1)),
         ({"brightness": "x", "contrast": float("nan"), "low": 10**400, "high": True}, PLAIN),
@@ -98,4 +105,4 @@ def test_decoded_picture_has_its_appearance_and_colour_scale() -> None:
     ],
 )
 def test_saved_appearance_is_restored_and_invalid_values_become_defaults(saved, look) -> None:
-    assert restored(saved) == look
+    assert parse_look(saved) == look

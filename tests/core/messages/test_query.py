@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.messages.query import MAX_LENGTH, FoundPath, JsonQuery, QueryAnswer
+from app.core.messages.query import MAX_LENGTH, FoundPath, JsonQuery, QueryResult
 from app.core.messages.reader import LARGE_BYTES, read
 from app.errors import QueryError
 from nep.messages.message import Message
@@ -23,7 +23,7 @@ SEEN = {
 
 
 def found(text: str, value: object = SEEN) -> dict[str, object]:
-    return {str(path): each for path, each in JsonQuery(text).answer(value).found.items()}
+    return {str(path): each for path, each in JsonQuery(text).evaluate(value).found.items()}
 
 
 def test_paths_written_by_panels_find_values() -> None:
@@ -40,11 +40,11 @@ def test_paths_written_by_panels_find_values() -> None:
 
 
 def test_query_results_are_the_message_values_with_their_paths() -> None:
-    answer = JsonQuery("$.people[?@.name=='Bea'].at").answer(SEEN)
+    answer = JsonQuery("$.people[?@.name=='Bea'].at").evaluate(SEEN)
     (path,) = answer.found
     assert path.steps == ("people", 1, "at")
     assert answer.found[path] is SEEN["people"][1]["at"]  # type: ignore[index]
-    assert FoundPath.of(()) == "$"
+    assert FoundPath.from_steps(()) == "$"
 
 
 def test_true_differs_from_one_and_equal_lists_are_equal() -> None:
@@ -105,23 +105,23 @@ MANY = {"people": [{"name": "Ann", "age": number} for number in range(1000)]}
     ],
 )
 def test_exponential_query_stops_at_step_limit_with_partial_result(text) -> None:
-    answer = JsonQuery(text).answer(MANY, most_steps=5000)
+    answer = JsonQuery(text).evaluate(MANY, most_steps=5000)
     assert answer.cut == "Search stopped after 5000 values; these were found so far."
 
 
 def test_comparing_long_lists_counts_towards_step_limit() -> None:
     lists = {"a": list(range(4000)), "b": list(range(4000))}
-    answer = JsonQuery("$[?$.a == $.b]").answer(lists, most_steps=3000)
+    answer = JsonQuery("$[?$.a == $.b]").evaluate(lists, most_steps=3000)
     assert answer.cut.startswith("Search stopped after 3000 values")
 
 
 def test_number_of_results_and_depth_are_limited() -> None:
-    answer = JsonQuery("$..age").answer(MANY, most_found=10)
+    answer = JsonQuery("$..age").evaluate(MANY, most_found=10)
     assert (len(answer.found), answer.cut) == (10, "Only the first 10 are shown.")
     deep: dict[str, object] = {}
     for _each in range(500):
         deep = {"a": deep}
-    answer = JsonQuery("$..*").answer(deep)
+    answer = JsonQuery("$..*").evaluate(deep)
     assert answer.found
     assert answer.cut
 
@@ -129,4 +129,6 @@ def test_number_of_results_and_depth_are_limited() -> None:
 def test_query_works_on_lazy_large_message() -> None:
     large = read(Message("/big", b'{"a": [{"x": 1}, {"x": 2}]}' + b" " * LARGE_BYTES, "json", "json"))
     assert found("$.a[?@.x > 1].x", large.value) == {"a[1].x": 2}
-    assert JsonQuery("$.a").answer(large.value) == QueryAnswer({FoundPath.of(("a",)): large.value["a"]})  # type: ignore[index]
+    assert JsonQuery("$.a").evaluate(large.value) == QueryResult(
+        {FoundPath.from_steps(("a",)): large.value["a"]}
+    )  # type: ignore[index]

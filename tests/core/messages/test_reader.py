@@ -69,7 +69,7 @@ def test_reader_runs_in_another_thread(reader: Reader, monkeypatch) -> None:
         return before(one)
 
     monkeypatch.setattr(reader_module, "read", watched)
-    reader.ask(message(json.dumps({"data": list(range(1000))}).encode()))
+    reader.submit(message(json.dumps({"data": list(range(1000))}).encode()))
     assert len(taken(reader).value["data"]) == 1000  # type: ignore[index, arg-type]
     assert len(threads) == 1
     assert threading.get_ident() not in threads
@@ -92,11 +92,11 @@ class SlowRead:
 
 def test_only_newest_pending_message_is_read(reader: Reader, monkeypatch) -> None:
     slow = SlowRead(monkeypatch)
-    reader.ask(message(b"1", seq=1))
+    reader.submit(message(b"1", seq=1))
     assert slow.began.wait(WAIT_S)
     for seq in range(2, 50):
-        reader.ask(message(b"1", seq=seq))
-    assert reader.busy
+        reader.submit(message(b"1", seq=seq))
+    assert reader.is_busy
     slow.go_on.set()
     found = taken(reader)
     while found.value != 49:
@@ -106,21 +106,21 @@ def test_only_newest_pending_message_is_read(reader: Reader, monkeypatch) -> Non
 
 def test_forgotten_message_is_not_delivered(reader: Reader, monkeypatch) -> None:
     slow = SlowRead(monkeypatch)
-    reader.ask(message(b"1", seq=1))
+    reader.submit(message(b"1", seq=1))
     assert slow.began.wait(WAIT_S)
-    reader.forget()
-    assert not reader.busy
+    reader.clear()
+    assert not reader.is_busy
     slow.go_on.set()
-    reader.ask(message(b"1", seq=2))
+    reader.submit(message(b"1", seq=2))
     assert taken(reader).value == 2
 
 
 def test_low_priority_reads_are_throttled_and_skipped_while_busy(reader: Reader) -> None:
-    assert reader.ask_at_leisure(message(b"[1]", seq=1), 10.0)
+    assert reader.submit_throttled(message(b"[1]", seq=1), 10.0)
     assert taken(reader).message.seq == 1
-    assert not reader.ask_at_leisure(message(b"[1]", seq=2), 10.9)
-    assert reader.ask_at_leisure(message(b"[1]", seq=3), 11.0)
+    assert not reader.submit_throttled(message(b"[1]", seq=2), 10.9)
+    assert reader.submit_throttled(message(b"[1]", seq=3), 11.0)
     assert taken(reader).message.seq == 3
-    reader.forget()  # another topic is shown
-    assert reader.ask_at_leisure(message(b"[1]", seq=4), 11.1)
-    assert not reader.ask_at_leisure(message(b"[1]", seq=5), 11.1)
+    reader.clear()  # another topic is shown
+    assert reader.submit_throttled(message(b"[1]", seq=4), 11.1)
+    assert not reader.submit_throttled(message(b"[1]", seq=5), 11.1)

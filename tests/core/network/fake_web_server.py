@@ -59,10 +59,10 @@ class FakeWebServer:
         self.rosbridge = on
         return 0
 
-    def let_in(self, page_id: int) -> None:
+    def unblock_page(self, page_id: int) -> None:
         self.kept_out.discard(page_id)
 
-    def keep_out(self, page_id: int) -> None:
+    def block_page(self, page_id: int) -> None:
         self.kept_out.add(page_id)
         self.leave(page_id)
 

@@ -69,7 +69,10 @@ def test_malformed_count_is_exact_after_window_was_busy(session: Session, talker
         tick_until(session, lambda: session.topics["/bad"].received == sent)
         assert bad_count(session, "/bad") == sent
         assert f"({sent} messages)" in session.alerts.active[0].title
-        assert session.topics["/bad"].shown_of == (MESSAGES_PER_TOPIC, sent)  # the ring was full, and yet
+        assert session.topics["/bad"].displayed_and_sent == (
+            MESSAGES_PER_TOPIC,
+            sent,
+        )  # the ring was full, and yet
 
 
 def ticking_s(session: Session, publisher: nep.Publisher, data: bytes, sent: int) -> float:
@@ -96,7 +99,7 @@ def test_100_000_malformed_messages_are_all_counted(session: Session, talker: ne
 
         def all_told() -> bool:
             publisher.publish_bytes(BAD)  # what was lost is known by what comes behind it
-            session.traffic.miss(session.source.missed(), time.monotonic())
+            session.traffic.count_lost(session.source.lost_counts(), time.monotonic())
             return topic.received + topic.missed >= sent
 
         tick_until(session, all_told, 30)
@@ -137,7 +140,7 @@ def test_messages_of_50_mb_are_received_and_only_the_newest_is_kept(
             publisher.publish_bytes(data)
 
         def arrived() -> bool:
-            session.traffic.miss(session.source.missed(), time.monotonic())
+            session.traffic.count_lost(session.source.lost_counts(), time.monotonic())
             topic = session.topics.get("/huge")
             return topic is not None and topic.received + topic.missed == 3
 

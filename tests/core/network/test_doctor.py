@@ -6,7 +6,7 @@ import socket
 import threading
 
 from app.core.network.doctor import Doctor, doctor_of
-from nep.programs.doctor import Finding, Tell
+from nep.programs.doctor import Finding, ProgressCallback
 
 FINE = Finding("master", "ok", "A master runs.")
 
@@ -21,35 +21,35 @@ def test_doctor_runs_in_background_and_keeps_its_findings() -> None:
         return [FINE]
 
     doctor = Doctor(look, lambda: 7.0)
-    assert (doctor.looking, doctor.looked_s, doctor.findings) == (False, None, ())
+    assert (doctor.is_running, doctor.finished_s, doctor.findings) == (False, None, ())
     doctor.start()
     doctor.start()  # it looks already
-    assert doctor.looking
+    assert doctor.is_running
     go_on.set()
     doctor.close()
     assert looks == ["studio-doctor"]
-    assert (doctor.looking, doctor.looked_s, doctor.findings) == (False, 7.0, (FINE,))
+    assert (doctor.is_running, doctor.finished_s, doctor.findings) == (False, 7.0, (FINE,))
     assert doctor.revision == 2
 
 
 def test_partial_findings_are_available_while_doctor_runs() -> None:
     went, go_on = threading.Event(), threading.Event()
 
-    def look(_topic: str, tell: Tell) -> list[Finding]:
+    def look(_topic: str, tell: ProgressCallback) -> list[Finding]:
         tell((FINE,), 1, 3)
         went.set()
         go_on.wait(30)
         return [FINE, FINE, FINE]
 
     doctor = Doctor(look)
-    assert doctor.so_far is None
+    assert doctor.partial_findings is None
     doctor.start()
     assert went.wait(30)
-    assert (doctor.so_far, doctor.looked_at, doctor.things) == ((FINE,), 1, 3)
-    assert (doctor.looked_s, doctor.findings) == (None, ())
+    assert (doctor.partial_findings, doctor.looked_at, doctor.things) == ((FINE,), 1, 3)
+    assert (doctor.finished_s, doctor.findings) == (None, ())
     go_on.set()
     doctor.close()
-    assert (doctor.so_far, len(doctor.findings)) == (None, 3)
+    assert (doctor.partial_findings, len(doctor.findings)) == (None, 3)
 
 
 def test_topic_requested_during_a_run_is_checked_next() -> None:
@@ -63,14 +63,14 @@ def test_topic_requested_during_a_run_is_checked_next() -> None:
         return [Finding("topic", "ok", topic)]
 
     doctor = Doctor(look)
-    doctor.miss("/a")
+    doctor.expect_topic("/a")
     assert began.wait(30)
-    doctor.miss("/b")
-    assert (doctor.missed, doctor.told_of) == ("/b", "")
+    doctor.expect_topic("/b")
+    assert (doctor.expected_topic, doctor.checked_topic) == ("/b", "")
     go_on.set()
     doctor.close()
     assert asked == ["/a", "/b"]
-    assert (doctor.told_of, doctor.findings[0].sentence) == ("/b", "/b")
+    assert (doctor.checked_topic, doctor.findings[0].sentence) == ("/b", "/b")
 
 
 def test_topics_of_other_networks_are_not_checked(tmp_path) -> None:
@@ -78,7 +78,7 @@ def test_topics_of_other_networks_are_not_checked(tmp_path) -> None:
         probe.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{probe.getsockname()[1]}"
     doctor = doctor_of(address, tmp_path)
-    doctor.miss("ros2 /camera")
+    doctor.expect_topic("ros2 /camera")
     doctor.close()
     assert not any(finding.id.startswith("topic") for finding in doctor.findings)
 

@@ -30,7 +30,7 @@ def test_full_queue_keeps_newest_messages_and_counts_dropped_ones() -> None:
     batch = mailbox.drain().batches["a"]
     assert [m.seq for m in batch.messages] == [7, 8, 9]
     assert batch.dropped == 7
-    assert batch.arrived == 10
+    assert batch.arrived_count == 10
 
 
 def test_successive_batches_keep_newest_messages_and_exact_drop_count() -> None:
@@ -39,7 +39,7 @@ def test_successive_batches_keep_newest_messages_and_exact_drop_count() -> None:
         mailbox.post("a", [message("a", number) for number in range(first, first + 3)])
     batch = mailbox.drain().batches["a"]
     assert [m.seq for m in batch.messages] == [26, 27, 28, 29]
-    assert (batch.dropped, batch.arrived) == (26, 30)
+    assert (batch.dropped, batch.arrived_count) == (26, 30)
 
 
 def test_queue_is_limited_in_bytes_but_keeps_one_message_of_any_size() -> None:
@@ -71,22 +71,22 @@ def test_every_message_is_counted_with_many_threads() -> None:
         thread.start()
     while any(thread.is_alive() for thread in threads):
         batch = mailbox.drain().batches.get("a")
-        arrived += batch.arrived if batch else 0
+        arrived += batch.arrived_count if batch else 0
     for thread in threads:
         thread.join()
     batch = mailbox.drain().batches.get("a")
-    arrived += batch.arrived if batch else 0
+    arrived += batch.arrived_count if batch else 0
     assert arrived == 8000
 
 
 def test_topic_can_temporarily_have_a_larger_queue() -> None:
     mailbox = Mailbox(messages_per_topic=4)
     messages = [Message("/a", b"1", "json", "json", seq=n) for n in range(10)]
-    mailbox.set_room("/a", 8)
+    mailbox.set_capacity("/a", 8)
     mailbox.post("/a", messages)
     mailbox.post("/b", messages)
     drained = mailbox.drain().batches
     assert [(len(each.messages), each.dropped) for each in drained.values()] == [(8, 2), (4, 6)]
-    mailbox.set_room("/a", None)
+    mailbox.set_capacity("/a", None)
     mailbox.post("/a", messages)
     assert len(mailbox.drain().batches["/a"].messages) == 4

@@ -48,7 +48,7 @@ def test_foreign_program_at_master_address_is_named_once_and_retried_with_backof
     assert len(told) == 1
     assert f"(process {os.getpid()}) uses port " in told[0]
     assert "NEP_MASTER=" in told[0]
-    assert not start.runs
+    assert not start.has_started
     assert not [each for each in psutil.Process().children() if "master" in each.cmdline()]
 
 
@@ -57,7 +57,7 @@ def test_running_master_is_joined(master) -> None:
     start = MasterStart(master.address, told.append)
     start.ensure()
     start.close()
-    assert (told, start.runs, start.first) == ([], False, False)
+    assert (told, start.has_started, start.first) == ([], False, False)
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def the_one_started(address: str) -> None:
     start = MasterStart(address, told.append)
     start.ensure()
     start.ensure()  # one start at a time
-    eventually(lambda: start.runs)
+    eventually(lambda: start.has_started)
     assert start.first
     assert nep.is_running(address, 5)
     start.close()
@@ -106,18 +106,18 @@ def view(epoch: int) -> GraphView:
 
 def test_first_and_unchanged_master_are_accepted_at_once() -> None:
     learning = MasterChange()
-    assert not learning.still(None, view(1), 0.0)
-    assert not learning.still(view(1), view(1), 1.0)
+    assert not learning.is_incomplete(None, view(1), 0.0)
+    assert not learning.is_incomplete(view(1), view(1), 1.0)
 
 
 def test_graph_of_new_master_is_accepted_after_discovery_time() -> None:
     learning = MasterChange()
-    assert learning.still(view(1), view(2), 10.0)
-    assert learning.still(view(1), view(2), 10.0 + DISCOVERY_S - 0.1)
-    assert not learning.still(view(1), view(2), 10.0 + DISCOVERY_S)
+    assert learning.is_incomplete(view(1), view(2), 10.0)
+    assert learning.is_incomplete(view(1), view(2), 10.0 + DISCOVERY_S - 0.1)
+    assert not learning.is_incomplete(view(1), view(2), 10.0 + DISCOVERY_S)
 
 
 def test_third_master_restarts_discovery_time() -> None:
     learning = MasterChange()
-    learning.still(view(1), view(2), 10.0)
-    assert learning.still(view(1), view(3), 10.0 + DISCOVERY_S)
+    learning.is_incomplete(view(1), view(2), 10.0)
+    assert learning.is_incomplete(view(1), view(3), 10.0 + DISCOVERY_S)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.core.network.nodes import GONE_SHOWN_S, Nodes
+from app.core.network.nodes import GONE_DISPLAY_S, Nodes
 from nep.protocol.graph_view import (
     GraphView,
     NodeInfo,
@@ -58,11 +58,11 @@ def test_nodes_after_first_graph_are_new_until_seen() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a")]), 0)
     nodes.update(view(2, [node("a"), node("b")]), 1)
-    assert [each.new for each in nodes] == [False, True]
+    assert [each.is_new for each in nodes] == [False, True]
     before = nodes.revision
     nodes.mark_seen("b")
     nodes.mark_seen("b")
-    assert [each.new for each in nodes] == [False, False]
+    assert [each.is_new for each in nodes] == [False, False]
     assert nodes.revision == before + 1
 
 
@@ -79,10 +79,10 @@ def test_vanished_node_stays_listed_for_ten_seconds_with_its_topics() -> None:
     nodes = Nodes()
     nodes.update(view(1, [node("a", cpu=0.2)], [topic("/x", "a")]), 0)
     nodes.update(view(2, []), 5)
-    nodes.age(9)
+    nodes.update_ages(9)
     (gone,) = nodes
     assert (gone.gone_s, gone.publishes, gone.cpu_ratio) == (4, ("/x",), None)
-    nodes.age(5 + GONE_SHOWN_S)
+    nodes.update_ages(5 + GONE_DISPLAY_S)
     assert len(nodes) == 0
 
 
@@ -99,9 +99,9 @@ def test_reappearing_node_is_live_again() -> None:
     nodes.update(view(1, [node("a")]), 0)
     nodes.update(view(2, []), 1)
     nodes.update(view(3, [node("a")]), 2)
-    nodes.age(30)
+    nodes.update_ages(30)
     (back,) = nodes
-    assert (back.gone_s, back.new) == (None, False)
+    assert (back.gone_s, back.is_new) == (None, False)
 
 
 def test_gateway_is_hidden_and_original_nodes_are_marked() -> None:

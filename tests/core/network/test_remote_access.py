@@ -58,12 +58,12 @@ def make(world, tmp_path):
 
 def test_user_can_allow_and_deny_connections_from_other_computers(world, make):
     reach, alerts = make()
-    assert reach.typed_by_others("192.168.1.20") == "NEP_MASTER=192.168.1.20:7780"
-    reach.listen_at(["192.168.1.20"])
+    assert reach.environment_variable("192.168.1.20") == "NEP_MASTER=192.168.1.20:7780"
+    reach.listen_on(["192.168.1.20"])
     world.answer(reach)
     assert world.asked == [(("192.168.1.20",), "127.0.0.1:7780")]
     assert reach.hosts == ("192.168.1.20",)
-    reach.listen_at([])
+    reach.listen_on([])
     world.answer(reach)
     assert reach.hosts == ()
     assert not alerts.active
@@ -72,13 +72,13 @@ def test_user_can_allow_and_deny_connections_from_other_computers(world, make):
 
 def test_remote_access_choice_is_sent_once_to_each_new_master(world, make):
     reach, _alerts = make()
-    reach.listen_at(["192.168.1.20"])
+    reach.listen_on(["192.168.1.20"])
     world.answer(reach)
     again, _alerts = make()
-    again.follow(GraphView(epoch=7, revision=1))
+    again.update_graph(GraphView(epoch=7, revision=1))
     world.answer(again)
-    again.follow(GraphView(epoch=7, revision=2))
-    again.follow(GraphView(epoch=8, revision=1, listens=("192.168.1.20",)))
+    again.update_graph(GraphView(epoch=7, revision=2))
+    again.update_graph(GraphView(epoch=8, revision=1, listens=("192.168.1.20",)))
     again.close()
     assert len(world.asked) == 2
     assert again.hosts == ("192.168.1.20",)
@@ -87,14 +87,14 @@ def test_remote_access_choice_is_sent_once_to_each_new_master(world, make):
 def test_rejected_remote_access_is_an_alert_with_fix_until_resolved(world, make):
     reach, alerts = make()
     world.refusal = "'192.168.1.20' is not an address of this computer; its addresses: 10.0.0.7"
-    reach.listen_at(["192.168.1.20"])
+    reach.listen_on(["192.168.1.20"])
     world.answer(reach)
     (alert,) = alerts.active
     assert (alert.id, alert.action) == (ALERT, "network.others")
     assert alert.detail == f"{world.refusal}."
     assert reach.hosts == ()
     world.refusal = ""
-    reach.listen_at(["10.0.0.7"])
+    reach.listen_on(["10.0.0.7"])
     world.answer(reach)
     assert not alerts.active
     reach.close()
@@ -104,7 +104,7 @@ def test_unsaved_remote_access_choice_is_applied_and_reported(world, make, tmp_p
     reach, alerts = make()
     (tmp_path / "settings.json").mkdir()  # as a full disk: nothing can be written there
     for hosts, words in ((["192.168.1.20"], "Can't save this change"), ([], "Can't save this change")):
-        reach.listen_at(hosts)
+        reach.listen_on(hosts)
         world.answer(reach)
         assert world.asked[-1][0] == tuple(hosts)
         assert reach.hosts == tuple(hosts)
@@ -112,7 +112,7 @@ def test_unsaved_remote_access_choice_is_applied_and_reported(world, make, tmp_p
         assert alert.title == "The list of allowed connections can't be saved."
         assert alert.detail.startswith(words)
     (tmp_path / "settings.json").rmdir()
-    reach.listen_at(["192.168.1.20"])
+    reach.listen_on(["192.168.1.20"])
     world.answer(reach)
     assert not alerts.active
     reach.close()
@@ -120,14 +120,14 @@ def test_unsaved_remote_access_choice_is_applied_and_reported(world, make, tmp_p
 
 def test_remote_access_choice_is_not_sent_to_master_of_another_computer(make, world):
     near, _alerts = make()
-    near.listen_at(["192.168.1.20"])  # kept, for the master of this computer
+    near.listen_on(["192.168.1.20"])  # kept, for the master of this computer
     world.answer(near)
     world.asked.clear()
     near.close()
     reach, _alerts = make("192.168.1.9:7780")
-    assert not reach.is_near
+    assert not reach.is_local
     assert reach.master_host == "192.168.1.9"
-    reach.follow(GraphView(epoch=1, revision=1, listens=("192.168.1.9",)))
+    reach.update_graph(GraphView(epoch=1, revision=1, listens=("192.168.1.9",)))
     reach.close()
     assert not world.asked
 
@@ -142,8 +142,8 @@ def test_last_remote_access_choice_is_sent_last_despite_slow_first_request(world
 
     monkeypatch.setattr(world, "ask", slow)
     reach, _alerts = make()
-    reach.listen_at(["192.168.1.20"])
-    reach.listen_at([])
+    reach.listen_on(["192.168.1.20"])
+    reach.listen_on([])
     assert told == []
     may_go_on.set()
     reach.close()

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 import nep
-from app.core.network.source import GraphSeen, LiveSource, MasterFound, MasterLost
+from app.core.network.source import GraphReceived, LiveSource, MasterFound, MasterLost
 from nep.masters.master import Master
 from nep.masters.process import view_or_none
 from nep.nodes.log_handler import LOG_TOPIC, LOG_TYPE
@@ -72,12 +72,12 @@ def test_missed_messages_are_counted_from_start_of_watch(
         source.watch("/a")
         until(lambda: publisher.subscribers == 1, "it listens")
         publisher.publish(1)
-        until(lambda: source.missed().get("/a") == 0, "nothing was lost")
+        until(lambda: source.lost_counts().get("/a") == 0, "nothing was lost")
         _, subscriber = source._subscribers["/a"]
         subscriber._transport._readable.sources.lost += 5  # as libzmq does when nobody reads for long
-        assert source.missed()["/a"] == 5
+        assert source.lost_counts()["/a"] == 5
         source.watch("/a")  # somebody looks anew
-        assert source.missed()["/a"] == 0
+        assert source.lost_counts()["/a"] == 0
         source.unwatch("/a")
-        until(lambda: "/a" not in source.missed(), "nobody looks")
-    assert {type(event) for event in events} == {MasterFound, GraphSeen}
+        until(lambda: "/a" not in source.lost_counts(), "nobody looks")
+    assert {type(event) for event in events} == {MasterFound, GraphReceived}

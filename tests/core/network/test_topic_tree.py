@@ -9,9 +9,9 @@ from app.core.network.topic_tree import (
     TopicFolder,
     TopicTree,
     TreeRow,
-    fits,
     folders_above,
     parts_of_name,
+    topic_filter,
 )
 from app.core.network.topics import Topic
 
@@ -27,7 +27,7 @@ def keys(tree: TopicTree) -> list[str]:
 def test_folders_precede_their_topics_and_topic_may_have_folder_name() -> None:
     tree = TopicTree([Topic(name) for name in ("/b", "/a/y", "/a/x", "/a/x/deep", "/a")])
     assert keys(tree) == ["/a", "/a/*", "/a/x", "/a/x/*", "/a/x/deep", "/a/y", "/b"]
-    assert [folder.deep for folder in tree] == [0, 1]
+    assert [folder.depth for folder in tree] == [0, 1]
 
 
 def test_collapsed_folder_hides_its_contents() -> None:
@@ -44,15 +44,15 @@ def test_folder_sums_known_figures_of_live_topics() -> None:
         Topic("/c/unknown"),
     ]
     tree = TopicTree(topics)
-    figures = tree["/a/*"].figures
+    figures = tree["/a/*"].stats
     assert (figures.rate_hz, figures.bandwidth_Bps, figures.age_s, figures.lost) == (15.5, 100.0, 1.0, 2)
-    assert tree["/a/b/*"].figures.lost is None
-    unknown = tree["/c/*"].figures
+    assert tree["/a/b/*"].stats.lost is None
+    unknown = tree["/c/*"].stats
     assert (unknown.rate_hz, unknown.bandwidth_Bps, unknown.age_s, unknown.lost) == (None,) * 4
     topics[0].rate_hz = 20.0
-    assert tree["/a/*"].figures.rate_hz == 15.5  # nothing is added up twice for one painting
-    tree.renew()
-    assert tree["/a/*"].figures.rate_hz == 25.5
+    assert tree["/a/*"].stats.rate_hz == 15.5  # nothing is added up twice for one painting
+    tree.invalidate_stats()
+    assert tree["/a/*"].stats.rate_hz == 25.5
 
 
 def test_networks_have_separate_folders() -> None:
@@ -81,7 +81,7 @@ def test_tree_depth_is_limited() -> None:
     name = "/x" * 10_000
     assert len(parts_of_name(name)) == MAX_DEPTH + 1
     assert len(folders_above(name)) == MAX_DEPTH
-    assert max(folder.deep for folder in TopicTree([Topic(name)])) == MAX_DEPTH - 1
+    assert max(folder.depth for folder in TopicTree([Topic(name)])) == MAX_DEPTH - 1
 
 
 def test_folders_above_a_topic() -> None:
@@ -110,4 +110,4 @@ def test_folders_above_a_topic() -> None:
     ],
 )
 def test_filter_words_match_substrings_and_patterns_match_whole_name(words, fit) -> None:
-    assert fits(words)("/robot/depth", " /robot/depth image camera_driver") is fit
+    assert topic_filter(words)("/robot/depth", " /robot/depth image camera_driver") is fit

@@ -6,9 +6,15 @@ from dataclasses import replace
 from itertools import count
 
 from app.core.network.mailbox import Batch
-from app.core.network.topics import GONE_SHOWN_S, START_S, STATISTICS_LATE_S, Topics, total_rate_hz
+from app.core.network.topics import (
+    GONE_DISPLAY_S,
+    MIN_REPORTED_SILENCE_S,
+    START_GRACE_S,
+    Topics,
+    total_rate_hz,
+)
 from nep.messages.clocks import ClockDifference, PublisherClock
-from nep.messages.message import Message, kind_of
+from nep.messages.message import Message, message_kind
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 NODE = NodeInfo("n1", "camera_driver", "here", 5, "python", "native", 0)
@@ -40,9 +46,9 @@ def test_topics_after_first_graph_are_new_until_seen() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(info("/a"), info("/b")), 1)
-    assert [topic.new for topic in topics] == [False, True]
+    assert [topic.is_new for topic in topics] == [False, True]
     topics.mark_seen("/b")
-    assert not topics["/b"].new
+    assert not topics["/b"].is_new
 
 
 def test_topic_figures_come_from_publishers_and_node_names_are_sorted() -> None:
@@ -51,7 +57,7 @@ def test_topic_figures_come_from_publishers_and_node_names_are_sorted() -> None:
     topic = topics["/a"]
     assert (topic.rate_hz, topic.bandwidth_Bps, topic.lost, topic.loss_ratio) == (30.0, 100.0, 3, 0.1)
     assert topic.publisher_nodes == ("camera_driver",)
-    topics.age(0, 1_500_000_000)
+    topics.update_ages(0, 1_500_000_000)
     assert topic.age_s == 0.5
 
 
@@ -59,30 +65,30 @@ def test_vanished_topic_stays_listed_for_ten_seconds_with_unknown_figures() -> N
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(), 5)
-    topics.age(9, 0)
+    topics.update_ages(9, 0)
     assert topics["/a"].gone_s == 4
     assert (topics["/a"].rate_hz, topics["/a"].age_s, topics["/a"].publishers) == (None, None, 0)
-    assert topics.live() == []
-    topics.age(5 + GONE_SHOWN_S, 0)
+    assert topics.existing_topics() == []
+    topics.update_ages(5 + GONE_DISPLAY_S, 0)
     assert len(topics) == 0
 
 
 def test_vanished_watched_topic_leaves_the_list_and_can_return() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
-    topics["/a"].watched = True
+    topics["/a"].is_watched = True
     topics.update(view(), 5)
-    topics.age(5 + GONE_SHOWN_S, 0)
+    topics.update_ages(5 + GONE_DISPLAY_S, 0)
     before = topics.revision
-    topics.age(6 + GONE_SHOWN_S, 0)
+    topics.update_ages(6 + GONE_DISPLAY_S, 0)
     assert (len(topics), list(topics), topics.revision) == (0, [], before)
     assert topics.get("/a") is not None, "whoever looks at it keeps it"
     topics.update(view(info("/a")), 30)
     assert [topic.name for topic in topics] == ["/a"]
     topics.update(view(), 40)
-    topics.age(40 + GONE_SHOWN_S, 0)
+    topics.update_ages(40 + GONE_DISPLAY_S, 0)
     topics.unwatch("/a")
-    topics.age(41 + GONE_SHOWN_S, 0)
+    topics.update_ages(41 + GONE_DISPLAY_S, 0)
     assert (len(topics), topics.get("/a")) == (0, None)
 
 
@@ -93,15 +99,15 @@ def test_own_subscription_does_not_keep_topic_alive() -> None:
         1, 1, {"n1": NODE, "n2": looking}, {"/a": info("/a", subscribers=(SubscriberInfo(9, "n2", 0, 0),))}
     )
     topics.update(there, 0)
-    assert topics.live()
+    assert topics.existing_topics()
     left = info("/a", publishers=0, subscribers=(SubscriberInfo(9, "n2", 0, 0),))
     topics.update(GraphView(1, 2, {"n2": looking}, {"/a": left}), 1)
-    assert topics.live() == []
+    assert topics.existing_topics() == []
     foreign = info(
         "/a", publishers=0, subscribers=(SubscriberInfo(9, "n2", 0, 0), SubscriberInfo(8, "n1", 0, 0))
     )
     topics.update(GraphView(1, 3, {"n1": NODE, "n2": looking}, {"/a": foreign}), 2)
-    assert [topic.name for topic in topics.live()] == ["/a"]
+    assert [topic.name for topic in topics.existing_topics()] == ["/a"]
 
 
 def test_reappearing_topic_is_live_again() -> None:
@@ -139,7 +145,7 @@ def test_age_without_time_stamps_counts_from_arrival() -> None:
     topics = Topics()
     topics.update(view(info("/a", last_stamp_ns=None)), 0)
     topics.add("/a", Batch([message(1)]), 10)
-    topics.age(12, 999)
+    topics.update_ages(12, 999)
     assert topics["/a"].age_s == 2
 
 
@@ -165,14 +171,14 @@ def test_many_topics_are_updated_and_aged_incrementally() -> None:
     topics.update(view(*map(info, names), revision=7), 0)
     topics.update(view(*[info(name, rate_hz=12.0) for name in names], revision=7), 0)
     for _ in range(3):
-        topics.age(0, 4_000_000_000)
+        topics.update_ages(0, 4_000_000_000)
     assert {(topic.age_s, topic.rate_hz) for topic in topics} == {(3.0, 12.0)}
     for _ in range(3):
-        topics.age(0, 5_000_000_000)
+        topics.update_ages(0, 5_000_000_000)
     assert {tuple(topic.rates) for topic in topics} == {(10.0, 12.0)}
     topics.update(GraphView(1, 2, {"n1": NODE}, {}), 10.0)
     for _ in range(6):
-        topics.age(10.0 + GONE_SHOWN_S, 0)
+        topics.update_ages(10.0 + GONE_DISPLAY_S, 0)
     assert len(topics) == 0
 
 
@@ -187,7 +193,7 @@ def heard(
 
 
 def silence(topics: Topics, now: float) -> float | None:
-    topics.age(now, 90_000_000_000)
+    topics.update_ages(now, 90_000_000_000)
     return topics["/a"].silent_s
 
 
@@ -201,7 +207,7 @@ def test_unwatched_stream_is_not_silent() -> None:
 def test_watched_stream_is_silent_since_its_last_message() -> None:
     topics = Topics()
     topics.update(view(heard()), 10)
-    topics["/a"].watched = True
+    topics["/a"].is_watched = True
     topics.add("/a", Batch([message(1)]), 20)
     assert silence(topics, 20.5) == 0.5
     assert silence(topics, 24) == 4.0
@@ -213,9 +219,9 @@ def test_newly_watched_stream_has_grace_period() -> None:
     topics = Topics()
     topics.update(view(info("/a")), 0)
     topics.update(view(heard()), 100)
-    topics["/a"].watched = True
-    assert silence(topics, 100 + START_S) == 0.0
-    assert silence(topics, 104 + START_S) == 4.0
+    topics["/a"].is_watched = True
+    assert silence(topics, 100 + START_GRACE_S) == 0.0
+    assert silence(topics, 104 + START_GRACE_S) == 4.0
     topics.update(view(heard(sender=2)), 110)
     assert silence(topics, 112) == 0.0, "another publisher has taken its place"
 
@@ -223,9 +229,9 @@ def test_newly_watched_stream_has_grace_period() -> None:
 def test_wrong_clock_does_not_cause_silence() -> None:
     topics = Topics()
     topics.update(view(heard()), 0)
-    topics["/a"].watched = True
+    topics["/a"].is_watched = True
     topics.add("/a", Batch([message(1, stamp_ns=1)]), 8)
-    topics.age(8.1, 10**18)
+    topics.update_ages(8.1, 10**18)
     assert (round(topics["/a"].silent_s or 0, 3), topics["/a"].age_s) == (0.1, (10**18 - 10**9) / 1e9)
 
 
@@ -234,15 +240,15 @@ def test_silence_of_topics_received_by_others_follows_last_master_report() -> No
     topics.update(view(heard()), 0)
     topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10)
     assert silence(topics, 60) == 0.0, "the master has gone; nobody knows"
-    topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10 + STATISTICS_LATE_S)
-    assert silence(topics, 60) == STATISTICS_LATE_S
+    topics.update(view(heard(last_stamp_ns=2_000_000_000), revision=5), 10 + MIN_REPORTED_SILENCE_S)
+    assert silence(topics, 60) == MIN_REPORTED_SILENCE_S
 
 
 def test_topic_that_never_sent_is_not_silent() -> None:
     topics = Topics()
     never = replace(heard(), last_stamp_ns=None)
     topics.update(view(never), 0)
-    topics["/a"].watched = True
+    topics["/a"].is_watched = True
     assert silence(topics, 100) is None
 
 
@@ -254,12 +260,12 @@ def test_message_ages_are_corrected_by_clock_offset() -> None:
     seen = replace(view(info("/a")), nodes={"n1": far, "me": mine})
     topics.update(seen, 0)
     # Its clock is three hours ahead of ours.
-    topics.age(0, 1_000_000_000 - 3 * hour + 500_000_000)
+    topics.update_ages(0, 1_000_000_000 - 3 * hour + 500_000_000)
     assert topics["/a"].age_s == 0.5
     newest = message(1, stamp_ns=1_200_000_000)
-    newest.kind = kind_of("/a", "json", "json", clock=PublisherClock(ClockDifference(-3 * hour, 10)))
+    newest.kind = message_kind("/a", "json", "json", clock=PublisherClock(ClockDifference(-3 * hour, 10)))
     topics.add("/a", Batch([newest]), 0)
-    topics.age(0, 1_000_000_000 - 3 * hour + 500_000_000)
+    topics.update_ages(0, 1_000_000_000 - 3 * hour + 500_000_000)
     assert topics["/a"].age_s == 0.3
 
 
@@ -270,7 +276,7 @@ def test_newest_message_of_publishers_on_two_computers_counts() -> None:
     near = replace(publisher(), id=2, node_id="me", last_stamp_ns=4_000_000_000)
     both = replace(info("/a"), publishers=(replace(publisher(), last_stamp_ns=10**12), near))
     topics.update(replace(view(both), nodes={"n1": far, "me": mine}), 0)
-    topics.age(0, 4_250_000_000)
+    topics.update_ages(0, 4_250_000_000)
     assert topics["/a"].age_s == 0.25
 
 
@@ -278,5 +284,5 @@ def test_ages_are_not_corrected_without_own_clock_offset() -> None:
     topics = Topics(own=("mine", 7))
     far = replace(NODE, clock_offset_ns=-(10**12))
     topics.update(replace(view(info("/a")), nodes={"n1": far}), 0)
-    topics.age(0, 1_500_000_000)
+    topics.update_ages(0, 1_500_000_000)
     assert topics["/a"].age_s == 0.5

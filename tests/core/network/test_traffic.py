@@ -6,7 +6,7 @@ from collections.abc import ValuesView
 from dataclasses import replace
 
 from app.core.network.mailbox import Batch
-from app.core.network.topics import AT_ONCE, Topics
+from app.core.network.topics import BATCH_SIZE, Topics
 from app.core.network.traffic import WINDOW_S, RecentLosses, Traffic
 from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
@@ -22,10 +22,10 @@ def test_dropped_and_missed_messages_count_as_sent_but_not_shown() -> None:
     topics.add("/a", batch(2, 5), 1.0)
     traffic.add({"/a": batch(2, 5), "/b": batch(1, 0)}, 1.0)
     assert (traffic.shown_30s, traffic.sent_30s) == (3, 8)
-    traffic.miss({"/a": 10, "/unknown": 99}, 2.0)
-    traffic.miss({"/a": 14}, 3.0)
+    traffic.count_lost({"/a": 10, "/unknown": 99}, 2.0)
+    traffic.count_lost({"/a": 14}, 3.0)
     assert (traffic.shown_30s, traffic.sent_30s) == (3, 22)
-    assert topics["/a"].shown_of == (2, 7 + 14)
+    assert topics["/a"].displayed_and_sent == (2, 7 + 14)
 
 
 def test_only_last_30_seconds_are_counted() -> None:
@@ -42,11 +42,11 @@ def test_new_subscription_counts_from_zero() -> None:
     topics = Topics()
     traffic = Traffic(topics)
     topics.add("/a", batch(1, 0), 0.0)
-    traffic.miss({"/a": 7}, 0.0)
+    traffic.count_lost({"/a": 7}, 0.0)
     topics.unwatch("/a")
     topics.add("/a", batch(1, 0), 1.0)
-    traffic.miss({"/a": 2}, 1.0)
-    assert topics["/a"].shown_of == (1, 3)
+    traffic.count_lost({"/a": 2}, 1.0)
+    assert topics["/a"].displayed_and_sent == (1, 3)
     assert traffic.sent_30s == 9
 
 
@@ -57,9 +57,9 @@ def test_network_figures_come_from_the_graph() -> None:
     def view(lost: int) -> GraphView:
         return GraphView(1, 1, {}, {"/a": TopicInfo("/a", "json", "json", (one,), lost=lost, rate_hz=10.0)})
 
-    traffic.follow(view(4), 0.0)
+    traffic.update_graph(view(4), 0.0)
     assert (traffic.messages_per_s, traffic.lost_30s) == (10.0, 0)
-    traffic.follow(view(9), 1.0)
+    traffic.update_graph(view(9), 1.0)
     assert traffic.lost_30s == 5
 
 
@@ -77,17 +77,17 @@ def test_figures_of_many_topics_are_summed_twice_a_second_including_last_ones() 
     traffic = Traffic(Topics())
     one = TopicInfo("/a", "json", "json", lost=1, rate_hz=2.0)
     views = [
-        GraphView(1, 1, {}, Counted({f"/{n}": replace(one, lost=told) for n in range(AT_ONCE + 1)}))
+        GraphView(1, 1, {}, Counted({f"/{n}": replace(one, lost=told) for n in range(BATCH_SIZE + 1)}))
         for told in range(1, 21)
     ]
     for number, view in enumerate(views):
-        traffic.follow(view, number / 20)
+        traffic.update_graph(view, number / 20)
         traffic.add({}, number / 20)
     went = sum(view.topics.times for view in views if isinstance(view.topics, Counted))
     assert 4 <= went <= 6  # each time for what was lost and for the rates
     traffic.add({}, 2.0)
-    assert traffic.messages_per_s == 2.0 * (AT_ONCE + 1)
-    assert traffic.lost_30s == 19 * (AT_ONCE + 1)
+    assert traffic.messages_per_s == 2.0 * (BATCH_SIZE + 1)
+    assert traffic.lost_30s == 19 * (BATCH_SIZE + 1)
 
 
 def test_only_recent_losses_are_counted() -> None:

@@ -10,11 +10,11 @@ def test_first_watch_subscribes_and_last_close_unsubscribes() -> None:
     watches = Watches(lambda topic: calls.append(f"+{topic}"), lambda topic: calls.append(f"-{topic}"))
     first = watches.open(["/a", "/b"])
     with watches.open(["/a"]):
-        assert watches.watched("/a")
+        assert watches.is_watched("/a")
     first.close()
     first.close()
     assert calls == ["+/a", "+/b", "-/a", "-/b"]
-    assert not watches.watched("/a")
+    assert not watches.is_watched("/a")
 
 
 def test_suspended_watch_is_unsubscribed_but_remembered() -> None:
@@ -23,7 +23,7 @@ def test_suspended_watch_is_unsubscribed_but_remembered() -> None:
     first, second = watches.open(["/a"]), watches.open(["/a"])
     first.suspend()
     first.suspend()
-    assert (calls, watches.watched("/a"), first.resting) == (["+/a"], True, True)
+    assert (calls, watches.is_watched("/a"), first.is_suspended) == (["+/a"], True, True)
     second.close()
     assert calls == ["+/a", "-/a"], "the other one only rests, and still wants to know"
     first.resume()
@@ -34,4 +34,4 @@ def test_suspended_watch_is_unsubscribed_but_remembered() -> None:
     assert calls == ["+/a", "-/a", "+/a", "-/a", "!/a"]
     first.resume()
     first.close()
-    assert (calls[-1], len(calls), watches.watched("/a")) == ("!/a", 5, False)
+    assert (calls[-1], len(calls), watches.is_watched("/a")) == ("!/a", 5, False)

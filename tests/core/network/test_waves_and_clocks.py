@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.network.source import GraphSeen
+from app.core.network.source import GraphReceived
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, TopicInfo
@@ -66,12 +66,12 @@ def test_10_000_short_lived_topics_leave_nothing_behind(quiet: Session, clocks: 
     most = 0
     for wave in range(100):
         names = {f"/short/{wave}/{number}": f"node {wave}" for number in range(100)}
-        post(GraphSeen(graph(wave + 2, names, clocks.wall_ns), 0.001))
+        post(GraphReceived(graph(wave + 2, names, clocks.wall_ns), 0.001))
         quiet.tick()
         clocks.go_on(0.5)
         most = max(most, len(quiet.topics))
     assert most <= 100 * (10 / 0.5 + 3)  # what vanished is shown for ten seconds, no longer
-    post(GraphSeen(graph(1000, {}, 0), 0.001))
+    post(GraphReceived(graph(1000, {}, 0), 0.001))
     quiet.tick()
     for _ in range(4):
         clocks.go_on(11.0)
@@ -84,12 +84,12 @@ def test_10_000_short_lived_topics_leave_nothing_behind(quiet: Session, clocks: 
 @pytest.mark.parametrize("jump_s", [-3600.0, 3600.0, -1e9])
 def test_clock_jump_causes_no_negative_age_and_no_loss(quiet: Session, clocks: Clocks, jump_s: float) -> None:
     names = {"/steady": "steady"}
-    quiet._mailbox.post_event(GraphSeen(graph(2, names, clocks.wall_ns), 0.001))
+    quiet._mailbox.post_event(GraphReceived(graph(2, names, clocks.wall_ns), 0.001))
     quiet.tick()
     clocks.wall_ns += round(jump_s * 1e9)
     for number in range(5):
         clocks.go_on(0.5)
-        quiet._mailbox.post_event(GraphSeen(graph(2, names, clocks.wall_ns), 0.001))
+        quiet._mailbox.post_event(GraphReceived(graph(2, names, clocks.wall_ns), 0.001))
         quiet.tick()
         age = quiet.topics["/steady"].age_s
         assert age is not None, number

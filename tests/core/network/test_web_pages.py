@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from app.core.network.web_page_list import GONE_SHOWN_S, PageList
+from app.core.network.web_page_list import GONE_DISPLAY_S, PageList
 from app.core.network.web_pages import WebPages, WebServerStarted
-from app.core.network.web_words import notices, page_name, share_words, terminal_command, web_status
+from app.core.network.web_words import notices, page_name, share_text, terminal_command, web_status
 from nep.errors import NepError
 from nep.masters.master import master_address
 from nep.programs.web.context import PageTopic, Refusal
@@ -41,7 +41,7 @@ class Studio:
         return self.servers[-1]
 
     def switch_on(self) -> FakeWebServer:
-        self.web.serve("rosbridge", on=True)
+        self.web.set_protocol_enabled("rosbridge", on=True)
         return self.wait()
 
 
@@ -56,7 +56,7 @@ def test_settings_of_a_running_server_change_without_a_restart(studio: Studio) -
     web, server = studio.web, studio.switch_on()
     web.add_origin("http://lab.example:80/")
     web.set_robots(["Turtle", "Turtle"])
-    web.serve("foxglove", on=True)
+    web.set_protocol_enabled("foxglove", on=True)
     assert server.access.origins == {"http://lab.example"}
     assert server.allow_moving == {"Turtle"}
     assert server.foxglove is not None
@@ -68,24 +68,24 @@ def test_settings_of_a_running_server_change_without_a_restart(studio: Studio) -
 
 
 def test_settings_changed_during_the_start_reach_the_server(studio: Studio) -> None:
-    studio.web.serve("rosbridge", on=True)
+    studio.web.set_protocol_enabled("rosbridge", on=True)
     studio.web.set_robots(["Turtle"])
     assert studio.wait().allow_moving == {"Turtle"}
 
 
 def test_server_stops_with_its_last_protocol(studio: Studio) -> None:
     server = studio.switch_on()
-    studio.web.serve("foxglove", on=True)
-    studio.web.serve("rosbridge", on=False)
+    studio.web.set_protocol_enabled("foxglove", on=True)
+    studio.web.set_protocol_enabled("rosbridge", on=False)
     assert (studio.web.state, server.has_ended, server.rosbridge) == ("on", False, False)
-    studio.web.serve("foxglove", on=False)
+    studio.web.set_protocol_enabled("foxglove", on=False)
     studio.web.close()
     assert (studio.web.state, server.has_ended) == ("off", True)
 
 
 def test_another_address_restarts_the_server_with_a_token(studio: Studio) -> None:
     first = studio.switch_on()
-    studio.web.open_to(WIFI.host)
+    studio.web.listen_on(WIFI.host)
     second = studio.wait()
     assert first.has_ended
     assert second.settings.listen == (WIFI.host,)
@@ -95,7 +95,7 @@ def test_another_address_restarts_the_server_with_a_token(studio: Studio) -> Non
 
 
 def test_new_token_disconnects_pages_and_the_old_one_can_be_restored(studio: Studio) -> None:
-    studio.web.open_to(WIFI.host)
+    studio.web.listen_on(WIFI.host)
     server = studio.switch_on()
     server.pages = (page(1), page(2))
     before = studio.web.token
@@ -109,7 +109,7 @@ def test_occupied_port_names_its_program_and_suggests_a_free_port(studio: Studio
     with socket.create_server(("127.0.0.1", 0)) as taken:
         web = WebPages(master_address(), studio.events.put, addresses=tuple)
         web.port = taken.getsockname()[1]
-        web.serve("rosbridge", on=True)
+        web.set_protocol_enabled("rosbridge", on=True)
         web.started(studio.events.get(timeout=30))
         assert (web.state, web.protocols) == ("off", frozenset())
         assert str(web.port) in web.sentence
@@ -122,7 +122,7 @@ def test_start_without_optional_libraries_gives_install_advice(studio: Studio) -
         raise NepError("the web server is not installed; install it with: pip install 'nep-studio[web]'")
 
     web = WebPages(master_address(), studio.events.put, start=start, addresses=tuple)
-    web.serve("rosbridge", on=True)
+    web.set_protocol_enabled("rosbridge", on=True)
     web.started(studio.events.get(timeout=30))
     assert (web.state, web.protocols, web.free_port) == ("off", frozenset(), 0)
     assert web.sentence.startswith("The web server")
@@ -149,7 +149,7 @@ def test_disconnected_page_stays_listed_for_a_while(studio: Studio) -> None:
     studio.web.refresh()
     assert [(each.page.id, each.gone_s) for each in studio.web.listed] == [(1, 4.0), (2, None)]
     assert [each.id for each in studio.web.connected] == [2]
-    studio.now += GONE_SHOWN_S
+    studio.now += GONE_DISPLAY_S
     studio.web.refresh()
     assert [each.page.id for each in studio.web.listed] == [2]
 
@@ -158,9 +158,11 @@ def test_page_is_slow_while_it_drops_messages() -> None:
     pages = PageList()
     for now, dropped in ((0.0, 0), (1.0, 3), (5.0, 3)):
         pages.update([page(1, PageTopic("/camera", False, sent_count=997, dropped_count=dropped))], now)
-    assert [(each.topic, share_words(each.share)) for each in pages.slow()] == [("/camera", "0.3 %")]
+    assert [(each.topic, share_text(each.dropped_share)) for each in pages.slow_topics()] == [
+        ("/camera", "0.3 %")
+    ]
     pages.update([page(1, PageTopic("/camera", False, sent_count=2_000, dropped_count=3))], 20.0)
-    assert list(pages.slow()) == []
+    assert list(pages.slow_topics()) == []
 
 
 def test_rejection_notices_offer_a_fix_until_allowed_or_dismissed(studio: Studio) -> None:
@@ -186,20 +188,20 @@ def test_page_disconnected_by_user_can_be_allowed_again(studio: Studio) -> None:
     server = studio.switch_on()
     first = page(1)
     server.pages = (first,)
-    studio.web.keep_out(first)
+    studio.web.block_page(first)
     assert (server.pages, server.kept_out) == ((), {1})
     assert notices(studio.web) == ()
     server.refusals = (Refusal(5.0, first.origin, "disconnected", kind="kept out"),)
     (notice,) = notices(studio.web)
     assert (notice.next_step, notice.value) == ("let in", "1")
-    studio.web.let_in(1)
+    studio.web.unblock_page(1)
     assert (server.kept_out, notices(studio.web)) == (set(), ())
 
 
 def test_terminal_command_has_the_current_settings(studio: Studio) -> None:
     web = studio.web
     assert terminal_command(web, "linux") == "nep web"
-    web.open_to(WIFI.host)
+    web.listen_on(WIFI.host)
     web.port = 9091
     web.add_origin("http://lab.example")
     web.set_robots(["Big Turtle"])
@@ -215,7 +217,7 @@ def test_status_warns_while_other_computers_can_connect(studio: Studio) -> None:
     assert web_status(studio.web, "")[1] == ""
     studio.switch_on()
     assert web_status(studio.web, "")[2] is None
-    studio.web.open_to(WIFI.host)
+    studio.web.listen_on(WIFI.host)
     studio.wait().pages = (page(1),)
     studio.web.refresh()
     icon, words, status = web_status(studio.web, "Wi-Fi 192.168.1.20")

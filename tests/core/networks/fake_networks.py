@@ -35,7 +35,7 @@ class Fake:
     def unwatch(self, topic: str) -> None:
         self.wanted.discard(topic)
 
-    def end(self) -> None:
+    def request_stop(self) -> None:
         self.said.append("end")
 
     @property

@@ -63,11 +63,11 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
 
     with running(TALKER, kind, address) as talker:
         assert talker.line() == "ready"
-        session.networks.choose(kind, address)
+        session.networks.select(kind, address)
         for key in keys:
             session.watch(key)
         tick_until(session, lambda: all(topic(key).newest for key in keys))
-        tick_until(session, lambda: topic(keys[0]).counted is not None and topic(keys[0]).rate_hz)
+        tick_until(session, lambda: topic(keys[0]).measured_rates is not None and topic(keys[0]).rate_hz)
         tick_until(session, lambda: any("robot" in node.name for node in network.nodes))
         newest = [topic(key).newest for key in keys]
         seen: dict[str, object] = {
@@ -86,7 +86,7 @@ def seen_by(session: Session, kind: str, address: str, ends: ExitStack) -> dict[
         ends.close()  # kills the master
         tick_until(session, lambda: network.state == "lost")
         seen["lost"] = network.sentence
-    session.networks.leave(kind)
+    session.networks.deselect(kind)
     seen["left"] = [network.state, len(session.networks.topics)]
     return seen
 

@@ -11,10 +11,10 @@ import pytest
 
 import nep
 from app.core.network.mailbox import Batch
-from app.core.network.source import GraphSeen, MasterFound, MasterLost, WatchFailed
+from app.core.network.source import GraphReceived, MasterFound, MasterLost, WatchFailed
 from app.core.network.topics import Topic, Topics, key_of, split_key
-from app.core.networks.kinds import KINDS, kind_named
-from app.core.networks.networks import KEPT, by_network, lost_words
+from app.core.networks.kinds import KINDS, find_kind
+from app.core.networks.networks import SETTING_KEY, lost_message, split_by_network
 from app.core.networks.source import OtherSource
 from app.core.session import Session
 from app.core.storage.settings import Settings
@@ -41,15 +41,15 @@ def test_topic_names_of_all_networks_are_distinct() -> None:
     assert split_key(key_of("", "/camera")) == ("", "/camera")
     assert split_key(key_of("ros", "/a b c")) == ("ros", "/a b c"), "strangers may name a topic anything"
     assert Topic("/camera", network="ros").key == "ros /camera"
-    native, others = by_network({"/a": Batch(), "ros /a": Batch()})
+    native, others = split_by_network({"/a": Batch(), "ros /a": Batch()})
     assert (list(native), list(others)) == (["/a"], ["ros /a"])
 
 
 def test_network_is_observed_only_when_chosen_and_again_at_next_start(world: World) -> None:
     world.networks.start()
-    assert (world.made, world.networks.chosen) == ([], [])
-    world.networks.choose("ros2", " 7 ")
-    world.networks.choose("zenoh", "")
+    assert (world.made, world.networks.selected) == ([], [])
+    world.networks.select("ros2", " 7 ")
+    world.networks.select("zenoh", "")
     assert [(fake.kind.name, fake.address, fake.said) for fake in world.made] == [
         ("ros2", "7", ["start"]),
         ("zenoh", "local", ["start"]),
@@ -58,7 +58,7 @@ def test_network_is_observed_only_when_chosen_and_again_at_next_start(world: Wor
     again = World(Settings(world.settings.path.parent))
     again.networks.start()
     assert [(fake.kind.name, fake.address) for fake in again.made] == [("ros2", "7"), ("zenoh", "local")]
-    again.networks.leave("ros2")
+    again.networks.deselect("ros2")
     assert again.made[0].said == ["start", "end"], "the window does not wait for its thread"
     third = World(Settings(world.settings.path.parent))
     third.networks.start()
@@ -71,7 +71,7 @@ def test_network_is_observed_only_when_chosen_and_again_at_next_start(world: Wor
     "kept", [[], {"ros2": "999"}, {"ros2": 5}, {"roz": "1"}, {"zenoh": "nowhere at all"}, {"ros": None}]
 )
 def test_invalid_network_settings_are_ignored(kept: object, tmp_path: Path) -> None:
-    (tmp_path / "settings.json").write_text(json.dumps({KEPT: kept}))
+    (tmp_path / "settings.json").write_text(json.dumps({SETTING_KEY: kept}))
     world = World(Settings(tmp_path))
     world.networks.start()
     assert world.made == []
@@ -91,13 +91,13 @@ def test_invalid_network_settings_are_ignored(kept: object, tmp_path: Path) -> N
 def test_invalid_address_is_rejected_with_reason_and_choice_stays(
     world: World, kind: str, address: str, said: str
 ) -> None:
-    world.networks.choose(kind, "")
+    world.networks.select(kind, "")
     before = list(world.made)
     with pytest.raises(NepError, match=said):
-        world.networks.choose(kind, address)
+        world.networks.select(kind, address)
     assert world.made == before
     assert world.networks.get(kind) is not None
-    assert [network.kind.name for network in world.networks.chosen] == [kind]
+    assert [network.kind.name for network in world.networks.selected] == [kind]
 
 
 def test_network_is_observed_even_if_choice_cannot_be_saved(
@@ -108,16 +108,16 @@ def test_network_is_observed_even_if_choice_cannot_be_saved(
 
     monkeypatch.setattr(world.settings, "set", refuse)
     with pytest.raises(SettingsError):
-        world.networks.choose("zenoh", "")
-    assert [network.kind.name for network in world.networks.chosen] == ["zenoh"]
+        world.networks.select("zenoh", "")
+    assert [network.kind.name for network in world.networks.selected] == ["zenoh"]
 
 
 def test_topics_and_nodes_are_listed_with_their_network(world: World) -> None:
     before = world.networks.revision
-    world.networks.choose("ros", "")
+    world.networks.select("ros", "")
     assert world.networks.revision > before
     world.tell(MasterFound("127.0.0.1:11311"))
-    world.tell(GraphSeen(graph("/a"), 0.0))
+    world.tell(GraphReceived(graph("/a"), 0.0))
     assert [(topic.key, topic.network, topic.rate_hz) for topic in world.networks.topics] == [
         ("ros /a", "ros", None)
     ]
@@ -129,41 +129,43 @@ def test_topics_and_nodes_are_listed_with_their_network(world: World) -> None:
 
 
 def test_unreachable_network_is_stale_with_reason_until_it_returns(world: World) -> None:
-    world.networks.choose("ros", "")
-    world.tell(GraphSeen(graph("/a"), 0.0))
+    world.networks.select("ros", "")
+    world.tell(GraphReceived(graph("/a"), 0.0))
     revision = world.networks.revision
     world.tell(MasterLost("", "no ROS master answers"), 5.0)
-    (network,) = world.networks.chosen
+    (network,) = world.networks.selected
     assert (network.state, network.sentence) == ("lost", "no ROS master answers")
-    assert [topic.stale for topic in network.topics] == [node.stale for node in network.nodes] == [True]
-    assert lost_words(network) == "ROS 1: no ROS master answers."
+    assert [topic.is_stale for topic in network.topics] == [node.is_stale for node in network.nodes] == [True]
+    assert lost_message(network) == "ROS 1: no ROS master answers."
     (alert,) = world.alerts.active
     assert (alert.title, alert.detail) == ("ROS 1 can't be shown now.", "No ROS master answers.")
     assert world.networks.revision > revision
-    world.networks.age(100.0, 0)
+    world.networks.update_ages(100.0, 0)
     assert [topic.name for topic in network.topics] == ["/a"], "it may be there: who is connected goes on"
-    world.tell(GraphSeen(graph("/a", revision=2), 0.0), 101.0)
-    assert (network.state, network.sentence, lost_words(network)) == ("there", "", "")
+    world.tell(GraphReceived(graph("/a", revision=2), 0.0), 101.0)
+    assert (network.state, network.sentence, lost_message(network)) == ("there", "", "")
     assert world.alerts.active == ()
-    assert [topic.stale for topic in network.topics] == [node.stale for node in network.nodes] == [False]
-    world.tell(GraphSeen(GraphView(1, 3), 0.0), 102.0)
+    assert (
+        [topic.is_stale for topic in network.topics] == [node.is_stale for node in network.nodes] == [False]
+    )
+    world.tell(GraphReceived(GraphView(1, 3), 0.0), 102.0)
     assert [topic.gone_s for topic in network.topics] == [0.0]
-    world.networks.age(113.0, 0)
+    world.networks.update_ages(113.0, 0)
     assert list(network.topics) == []
 
 
 def test_events_of_closed_source_are_ignored(world: World) -> None:
-    world.networks.choose("ros", "127.0.0.1:1")
-    world.networks.choose("ros", "127.0.0.1:2")
-    world.tell(GraphSeen(graph("/of/the/first"), 0.0), source=0)
+    world.networks.select("ros", "127.0.0.1:1")
+    world.networks.select("ros", "127.0.0.1:2")
+    world.tell(GraphReceived(graph("/of/the/first"), 0.0), source=0)
     assert world.networks.topics == []
     world.tell(MasterLost("", "no ROS master answers"))
-    world.networks.leave("ros")
+    world.networks.deselect("ros")
     assert world.alerts.active == (), "nobody wants to know any more"
-    world.tell(GraphSeen(graph("/a"), 0.0))
+    world.tell(GraphReceived(graph("/a"), 0.0))
     assert (world.networks.topics, world.networks.nodes) == ([], [])
-    world.networks.choose("ros", "127.0.0.1:2")
-    world.networks.choose("ros", "127.0.0.1:2")
+    world.networks.select("ros", "127.0.0.1:2")
+    world.networks.select("ros", "127.0.0.1:2")
     assert len(world.made) == 3, "the same address again changes nothing"
 
 
@@ -172,40 +174,40 @@ def test_watch_before_network_is_chosen_takes_effect_later(world: World) -> None
     world.networks.watch("ros /b")
     world.networks.unwatch("ros /b")
     world.networks.add("ros /a", Batch([message()]), 0.0)  # of a network that was left
-    world.networks.choose("ros", "")
+    world.networks.select("ros", "")
     assert world.made[0].wanted == {"/a"}
     world.networks.add("ros /a", Batch([message(), message()], dropped=3), 1.0)
     world.networks.add("ros /b", Batch([message()]), 1.0)
     found = world.networks.topic("ros /a")
     assert found is not None
-    assert (found.received, found.dropped, found.watched) == (5, 3, True)
+    assert (found.received, found.dropped, found.is_watched) == (5, 3, True)
     assert world.networks.topic("ros /b") is None
     world.networks.unwatch("ros /a")
-    assert (found.newest, found.received, found.watched) == (None, 0, False)
+    assert (found.newest, found.received, found.is_watched) == (None, 0, False)
     assert world.made[0].wanted == set()
 
 
 def test_reason_for_undecodable_topic_is_available_while_watched(world: World) -> None:
-    world.networks.choose("ros2", "")
+    world.networks.select("ros2", "")
     world.networks.watch("ros2 /a")
     world.tell(WatchFailed("/a", "there is no type 'my/Own'"))
-    assert world.networks.unread("ros2 /a") == "there is no type 'my/Own'"
-    assert world.networks.unread("ros2 /b") == world.networks.unread("/a") == ""
+    assert world.networks.read_problem("ros2 /a") == "there is no type 'my/Own'"
+    assert world.networks.read_problem("ros2 /b") == world.networks.read_problem("/a") == ""
     world.networks.add("ros2 /a", Batch([message()]), 0.0)
-    assert world.networks.unread("ros2 /a") == ""
+    assert world.networks.read_problem("ros2 /a") == ""
     world.tell(WatchFailed("/a", "again"))
     world.networks.unwatch("ros2 /a")
-    assert world.networks.unread("ros2 /a") == ""
+    assert world.networks.read_problem("ros2 /a") == ""
 
 
 def test_arrivals_are_counted_where_network_reports_no_rate() -> None:
     topics = Topics(("", 0), "ros")
     topics.update(graph("/a", "/b"), 0.0)
-    topics["/a"].watched = True
+    topics["/a"].is_watched = True
     before = topics.count(0.0, {})
     topics.add("/a", Batch([message(100)] * 4, dropped=6), 1.0)
     before = topics.count(2.0, before)
-    assert topics["/a"].counted == (5.0, 500.0)
+    assert topics["/a"].measured_rates == (5.0, 500.0)
     topics.update(graph("/a", "/b"), 2.0)
     assert (topics["/a"].rate_hz, topics["/a"].bandwidth_Bps) == (5.0, 500.0), (
         "a graph without does not undo it"
@@ -214,15 +216,15 @@ def test_arrivals_are_counted_where_network_reports_no_rate() -> None:
     topics.update(graph("/a", rate_hz=9.0, revision=2), 3.0)
     assert topics["/a"].rate_hz == 9.0, "who publishes knows better"
     topics.unwatch("/a")
-    assert (topics["/a"].counted, topics.count(1.0, before)) == (None, {})
+    assert (topics["/a"].measured_rates, topics.count(1.0, before)) == (None, {})
 
 
 def test_every_network_kind_is_a_back_end_with_install_advice(monkeypatch: pytest.MonkeyPatch) -> None:
     for kind in KINDS:
-        assert kind_named(kind.name) is kind
+        assert find_kind(kind.name) is kind
         assert kind.checked(kind.example) == kind.checked("")
-        assert kind.not_known == f"unknown on {kind.words}"
-    assert kind_named("") is kind_named("zeromq") is None
+        assert kind.unknown_text == f"unknown on {kind.product_name}"
+    assert find_kind("") is find_kind("zeromq") is None
     monkeypatch.setitem(sys.modules, "zenoh", None)
     with pytest.raises(BackendUnavailableError, match=r"pip install .*nep-studio\[zenoh\]"):
         nep.node("n", "zenoh")
@@ -234,7 +236,7 @@ def test_zenoh_network_is_observed_beside_the_native_network(session: Session) -
     with nep.node("talker") as native, nep.node("arm", "zenoh", master=place) as arm:
         ours, theirs = native.new_pub("/pose"), arm.new_pub("/pose")
         watches = [session.watch("/pose"), session.watch("zenoh /pose")]
-        session.networks.choose("zenoh", place)
+        session.networks.select("zenoh", place)
         until(lambda: theirs.subscribers == 1, "Studio hears it")
         until(lambda: ours.subscribers == 1, "and this")
         ours.publish({"x": 1})
@@ -249,7 +251,7 @@ def test_zenoh_network_is_observed_beside_the_native_network(session: Session) -
         assert session.networks.topic("zenoh /pose") is not session.topics.get("/pose")
         tick_until(session, lambda: {"arm", "studio"} <= {node.name for node in session.networks.nodes})
         assert "arm" not in {node.name for node in session.nodes}
-        session.networks.leave("zenoh")
+        session.networks.deselect("zenoh")
         until(lambda: theirs.subscribers == 0, "its thread has left the network")
         assert session.networks.topics == []
         for watch in watches:
@@ -288,7 +290,7 @@ def test_missing_package_is_reported_in_one_sentence(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "zenoh", None)
-    session.networks.choose("zenoh", "local/nobody")
+    session.networks.select("zenoh", "local/nobody")
     network = session.networks.get("zenoh")
     assert network is not None
     tick_until(session, lambda: network.state == "lost")

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 import nep
 from app.core.network.nodes import NodeEntry
-from app.core.networks.parameters import NodeParameters, parameters_in, refusal_of, text_of, value_of
+from app.core.networks.parameters import NodeParameters, parse_parameters, read_only_reason, text_of, value_of
 from app.core.session import Session
 from nep.masters.master import Master
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from tests.core.waiting import tick_until
 
 
@@ -31,7 +31,7 @@ def robot(master: Master) -> Iterator[nep.Node]:
 def shown(session: Session, robot: nep.Node) -> Iterator[NodeParameters]:
     made = NodeParameters(session.watch, session.topic, session.parameters)
     tick_until(session, lambda: entry(session, robot) is not None)
-    tick_until(session, lambda: entry_of(session, robot).may_set)
+    tick_until(session, lambda: entry_of(session, robot).can_set_parameters)
     made.show(entry(session, robot))
     tick_until(session, lambda: _refreshed(made).heard)
     yield made
@@ -128,7 +128,7 @@ def test_number_out_of_wire_range_is_rejected(
 def test_node_that_ends_during_request_is_reported(
     session: Session, robot: nep.Node, shown: NodeParameters, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.core.networks.parameters.ANSWER_TIMEOUT_S", 0.3)
+    monkeypatch.setattr("app.core.networks.parameters.REPLY_TIMEOUT_S", 0.3)
     halted = threading.Event()
     robot.parameters.on_change(lambda _new: halted.wait(20.0) and None)
     shown.set("speed", "1")
@@ -158,7 +158,7 @@ def test_showing_another_node_or_none_clears_parameters(session: Session, shown:
     assert (shown.node, shown.all, shown.watching, shown.heard) == (None, (), None, False)
     assert shown.revision > revision
     assert watching is not None
-    assert not session._watches.watched(watching.topics[0])  # type: ignore[attr-defined]
+    assert not session._watches.is_watched(watching.topics[0])  # type: ignore[attr-defined]
     shown.show(None)
     shown.refresh(0.0)
     shown.set("speed", "1")
@@ -168,7 +168,7 @@ def test_showing_another_node_or_none_clears_parameters(session: Session, shown:
 def test_foreign_messages_on_parameter_topic_are_decoded_or_reported(
     session: Session, robot: nep.Node, shown: NodeParameters
 ) -> None:
-    with nep.node("stranger") as stranger, stranger.new_pub(place_of(robot.id)) as loud:
+    with nep.node("stranger") as stranger, stranger.new_pub(parameters_topic(robot.id)) as loud:
         for payload in ("words", 7, {"parameters": None}, {}):
             loud.publish(payload)
         tick_until(session, lambda: _refreshed(shown).problem)
@@ -204,7 +204,7 @@ JSON = st.recursive(
 @given(state=JSON)
 def test_any_state_is_decoded_or_rejected_with_explanation(state: object) -> None:
     try:
-        found = parameters_in({"parameters": state} if isinstance(state, list) else state)
+        found = parse_parameters({"parameters": state} if isinstance(state, list) else state)
     except nep.NepError:
         assert not isinstance(state, list)
     else:
@@ -238,8 +238,8 @@ def test_value_of_wrong_type_is_rejected_with_advice(text: str, kind: str, said:
 
 
 def test_read_only_parameters_are_explained() -> None:
-    (parameter,) = parameters_in({"parameters": [{"name": "gain", "value": 1, "type": "int"}]})
+    (parameter,) = parse_parameters({"parameters": [{"name": "gain", "value": 1, "type": "int"}]})
     node = NodeEntry("a", "arm", network="zenoh", has_parameters=True)
-    assert refusal_of(node, parameter) == "parameters on this network are read-only"
-    node.may_set = True
-    assert refusal_of(node, parameter) == ""
+    assert read_only_reason(node, parameter) == "parameters on this network are read-only"
+    node.can_set_parameters = True
+    assert read_only_reason(node, parameter) == ""

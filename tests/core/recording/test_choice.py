@@ -8,14 +8,14 @@ import pytest
 
 from app.core.recording.choice import (
     RecordingChoice,
-    RingWish,
+    RingSettings,
+    choice_to_json,
     file_stem,
     free_path,
-    plain_choice,
-    plain_wish,
-    read_choice,
-    read_patterns,
-    read_wish,
+    parse_choice,
+    parse_patterns,
+    parse_ring_settings,
+    ring_settings_to_json,
 )
 
 
@@ -31,14 +31,14 @@ from app.core.recording.choice import (
     ],
 )
 def test_patterns_are_parsed_and_not_excludes(text, wanted, unwanted):
-    assert read_patterns(text) == (wanted, unwanted)
+    assert parse_patterns(text) == (wanted, unwanted)
 
 
 def test_exclusions_win_and_no_patterns_means_all():
-    choice = RecordingChoice("pattern", patterns=("/arm/*",), left_out=("/arm/raw",))
+    choice = RecordingChoice("pattern", patterns=("/arm/*",), excluded=("/arm/raw",))
     assert [choice.selection.has(topic) for topic in ("/arm/x", "/arm/raw", "/odom")] == [True, False, False]
-    assert RecordingChoice("pattern", left_out=("/raw",)).selection.has("/odom")
-    assert RecordingChoice("all", topics=("/a",), left_out=("/b",)).selection.has("/b")
+    assert RecordingChoice("pattern", excluded=("/raw",)).selection.has("/odom")
+    assert RecordingChoice("all", topics=("/a",), excluded=("/b",)).selection.has("/b")
 
 
 def test_invalid_recording_choice_gives_reason():
@@ -54,14 +54,14 @@ def test_invalid_recording_choice_gives_reason():
      {"ends_min": 0, "ends_gb": float("nan")}, {"ends_min": "30", "ends_gb": -1}, {"ends_min": True}],
 )  # fmt: skip
 def test_any_recording_settings_are_readable(told):
-    assert read_choice(told) == RecordingChoice()
+    assert parse_choice(told) == RecordingChoice()
 
 
 def test_recording_choice_and_flight_recorder_settings_round_trip():
     choice = RecordingChoice("pattern", ("/a",), ("/b/*",), ("/c",), 30.0, 0.5)
-    assert read_choice(plain_choice(choice)) == choice
-    wish = RingWish(is_on=True, seconds=90, size_gb=0.5, patterns=("/arm/*",), left_out=("/arm/raw",))
-    assert read_wish(plain_wish(wish)) == wish
+    assert parse_choice(choice_to_json(choice)) == choice
+    wish = RingSettings(is_on=True, seconds=90, size_gb=0.5, patterns=("/arm/*",), excluded=("/arm/raw",))
+    assert parse_ring_settings(ring_settings_to_json(wish)) == wish
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_recording_choice_and_flight_recorder_settings_round_trip():
     ],
 )
 def test_final_recording_size_is_estimated(ends, so_far, end):
-    assert RecordingChoice("all", ends_min=ends[0], ends_gb=ends[1]).end(*so_far) == end
+    assert RecordingChoice("all", max_minutes=ends[0], max_gb=ends[1]).expected_end(*so_far) == end
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_final_recording_size_is_estimated(ends, so_far, end):
     ],
 )
 def test_invalid_flight_recorder_settings_become_defaults(told):
-    assert read_wish(told) == RingWish()
+    assert parse_ring_settings(told) == RingSettings()
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 import nep
 from app.core.alerts import Alerts
 from app.core.recording import client as client_module
-from app.core.recording.client import RecorderClient, RecorderGone, RecorderSaid, RingChoice
+from app.core.recording.client import RecorderClient, RecorderEvent, RecorderExited, RingChoice
 from nep.recordings.reader import Recording
 from tests.nep.programs import eventually
 
@@ -24,7 +24,7 @@ class OrdersOnly:
         self.is_full = False
         self.is_closed = False
 
-    def order(self, content: Mapping[str, object]) -> bool:
+    def send_command(self, content: Mapping[str, object]) -> bool:
         self.orders.append(content)
         return not self.is_full
 
@@ -45,10 +45,10 @@ class DrivenRecorder:
         return self.lines[-1]
 
     def say(self, event: str, **content: object) -> None:
-        self.client.on_event(RecorderSaid(len(self.lines), {"event": event, **content}))
+        self.client.on_event(RecorderEvent(len(self.lines), {"event": event, **content}))
 
     def end(self, detail: str = "") -> None:
-        self.client.on_event(RecorderGone(len(self.lines), detail))
+        self.client.on_event(RecorderExited(len(self.lines), detail))
 
     def told(self) -> dict[str, tuple[str, str]]:
         return {each.id: (each.severity, each.title) for each in self.alerts.active}
@@ -68,7 +68,7 @@ def made() -> DrivenRecorder:
 
 def test_recorder_process_starts_only_when_needed(made):
     made.client.stop()
-    made.client.note("x")
+    made.client.add_bookmark("x")
     made.client.check()
     assert not made.client.save_last(Path("a.mcap"), 60.0)
     made.client.close()
@@ -86,7 +86,7 @@ def test_recording_starts_reports_figures_and_ends(made):
     made.say("ready")
     made.say("recording", path="a.mcap")
     assert client.state.phase == "recording"
-    client.note("it fell")
+    client.add_bookmark("it fell")
     made.say("figures", recording=status(), ring=None, free_bytes=5_000_000_000)
     state = client.state
     assert (state.message_count, state.size_bytes, state.duration_s, state.lost) == (4, 900, 1.5, 2)
@@ -113,7 +113,7 @@ def test_events_are_sent_only_while_recording(made):
     client.write_entry("runs", {"id": "2"})
     made.say("ended", path="a.mcap", status=status())
     client.write_entry("runs", {"id": "3"})
-    client.follow_ring(RingChoice(Path("ring")))
+    client.set_ring(RingChoice(Path("ring")))
     client.write_entry("runs", {"id": "3"}, "recording")
     made.lines[0].is_full = True  # it is told again in a second: nothing is wrong
     client.write_entry("alarms", {"id": "4"})
@@ -156,14 +156,14 @@ def test_dead_recorder_is_reported_and_replaced(made):
     assert made.alerts.active[0].detail == "killed"
     assert "Everything up to a second before that is saved" in made.told()["recorder:ended"][1]
     assert made.client.record(Path("b.mcap"))
-    made.client.on_event(RecorderSaid(1, {"event": "ended", "status": status()}))  # of the first one
+    made.client.on_event(RecorderEvent(1, {"event": "ended", "status": status()}))  # of the first one
     assert (len(made.lines), made.client.state.phase) == (2, "starting")
 
 
 def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     client, choice = made.client, RingChoice(Path("ring"), 60.0, 10**9, ("/a",))
-    client.follow_ring(choice)
-    client.follow_ring(choice)
+    client.set_ring(choice)
+    client.set_ring(choice)
     assert [each["op"] for each in made.lines[0].orders] == ["ring"]
     made.say("ring")
     made.say("figures", recording=None, ring={"seconds": 41.0, "size_bytes": 7}, free_bytes=None)
@@ -172,7 +172,7 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     assert client.save_last(Path("b.mcap"), 60.0)
     made.say("kept", path="a.mcap")
     made.say("problem", op="keep", path="b.mcap", sentence="the disk is full")
-    assert (client.state.keeping, client.state.last) == ((), Path("a.mcap"))
+    assert (client.state.saving, client.state.last) == ((), Path("a.mcap"))
     assert "recorder:keep" in made.told()
     waits = []
     for _each in range(6):
@@ -191,15 +191,15 @@ def test_flight_recorder_saves_last_seconds_and_is_restarted(made):
     assert client.state.ring_s is None
     client.check()
     assert len(made.lines) == 7
-    client.follow_ring(choice)
-    client.follow_ring(None)
+    client.set_ring(choice)
+    client.set_ring(None)
     assert [each["op"] for each in made.lines[-1].orders][-2:] == ["ring", "end_ring"]
     made.say("ring_ended", status={"problem": ""})
     assert not client.save_last(Path("c.mcap"), 60.0)
 
 
 def test_unresponsive_recorder_and_invalid_events_are_harmless(made):
-    made.client.follow_ring(RingChoice(Path("ring")))
+    made.client.set_ring(RingChoice(Path("ring")))
     made.lines[0].is_full = True
     assert made.client.record(Path("a.mcap"))
     assert made.client.state.phase == ""
@@ -207,7 +207,7 @@ def test_unresponsive_recorder_and_invalid_events_are_harmless(made):
     for event in ("ready", "recording", "figures", "ended", "ring", "ring_ended", "kept", "problem", "x"):
         for value in (None, 5, "x", [], {}, -1, 2**70, {"problem": 7, "topics": [], "duration_s": "x"}):
             made.say(event, recording=value, ring=value, status=value, path=value, op=value, free_bytes=value)
-    made.client.on_event(RecorderSaid(1, {}))
+    made.client.on_event(RecorderEvent(1, {}))
 
 
 def test_real_recorder_process_records_saves_and_finishes(master, tmp_path):
@@ -224,20 +224,20 @@ def test_real_recorder_process_records_saves_and_finishes(master, tmp_path):
 
     with nep.node("robot", master=master.address) as robot:
         publisher = robot.new_pub("/a")
-        client.follow_ring(RingChoice(tmp_path / "ring"))
+        client.set_ring(RingChoice(tmp_path / "ring"))
         assert client.record(tmp_path / "a.mcap", ("/a",), note="first")
         until(lambda: client.state.phase == "recording" and client.state.ring_s is not None)
         for n in range(20):
             publisher.publish({"n": n})
         until(lambda: client.state.topics.get("/a") is not None and client.state.topics["/a"].received == 20)
         assert client.save_last(tmp_path / "kept.mcap", 60.0, "it fell")
-        until(lambda: not client.state.keeping)
+        until(lambda: not client.state.saving)
         client.close(30.0)  # as Studio's end: the recording is finished
     assert not [each.title for each in client._alerts.active]
     with Recording(tmp_path / "a.mcap") as recording, Recording(tmp_path / "kept.mcap") as kept:
         assert recording.is_complete
         assert [each.message.payload["n"] for each in recording.read()] == list(range(20))
-        assert (kept.words["note"], kept.topics["/a"].message_count) == ("it fell", 20)
+        assert (kept.recorder_metadata["note"], kept.topics["/a"].message_count) == ("it fell", 20)
 
 
 def test_recorder_start_failure_is_reported(monkeypatch):
@@ -246,7 +246,7 @@ def test_recorder_start_failure_is_reported(monkeypatch):
     client = RecorderClient("127.0.0.1:1", Alerts(), events.put)
     client.record(Path("a.mcap"))
     gone = events.get(timeout=30.0)
-    assert isinstance(gone, RecorderGone)
+    assert isinstance(gone, RecorderExited)
     client.on_event(gone)
     assert client.state.phase == ""
     assert client._alerts.has("recorder:ended")

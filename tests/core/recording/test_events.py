@@ -15,7 +15,7 @@ from app.core.session import Session
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmCondition, AlarmEvent, AlarmRule
 
-RUNNING = RunState("running", "Greeting", begun=False, started_s=1.0)
+RUNNING = RunState("running", "Greeting", is_started=False, started_s=1.0)
 
 
 class Told:
@@ -37,7 +37,7 @@ class Told:
         """What is said of these states one after the other."""
         self.said.clear()
         for run in runs:
-            self.events.follow_run(run)
+            self.events.update_run(run)
         assert {role for role, _value in self.said} <= {"runs"}
         return [value for _role, value in self.said]
 
@@ -53,13 +53,13 @@ def event(kind: str, name: str = "/camera", condition: str = "silent") -> AlarmE
 
 
 def test_run_is_recorded_at_start_and_end_with_its_stop_time(told):
-    begun = replace(RUNNING, begun=True, started_s=1.2)
-    stopping = replace(begun, state="stopping", says="x")
+    begun = replace(RUNNING, is_started=True, started_s=1.2)
+    stopping = replace(begun, state="stopping", description="x")
     report = StopReport((RobotStop("Pepper", True, 41.0),), 41.2)
     proven = replace(stopping, state="proven", report=report)
     first, *rest = told.follow(RunState(), RUNNING, begun, replace(begun, state="paused"), begun)
     assert (first["name"], first["since_ns"], first["until_ns"], rest) == ("Greeting", 1010, None, [])
-    ended, answered = told.follow(stopping, proven, replace(proven, last_words="still proven"))
+    ended, answered = told.follow(stopping, proven, replace(proven, last_stop_text="still proven"))
     assert (ended["id"], ended["until_ns"], ended["result"], ended["words"]) == (
         first["id"], 1020, "stopped", "",
     )  # fmt: skip
@@ -87,32 +87,32 @@ def test_second_run_in_same_tick_is_a_separate_event(told):
 
 
 def test_tried_stack_is_recorded_with_text_of_its_block(told):
-    (said,) = told.follow(replace(RUNNING, trying="wave"))
+    (said,) = told.follow(replace(RUNNING, tried_label="wave"))
     assert said["name"] == "wave"
 
 
 def test_alarm_is_recorded_on_and_off_once_each(told):
     for kind in ("on", "still", "off", "off"):
-        told.events.take_alarm(event(kind))
+        told.events.on_alarm(event(kind))
     (role, on), (_role, off) = told.said
     assert role == "alarms"
     assert (on["topic"], on["severity"], on["until_ns"]) == ("/camera", "error", None)
     assert "/camera" in on["name"]
     assert off == {**on, "until_ns": 1020}
-    told.events.take_alarm(event("on"))
+    told.events.on_alarm(event("on"))
     assert told.said[-1][1]["id"] != on["id"]
 
 
 def test_alarm_about_node_has_no_topic(told):
-    told.events.take_alarm(event("on", "arm", "leaves"))
+    told.events.on_alarm(event("on", "arm", "leaves"))
     assert told.said[0][1]["topic"] == ""
 
 
 def test_ongoing_events_are_repeated_and_finished_ones_are_not(told):
-    told.events.take_alarm(event("on", "/a"))
-    told.events.take_alarm(event("on", "/b"))
-    told.events.follow_run(RUNNING)
-    told.events.take_alarm(event("off", "/a"))
+    told.events.on_alarm(event("on", "/a"))
+    told.events.on_alarm(event("on", "/b"))
+    told.events.update_run(RUNNING)
+    told.events.on_alarm(event("off", "/a"))
     assert told.to == {""}
     told.said.clear()
     told.events.repeat("ring")
@@ -122,14 +122,14 @@ def test_ongoing_events_are_repeated_and_finished_ones_are_not(told):
 
 
 def test_each_of_many_alarms_is_recorded_once_and_number_kept_is_limited(told, monkeypatch):
-    monkeypatch.setattr(events_module, "MAX_PRESENT", 3)
+    monkeypatch.setattr(events_module, "MAX_ACTIVE", 3)
     for number in range(5):
-        told.events.take_alarm(event("on", f"/{number}"))
+        told.events.on_alarm(event("on", f"/{number}"))
     assert len(told.said) == 5
     told.said.clear()
     told.events.repeat("recording")
     assert len(told.said) == 3
-    told.events.take_alarm(event("off", "/4"))
+    told.events.on_alarm(event("off", "/4"))
     assert len(told.said) == 3  # its end is not known, and nothing goes wrong
 
 

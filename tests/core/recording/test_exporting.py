@@ -17,7 +17,7 @@ def test_export_reports_its_files(tmp_path):
     record(tmp_path / "a.mcap", [[json_message(seq, topic="/odom") for seq in range(250)]])
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
     eventually(lambda: job.is_over)
-    assert (job.words(), job.share) == ("Exported 1 file", 1.0)
+    assert (job.result_text(), job.progress) == ("Exported 1 file", 1.0)
     (made,) = job.files
     assert made.count == 250
     assert len(made.path.read_text("utf-8").splitlines()) == 251
@@ -29,14 +29,14 @@ def test_export_of_a_part_reports_progress(tmp_path):
     part = Part(START_NS + 100 * STEP_NS, START_NS + 300 * STEP_NS, ["/a"])
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out", part)
     eventually(lambda: job.is_over)
-    assert ([(each.topic, each.count) for each in job.files], job.share) == ([("/a", 100)], 1.0)
+    assert ([(each.topic, each.count) for each in job.files], job.progress) == ([("/a", 100)], 1.0)
 
 
 def test_failed_export_is_reported(tmp_path):
     (tmp_path / "a.mcap").write_bytes(b"nothing of the kind")
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
     eventually(lambda: job.is_over)
-    assert job.words().startswith("Not exported: ")
+    assert job.result_text().startswith("Not exported: ")
     assert not job.files
 
 
@@ -55,11 +55,11 @@ def test_canceled_export_leaves_no_partial_file(tmp_path, monkeypatch):
     monkeypatch.setattr(exporting_module, "export", slow)
     job = RecordingExport(tmp_path / "a.mcap", "csv", tmp_path / "out")
     has_begun.wait()
-    assert job.words() == ""
+    assert job.result_text() == ""
     job.cancel()
     go_on.set()
     eventually(lambda: job.is_over)
-    assert job.words() == "The export was cancelled"
+    assert job.result_text() == "The export was cancelled"
     assert list((tmp_path / "out").iterdir()) == []
 
 

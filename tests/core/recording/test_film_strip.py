@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from mcap.writer import Writer
 
-from app.core.recording.film_strip import film_strip, part_of
+from app.core.recording.film_strip import film_strip, select_part
 from app.core.recording.opener import LocalOpener
 from nep.errors import BadTopicError
 from nep.messages.message import Message
@@ -52,12 +52,12 @@ def test_film_strip_without_pictures_has_counts_and_invalid_file_has_none(tmp_pa
 
 def test_part_includes_both_ends_and_matching_topics(look):
     begin, end = START_NS + 3 * STEP_NS, START_NS + 9 * STEP_NS
-    assert part_of(look, look.start_ns, look.end_ns, (), ()) == Part()
-    assert part_of(look, 0, 2**64, (), ("/camera",)) == Part(None, None, ["/odom"])
-    assert part_of(look, begin, end, ("/*a*",), ()) == Part(begin, end + 1, ["/camera"])
-    assert part_of(look, begin, end, ("/nowhere",), ()).topics == []
+    assert select_part(look, look.start_ns, look.end_ns, (), ()) == Part()
+    assert select_part(look, 0, 2**64, (), ("/camera",)) == Part(None, None, ["/odom"])
+    assert select_part(look, begin, end, ("/*a*",), ()) == Part(begin, end + 1, ["/camera"])
+    assert select_part(look, begin, end, ("/nowhere",), ()).topics == []
     with pytest.raises(BadTopicError):
-        part_of(look, begin, end, ("two words",), ())
+        select_part(look, begin, end, ("two words",), ())
 
 
 def test_topic_sizes_are_exact_and_part_size_is_proportional(look):

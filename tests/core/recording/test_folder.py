@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.core.recording import folder as folder_module
-from app.core.recording.folder import FolderScan, RecordingFolder, new_path, usual_folder
+from app.core.recording.folder import FolderScan, RecordingFolder, default_folder, new_path
 from nep.recordings.repair import repair
 from tests.nep.programs import eventually
 from tests.nep.recordings.messages import json_message, record
@@ -59,15 +59,15 @@ def test_each_file_is_listed_with_its_contents(folder, tmp_path, monkeypatch):
 def test_active_recording_is_not_opened_and_files_are_read_incrementally(folder, tmp_path, monkeypatch):
     for name in "abc":
         record(tmp_path / f"{name}.mcap", [[json_message(1)]])
-    monkeypatch.setattr(folder_module, "AT_ONCE", 1)
+    monkeypatch.setattr(folder_module, "MAX_READS_PER_SCAN", 1)
     counts = []
     for _each in range(3):
         found = look(folder, tmp_path / "b.mcap")
-        counts.append((sum(each.is_read for each in found.files), found.is_whole))
+        counts.append((sum(each.is_read for each in found.files), found.is_complete))
     assert counts == [(1, False), (2, True), (2, True)]
     monkeypatch.setattr(folder_module, "MAX_FILES", 2)
     found = look(folder)
-    assert (len(found.files), found.left_out) == (2, 1)
+    assert (len(found.files), found.omitted_count) == (2, 1)
 
 
 def test_missing_folder_is_reported(tmp_path):
@@ -83,4 +83,4 @@ def test_new_recording_names_are_unique(tmp_path, monkeypatch):
     first.touch()
     assert new_path(tmp_path, now).name == "recording-2026-11-26-22-01-05-2.mcap"
     monkeypatch.setenv("NEP_STUDIO_HOME", str(tmp_path))
-    assert usual_folder() == tmp_path / "Recordings"
+    assert default_folder() == tmp_path / "Recordings"

@@ -26,7 +26,7 @@ def numbers(gaps: dict[int, int]) -> Iterator[int]:
 
 def recording(path, gaps: dict[int, int]) -> None:
     made = numbers(gaps)
-    with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.0)) as writer:
+    with RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=0.0)) as writer:
         for _piece in range(PIECES):
             for _each in range(EACH):
                 writer.post([json_message(next(made), "/a")])
@@ -50,7 +50,7 @@ def read_bytes(monkeypatch) -> list[int]:
 def test_recording_without_losses_is_not_read(tmp_path, read_bytes) -> None:
     recording(tmp_path / "a.mcap", {})
     with Recording(tmp_path / "a.mcap") as made:
-        assert len(made.figure_pieces()) > PIECES // 2
+        assert len(made.stats_chunks()) > PIECES // 2
         assert losses_of(made) == {}
     assert read_bytes == []
 
@@ -74,12 +74,12 @@ def test_few_losses_are_all_found_by_reading_little(tmp_path, read_bytes) -> Non
 def test_late_messages_are_not_lost(tmp_path, is_complete) -> None:
     path = tmp_path / "a.mcap"
     order = [*range(200), 205, *range(206, 400), 200, 201, *range(400, 600), 603, *range(604, 800)]
-    with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.0)) as writer:
+    with RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=0.0)) as writer:
         for number in order:  # 200 to 204 are missing until 200 and 201 come; then 600 to 602
             writer.post([json_message(number, "/a")])
             assert writer.flush()
     with Recording(path) as made:
-        assert made.figures()["/a"].lost == 6
+        assert made.stats()["/a"].lost == 6
         made.is_complete = is_complete
         marks = losses_of(made)["/a"]
     assert [mark.count for mark in marks] == [3, 3]

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from app.core.alerts import Alerts
-from app.core.recording.choice import RecordingChoice, RingWish
-from app.core.recording.client import RecorderGone, RecorderSaid
-from app.core.recording.recordings import CHOOSE_FOLDER, NO_FOLDER, SessionRecordings, kept_file
+from app.core.recording.choice import RecordingChoice, RingSettings
+from app.core.recording.client import RecorderEvent, RecorderExited
+from app.core.recording.recordings import CHOOSE_FOLDER, NO_FOLDER, SessionRecordings, saved_file_name
 from app.core.storage.settings import Settings
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmEvent, AlarmRule
 from tests.core.recording.test_client import OrdersOnly, status
@@ -41,7 +41,7 @@ class Recorded:
         return self.lines[-1]
 
     def say(self, event: str, **content: object) -> None:
-        self.recordings.on_event(RecorderSaid(len(self.lines), {"event": event, **content}))
+        self.recordings.on_event(RecorderEvent(len(self.lines), {"event": event, **content}))
 
     def orders(self) -> list[object]:
         return [order["op"] for line in self.lines for order in line.orders]
@@ -55,7 +55,7 @@ def made(tmp_path, monkeypatch) -> Recorded:
 
 def test_recording_starts_with_last_choice_and_ends(made):
     recordings = made.recordings
-    recordings.choose(RecordingChoice("pattern", patterns=("/arm/*",), left_out=("/arm/raw",)))
+    recordings.set_choice(RecordingChoice("pattern", patterns=("/arm/*",), excluded=("/arm/raw",)))
     assert recordings.record("../Aiko: greets", "second try") == ""
     (order,) = made.lines[0].orders
     assert order["path"] == str(made.home / "Recordings" / "Aiko greets.mcap")
@@ -74,7 +74,7 @@ def test_recording_starts_with_last_choice_and_ends(made):
 def test_new_recording_includes_ongoing_events(made):
     recordings = made.recordings
     rule = AlarmRule("1", AlarmCondition("silent", "/camera", for_s=2.0))
-    recordings.events.take_alarm(AlarmEvent("on", rule, 1000.0))
+    recordings.events.on_alarm(AlarmEvent("on", rule, 1000.0))
     recordings.record("a")
     made.say("recording")
     recordings.check()
@@ -84,7 +84,7 @@ def test_new_recording_includes_ongoing_events(made):
         return [(each["value"]["topic"], each["to"]) for each in orders if each["op"] == "say"]
 
     assert said() == [("/camera", "recording")]
-    recordings.set_wish(RingWish(is_on=True))
+    recordings.set_ring_settings(RingSettings(is_on=True))
     recordings.check()
     assert said() == [("/camera", "recording"), ("/camera", "ring")]
 
@@ -98,7 +98,7 @@ def test_one_time_choice_is_not_saved(made):
 
 
 def test_impossible_recording_gives_reason_and_starts_nothing(made):
-    made.recordings.choose(RecordingChoice("chosen"))
+    made.recordings.set_choice(RecordingChoice("chosen"))
     assert made.recordings.record() == "No topic is selected."
     assert made.recordings.save_last() == "The flight recorder is off."
     assert made.lines == []
@@ -135,14 +135,14 @@ def test_folder_creation_failure_is_reported(made):
 def test_flight_recorder_is_off_by_default_and_restored_at_next_start(made):
     made.recordings.start()
     assert made.lines == []
-    made.recordings.set_wish(RingWish(is_on=True, seconds=30, size_gb=0.5))
+    made.recordings.set_ring_settings(RingSettings(is_on=True, seconds=30, size_gb=0.5))
     assert made.lines[0].orders[0]["seconds"] == 30.0
     assert made.lines[0].orders[0]["size_bytes"] == 500_000_000
     made.recordings.close()
     later = made.again()
     later.start()
     assert made.lines[1].orders[0]["op"] == "ring"
-    later.set_wish(replace(later.wish, is_on=False))
+    later.set_ring_settings(replace(later.wish, is_on=False))
     assert made.orders() == ["ring", "ring", "end_ring"]
 
 
@@ -154,16 +154,16 @@ def alarm() -> tuple[AlarmEvent, AlarmAction]:
 
 def test_alarm_saves_last_seconds_and_is_notified_when_saved(made):
     told: list[tuple[bool, str]] = []
-    made.recordings.set_wish(RingWish(is_on=True))
+    made.recordings.set_ring_settings(RingSettings(is_on=True))
     made.say("ring")
-    made.recordings.carry(*alarm(), lambda well, words: told.append((well, words)))
+    made.recordings.save_for_alarm(*alarm(), lambda well, words: told.append((well, words)))
     order = made.lines[0].orders[-1]
     assert (order["op"], order["seconds"]) == ("keep", 20.0)
     assert "/camera" in order["note"]
     assert told == []
     made.say("kept", path=order["path"])
     assert told == [(True, "saved alarm-2026-11-26-22-01-05.mcap")]
-    assert kept_file(told[0][1]) == "alarm-2026-11-26-22-01-05.mcap"
+    assert saved_file_name(told[0][1]) == "alarm-2026-11-26-22-01-05.mcap"
     assert made.made == [("alarm-2026-11-26-22-01-05.mcap", "kept")]
 
 
@@ -173,16 +173,16 @@ def test_alarm_is_notified_why_nothing_was_saved(made):
     def done(well: bool, words: str) -> None:
         told.append((well, words))
 
-    made.recordings.carry(*alarm(), done)
+    made.recordings.save_for_alarm(*alarm(), done)
     assert told == [(False, "nothing saved: the flight recorder is off")]
-    made.recordings.set_wish(RingWish(is_on=True))
+    made.recordings.set_ring_settings(RingSettings(is_on=True))
     made.say("ring")
     for _each in range(3):  # within one second: three names
-        made.recordings.carry(*alarm(), done)
+        made.recordings.save_for_alarm(*alarm(), done)
     paths = [order["path"] for order in made.lines[0].orders if order["op"] == "keep"]
     assert len(set(paths)) == 3
     made.say("problem", op="keep", path=paths[0], sentence="the disk is full")
-    made.recordings.on_event(RecorderGone(len(made.lines), "killed"))
+    made.recordings.on_event(RecorderExited(len(made.lines), "killed"))
     assert told[1:] == [(False, "nothing saved: see the alerts")] * 3
     assert made.made == []
     assert made.alerts.has("recorder:keep")
@@ -190,4 +190,4 @@ def test_alarm_is_notified_why_nothing_was_saved(made):
 
 @pytest.mark.parametrize("words", ["", "sound", "kept nothing", "mcap", ".mcapx"])
 def test_words_without_file_name_give_no_file(words):
-    assert kept_file(words) == ""
+    assert saved_file_name(words) == ""

@@ -55,7 +55,7 @@ class Shown:
 
     def tick(self, passed_s: float = 0.03) -> None:
         self.now += passed_s
-        self.replay.source.turn()
+        self.replay.source.process()
         self.replay.tick(self.now)
 
     def seek(self, at_ns: int) -> None:
@@ -89,7 +89,7 @@ class Taker:
 def test_replay_topics_match_file_and_newest_message_follows_playhead(shown, whole):
     topics = shown.replay.topics
     assert [topic.name for topic in topics] == ["/a", LOG_TOPIC]
-    assert not any(topic.new for topic in topics)
+    assert not any(topic.is_new for topic in topics)
     with shown.replay.watch("/a"):
         for place in (40, 3, 25):
             shown.seek(whole[place][0])
@@ -121,7 +121,7 @@ def test_log_ends_at_playhead_also_after_seeking_back(shown, whole):
 def test_series_starts_with_messages_before_playhead_and_has_no_duplicates(shown, whole):
     taker = Taker()
     shown.seek(whole[30][0])
-    shown.replay.series.join("/a", taker)
+    shown.replay.series.register("/a", taker)
     shown.tick()
     seqs = [message.seq for _ns, message in whole if message.topic == "/a"]
     assert taker.seqs == [seq for seq in seqs if seq <= 30]
@@ -145,7 +145,7 @@ def test_figures_show_losses_and_topic_rate(shown, whole):
 
 def test_losses_and_density_are_read_in_background_thread(shown, whole):
     densities = shown.replay.densities
-    densities.want(whole[0][0], whole[-1][0] + 1, COUNT)
+    densities.request(whole[0][0], whole[-1][0] + 1, COUNT)
     end = time.monotonic() + 60
     while densities.newest is None or not densities.losses:
         densities.collect_results()
@@ -208,7 +208,7 @@ def test_play_at_end_restarts_from_beginning(shown, whole):
 
 
 def test_stepping_through_missing_topic_does_nothing(shown):
-    shown.replay.choose("/nowhere")
+    shown.replay.select_topic("/nowhere")
     assert shown.replay.chosen == "/a"
     shown.replay.chosen = "/nowhere"
     before = shown.replay.player.position_ns
@@ -244,7 +244,7 @@ def test_topic_without_sequence_numbers_is_listed_with_unknown_losses(tmp_path):
     path = tmp_path / "original.mcap"
     record(path, [[Message("/original", b"{}", "json", "json")]])
     with Recording(path) as recording:
-        view = graph_of(recording.topics, recording.figures())
+        view = graph_of(recording.topics, recording.stats())
     assert len(view.topics["/original"].publishers) == 1
     assert view.topics["/original"].lost is None
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import nep
-from app.core.recording.replay.sending import MAX_DELAY_S, ReplayOutbox, ReplayRoute, sent_words
+from app.core.recording.replay.sending import MAX_DELAY_S, ReplayOutbox, ReplayRoute, sent_text
 from app.core.recording.replay.source import ReplaySource
 from app.core.robots.motion.gate import MotionGate
 from app.core.robots.motion.permission import MotionPermission
-from app.core.run.acting.arming import MAX_NAMES, Arming, Target
+from app.core.run.acting.arming import MAX_TARGETS, Arming, Target
 from app.core.session import Session
 from app.robots.description.description import parse
 from nep.errors import ClosedError
@@ -53,24 +53,24 @@ class Played:
         if watched:
             self.source.watch(watched)
         self.source.open()
-        self.source.turn()
+        self.source.process()
         self.messages: list[Message] = []
         self.late: list[float] = []
         self.source.forward(sent, self._take)
-        self.source.turn()
+        self.source.process()
 
     def _take(self, messages: list[Message], late_s: list[float]) -> None:
         self.messages += messages
         self.late += late_s
 
     def do(self, change: object) -> None:
-        self.source.order("test", change)  # type: ignore[arg-type]
-        self.source.turn()
+        self.source.queue_change("test", change)  # type: ignore[arg-type]
+        self.source.process()
 
     def pass_time(self, seconds: float, step_s: float = 0.004) -> None:
         end = self.clock.now + seconds
         while self.clock.now < end:
-            self.source.turn()
+            self.source.process()
             self.clock.now += step_s
 
     def taken(self) -> list[tuple[object, ...]]:
@@ -145,7 +145,7 @@ def test_late_replay_sends_no_burst_and_follows_replay_speed(played):
     sender.pass_time(0.1)
     sender.taken(), sender.late.clear()
     sender.clock.now += 20.0  # a computer that slept
-    sender.source.turn()
+    sender.source.process()
     assert max(sender.late) > MAX_DELAY_S
     assert 0 < sum(late <= MAX_DELAY_S for late in sender.late) <= round(MAX_DELAY_S / 0.01) + 1
     quick = played("/a", "/b")
@@ -162,7 +162,7 @@ def test_watch_on_sent_topic_receives_its_newest_message(played, whole):
     sender.do(Playback.pause)
     sender.source.pop_results()
     sender.source.watch("/a")
-    sender.source.turn()
+    sender.source.process()
     shown = sender.source.pop_results().drained.batches["/a"].messages
     assert [kept(each) for each in shown] == [sender.taken()[-1]]
 
@@ -209,13 +209,13 @@ def test_replay_omits_messages_that_would_move_a_newly_connected_robot():
     outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job), gate)
     arming.arm()
     arming.allow(Target("topic", TOPIC))
-    outbox.begin(ReplayRoute("/a", TOPIC), arming.turn, "json", is_latched=False)
+    outbox.start(ReplayRoute("/a", TOPIC), arming.turn, "json", is_latched=False)
     jobs.pop()(node)
-    (sent,) = outbox.going
+    (sent,) = outbox.active_topics
     outbox.offer([json_message(1, "/a")], [0.0])
     assert (sent.count, sent.skipped) == (1, 0)
     robots.come(parse(description(virtual=False)))
-    gate.follow()
+    gate.update()
     outbox.offer([json_message(2, "/a")], [0.0])
     assert (sent.count, sent.skipped) == (1, 1)
 
@@ -225,15 +225,15 @@ def test_outbox_sends_only_allowed_messages_and_counts_omitted_ones():
     outbox = ReplayOutbox(arming, lambda _what, job: jobs.append(job))
     arming.arm()
     arming.allow(Target("topic", "/test"))
-    outbox.begin(ReplayRoute("/a", "/test"), arming.turn, "json", is_latched=True)
-    (sent,) = outbox.going
+    outbox.start(ReplayRoute("/a", "/test"), arming.turn, "json", is_latched=True)
+    (sent,) = outbox.active_topics
     messages = [json_message(1, "/a"), json_message(2, "/b"), json_message(3, "/a")]
     outbox.offer(messages, [0.0] * 3)
     assert (sent.count, sent.skipped) == (0, 0)  # its publisher is not there yet: nothing has begun
     jobs.pop()(node)
     outbox.offer(messages, [0.0, 0.0, MAX_DELAY_S + 0.01])
     assert (sent.count, sent.skipped, sent.subscriber_count) == (1, 1, 2)
-    assert sent_words(sent) == "1 sent, 1 late message skipped"
+    assert sent_text(sent) == "1 sent, 1 late message skipped"
     assert node.made[0].made == ("/test", "json", True)
     assert node.made[0].sent == [(bytes(messages[0].data), None)]
     typed = Message("/a", b'{"x":1}', "json", "geometry_msgs/Point")
@@ -248,13 +248,13 @@ def test_outbox_sends_only_allowed_messages_and_counts_omitted_ones():
     arming.allow(Target("topic", "/test"))
     outbox.offer(messages, [0.0] * 3)  # another turn: what a person ended stays so
     assert sent.count == 2
-    assert outbox.end("/a") is sent
-    assert outbox.end("/a") is None
+    assert outbox.stop("/a") is sent
+    assert outbox.stop("/a") is None
     jobs.pop()(node)
     assert all(each.is_closed for each in node.made)
-    outbox.begin(ReplayRoute("/a", "/bad"), arming.turn, "json", is_latched=False)
+    outbox.start(ReplayRoute("/a", "/bad"), arming.turn, "json", is_latched=False)
     jobs.pop()(node)
-    assert outbox.going[0].problem
+    assert outbox.active_topics[0].problem
 
 
 def open_and_know(session: Session, path: Path):
@@ -263,8 +263,8 @@ def open_and_know(session: Session, path: Path):
     session.tick()  # another source shows: what was armed before has ended
     sending = replay.sending
     assert sending is not None
-    sending.learn()
-    tick_until(session, lambda: sending.is_known)
+    sending.analyze()
+    tick_until(session, lambda: sending.is_analyzed)
     return replay, sending
 
 
@@ -282,15 +282,15 @@ def test_replayed_topic_is_received_under_its_new_name_until_stop(
         replay, sending = open_and_know(session, path)
         assert acting.arm() == "A recording is open. Return to live to send."
         assert sending.arm() == "Choose a topic first."
-        assert sending.choose("/a", "two words") != ""
-        assert sending.choose("/nowhere", "") == ""
-        assert sending.choose("/a", "/test/a") == sending.choose("/camera", "") == ""
+        assert sending.select("/a", "two words") != ""
+        assert sending.select("/nowhere", "") == ""
+        assert sending.select("/a", "/test/a") == sending.select("/camera", "") == ""
         replay.play()
         tick_until(session, lambda: replay.player is not None and replay.player.is_at_end)
         assert not [each for each in heard if each.topic in ("/a", "/test/a", "/camera")]
         assert sending.arm() == ""
         assert acting.arming.targets == (Target("topic", "/test/a"), Target("topic", "/camera"))
-        going = sending.outbox.going
+        going = sending.outbox.active_topics
         tick_until(session, lambda: all(sent.is_ready and sent.subscriber_count for sent in going))
         replay.play()
         expected = [m for _ns, m in whole if m.topic in ("/a", "/camera")]
@@ -304,43 +304,43 @@ def test_replayed_topic_is_received_under_its_new_name_until_stop(
         session.runs.stop()
         assert not acting.arming.is_on
         session.tick()
-        assert sending.outbox.going == ()
+        assert sending.outbox.active_topics == ()
     said = [each.text for each in session.console.records]
     assert "/test/a: /a of the recording, sent during playback" in said
-    assert f"/test/a: /a of the recording, {sent_words(going[0])}" in said
-    assert f"/camera: {sent_words(going[1])}" in said
+    assert f"/test/a: /a of the recording, {sent_text(going[0])}" in said
+    assert f"/camera: {sent_text(going[1])}" in said
 
 
 def test_motion_commands_need_confirmation_even_under_another_name(session: Session, path: Path) -> None:
     acting = session.acting
     replay, sending = open_and_know(session, path)
     for recorded, name in (("/base/cmd_vel", "/harmless"), ("/b", "/arm/command"), ("/a", "")):
-        assert sending.choose(recorded, name) == ""
-    assert sending.moves("/base/cmd_vel", "/harmless")
+        assert sending.select(recorded, name) == ""
+    assert sending.moves_robot("/base/cmd_vel", "/harmless")
     assert sending.arm() == ""
-    assert [sent.route.recorded for sent in sending.outbox.going] == ["/a"]
+    assert [sent.route.recorded for sent in sending.outbox.active_topics] == ["/a"]
     question = acting.question
     assert question is not None
-    assert question.sentence.startswith("/harmless commands robots.")
+    assert question.message.startswith("/harmless commands robots.")
     acting.answer(let=False)
     session.tick()
     question = acting.question
     assert question is not None
     assert question.topic == "/arm/command"
     acting.answer(let=True)
-    assert [sent.route.name for sent in sending.outbox.going] == ["/a", "/arm/command"]
+    assert [sent.route.name for sent in sending.outbox.active_topics] == ["/a", "/arm/command"]
     assert acting.question is None
     session.tick()
     assert acting.question is None  # the one that was not wanted is not asked for again
     acting.forbid(Target("topic", "/a"))
     session.tick()
-    assert [sent.route.name for sent in sending.outbox.going] == ["/arm/command"]
-    for place in range(MAX_NAMES + 5):
-        sending.choose("/a", None), sending.choose("/a", f"/x{place}")
+    assert [sent.route.name for sent in sending.outbox.active_topics] == ["/arm/command"]
+    for place in range(MAX_TARGETS + 5):
+        sending.select("/a", None), sending.select("/a", f"/x{place}")
     assert len(sending.routes) == 3
     assert sending.arm() == ""
     assert acting.question is not None  # of what was chosen and not wanted before
-    session.back_to_live()
+    session.return_to_live()
     assert not acting.arming.is_on
-    assert sending.outbox.going == ()
+    assert sending.outbox.active_topics == ()
     assert replay.sending is sending

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from app.core.network.mailbox import MESSAGES_PER_TOPIC
-from app.core.recording.replay.source import Handed, ReplaySource
+from app.core.recording.replay.source import ReplayResults, ReplaySource
 from nep.errors import RecordingError
 from nep.messages.message import Message
 from nep.recordings.player import Playback
@@ -69,17 +69,17 @@ class Replayed:
         for topic in topics:
             self.source.watch(topic)
         self.source.open()
-        self.source.turn()
+        self.source.process()
 
-    def do(self, change) -> Handed:
-        self.source.order("test", change)
-        self.source.turn()
+    def do(self, change) -> ReplayResults:
+        self.source.queue_change("test", change)
+        self.source.process()
         return self.source.pop_results()
 
-    def pass_time(self, seconds: float, step_s: float = 0.004) -> Handed:
+    def pass_time(self, seconds: float, step_s: float = 0.004) -> ReplayResults:
         end = self.clock.now + seconds
         while self.clock.now < end:
-            self.source.turn()
+            self.source.process()
             self.clock.now += step_s
         return self.source.pop_results()
 
@@ -97,7 +97,7 @@ def replay(path):
         each.source.close()
 
 
-def of(handed: Handed, topic: str) -> list[Message]:
+def of(handed: ReplayResults, topic: str) -> list[Message]:
     batch = handed.drained.batches.get(topic)
     return batch.messages if batch is not None else []
 
@@ -111,10 +111,10 @@ def test_replayed_messages_are_byte_identical(replay, whole):
     played = replay("/a", "/b", "/camera", "/rare")
     first = played.source.pop_results()
     handed = played.do(Playback.play)
-    assert first.jump is not None
+    assert first.seek_messages is not None
     handed = played.pass_time(2.0)
     for topic in ("/a", "/b", "/rare", "/camera"):
-        came = [*(each for each in first.jump if each.topic == topic), *of(handed, topic)]
+        came = [*(each for each in first.seek_messages if each.topic == topic), *of(handed, topic)]
         assert [kept(each) for each in came] == [kept(m) for _ns, m in whole if m.topic == topic]
     status = played.source.status.player
     assert (status.is_playing, status.is_at_end) == (False, True)
@@ -129,7 +129,7 @@ def test_seek_delivers_newest_message_of_each_topic_up_to_playhead(replay, whole
     for _ in range(12):
         at_ns = chance.randint(start_ns, end_ns)
         handed = played.do(lambda playback, at_ns=at_ns: playback.seek(at_ns))
-        found = {each.topic: kept(each) for each in handed.jump}
+        found = {each.topic: kept(each) for each in handed.seek_messages}
         expected = {topic: newest(whole, topic, at_ns) for topic in topics}
         assert found == {topic: each for topic, each in expected.items() if each is not None}
         assert ("/camera" in played.pictures.shown) == (expected["/camera"] is not None)
@@ -140,10 +140,10 @@ def test_seek_discards_undelivered_messages(replay, whole):
     played = replay("/a")
     played.do(Playback.play)
     for _ in range(40):
-        played.source.turn()
+        played.source.process()
         played.clock.now += 0.01
     handed = played.do(lambda playback: playback.seek(whole[0][0]))
-    assert [each.seq for each in handed.jump] == [0]
+    assert [each.seq for each in handed.seek_messages] == [0]
     assert handed.drained.batches == {}
 
 
@@ -159,9 +159,9 @@ def test_seek_is_clamped_to_the_recording(replay, whole):
 def test_only_last_of_many_seeks_is_executed(replay, whole):
     played = replay("/a")
     for log_ns, _message in whole:
-        played.source.order("seek", lambda playback, at_ns=log_ns: playback.seek(at_ns))
+        played.source.queue_change("seek", lambda playback, at_ns=log_ns: playback.seek(at_ns))
     assert len(played.source._changes) == 1
-    played.source.turn()
+    played.source.process()
     assert played.source.status.player.position_ns == whole[-1][0]
 
 
@@ -171,7 +171,7 @@ def test_late_watch_receives_newest_message_and_all_later_ones(replay, whole):
     played.do(Playback.play)
     played.pass_time(0.4)
     played.source.watch("/b")
-    played.source.turn()
+    played.source.process()
     came = of(played.source.pop_results(), "/b")
     at_ns = played.source.status.player.position_ns
     came = [each for each in came if each.seq <= (at_ns - whole[0][0]) // STEP_NS]
@@ -185,7 +185,7 @@ def test_unwatched_topic_delivers_nothing(replay):
     played = replay("/a", "/b")
     played.do(Playback.play)
     played.source.unwatch("/b")
-    played.source.turn()
+    played.source.process()
     played.source.pop_results()
     handed = played.pass_time(0.5)
     assert of(handed, "/a")
@@ -196,13 +196,13 @@ def test_step_moves_between_messages_of_one_topic_and_pauses(replay, whole):
     played = replay("/a", "/rare")
     played.do(Playback.play)
     handed = played.do(lambda playback: playback.step("/rare"))
-    assert {each.topic: each.seq for each in handed.jump} == {"/a": 18, "/rare": 20}
+    assert {each.topic: each.seq for each in handed.seek_messages} == {"/a": 18, "/rare": 20}
     handed = played.do(lambda playback: playback.step("/rare"))
-    assert {each.topic: each.seq for each in handed.jump}["/rare"] == 60
+    assert {each.topic: each.seq for each in handed.seek_messages}["/rare"] == 60
     handed = played.do(lambda playback: playback.step("/rare", forward=False))
-    assert {each.topic: each.seq for each in handed.jump}["/rare"] == 20
+    assert {each.topic: each.seq for each in handed.seek_messages}["/rare"] == 20
     assert not played.source.status.player.is_playing
-    assert played.do(lambda playback: playback.step("/rare", forward=False)).jump is None
+    assert played.do(lambda playback: playback.step("/rare", forward=False)).seek_messages is None
 
 
 def test_loop_replays_its_part_repeatedly(replay, whole):
@@ -213,7 +213,7 @@ def test_loop_replays_its_part_repeatedly(replay, whole):
     seen = set()
     for _ in range(300):
         handed = played.pass_time(0.01)
-        seen.add(handed.jump is not None)
+        seen.add(handed.seek_messages is not None)
         position_ns = played.source.status.player.position_ns
         assert start_ns <= position_ns <= start_ns + 20 * STEP_NS
     assert seen == {True, False}
@@ -232,7 +232,7 @@ def test_slow_window_drops_and_counts_messages_while_playhead_stays_correct(tmp_
     played.do(Playback.play)
     handed = played.pass_time(5.0)
     batch = handed.drained.batches["/a"]
-    assert (len(batch.messages), batch.arrived) == (MESSAGES_PER_TOPIC, count - 1)
+    assert (len(batch.messages), batch.arrived_count) == (MESSAGES_PER_TOPIC, count - 1)
     assert batch.messages[-1].seq == count - 1
     assert played.source.status.player.position_ns == played.source.opened.recording.end_ns
 
@@ -240,7 +240,7 @@ def test_slow_window_drops_and_counts_messages_while_playhead_stays_correct(tmp_
 def test_small_messages_do_not_retain_their_file_chunk(replay):
     played = replay("/a")
     handed = played.do(lambda playback: playback.seek(2**63))
-    assert all(type(each.raw) is bytes for each in handed.jump)
+    assert all(type(each.raw) is bytes for each in handed.seek_messages)
 
 
 def test_plot_receives_messages_before_the_playhead(replay, whole):
@@ -248,9 +248,9 @@ def test_plot_receives_messages_before_the_playhead(replay, whole):
     played.source.pop_results()
     at_ns = whole[50][0]
     played.do(lambda playback: playback.seek(at_ns))
-    played.source.set_deep("/a", 8192)
+    played.source.set_history_capacity("/a", 8192)
     played.source.watch("/a")
-    played.source.turn()
+    played.source.process()
     handed = played.source.pop_results()
     before = [message.seq for log_ns, message in whole if message.topic == "/a" and log_ns <= at_ns]
     assert [each.seq for each in handed.history["/a"]] == before
@@ -262,11 +262,11 @@ def test_plot_receives_messages_before_the_playhead(replay, whole):
 def test_figures_follow_the_playhead(replay, whole):
     played = replay()
     handed = played.do(lambda playback: playback.seek(whole[59][0]))
-    assert handed.figures["/rare"].newest_ns == whole[20][0]
-    assert handed.figures["/rare"].rate_hz == pytest.approx(1 / ((whole[59][0] - whole[0][0]) / 1e9))
+    assert handed.stats["/rare"].newest_ns == whole[20][0]
+    assert handed.stats["/rare"].rate_hz == pytest.approx(1 / ((whole[59][0] - whole[0][0]) / 1e9))
     handed = played.do(lambda playback: playback.seek(whole[5][0]))
-    assert handed.figures["/rare"].newest_ns is None
-    assert handed.figures["/rare"].rate_hz == 0.0
+    assert handed.stats["/rare"].newest_ns is None
+    assert handed.stats["/rare"].rate_hz == 0.0
 
 
 def test_truncated_recording_is_played_without_modifying_it(tmp_path, path, whole):

@@ -6,10 +6,10 @@ import random
 
 import pytest
 
-from app.core.recording.replay.scale import MIN_SPAN_NS, TimeScale, clock_words, span_words
+from app.core.recording.replay.scale import MIN_SPAN_NS, TimeScale, clock_text, duration_text
 
 S = 1_000_000_000
-WHOLE = TimeScale.whole(100 * S, 860 * S)
+WHOLE = TimeScale.full(100 * S, 860 * S)
 
 
 @pytest.mark.parametrize(
@@ -23,11 +23,11 @@ WHOLE = TimeScale.whole(100 * S, 860 * S)
     ],
 )
 def test_time_spans_are_formatted(ns, digits, words):
-    assert span_words(ns, digits=digits) == words
+    assert duration_text(ns, digits=digits) == words
 
 
 def test_clock_time_has_milliseconds():
-    assert clock_words(1_790_000_000_412_999_999).endswith(".412")
+    assert clock_text(1_790_000_000_412_999_999).endswith(".412")
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -50,9 +50,9 @@ def test_visible_range_stays_within_the_recording(seed):
 
 def test_zoom_keeps_the_time_under_the_mouse():
     scale = WHOLE.zoomed(0.25, 400 * S)
-    assert scale.share(400 * S) == pytest.approx(WHOLE.share(400 * S))
-    assert not scale.is_whole
-    assert scale.zoomed(100.0, 400 * S).is_whole
+    assert scale.relative_position(400 * S) == pytest.approx(WHOLE.relative_position(400 * S))
+    assert not scale.is_full
+    assert scale.zoomed(100.0, 400 * S).is_full
 
 
 def test_tick_marks_are_full_steps_from_the_beginning():
@@ -63,6 +63,6 @@ def test_tick_marks_are_full_steps_from_the_beginning():
 
 
 def test_recording_of_a_single_moment_has_a_visible_range():
-    scale = TimeScale.whole(5 * S, 5 * S)
+    scale = TimeScale.full(5 * S, 5 * S)
     assert scale.span_ns == MIN_SPAN_NS
     assert scale.time(0.5) <= scale.last_ns

@@ -24,7 +24,7 @@ def found(tmp_path):
     def make(*said: tuple[int, str, object]):
         path = tmp_path / "a.mcap"
         path.unlink(missing_ok=True)
-        with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=1e6)) as writer:
+        with RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=1e6)) as writer:
             for number in range(10):
                 for after, role, value in said:
                     if after == number:
@@ -52,7 +52,7 @@ def test_run_spans_from_start_to_end_with_its_latest_text(found):
         (6, "runs", run(since_ns=at(1), until_ns=at(4), result="stopped", words="Stop, 41 ms")),
     )
     assert made.runs == (RecordedSpan(at(1), at(4), "Greeting", True, "stopped", "Stop, 41 ms"),)
-    assert (made.alarms, made.left_out, made.starts()) == ((), 0, [at(1)])
+    assert (made.alarms, made.omitted_count, made.starts()) == ((), 0, [at(1)])
 
 
 def test_ongoing_event_from_before_the_start_spans_the_whole_recording(found):
@@ -98,4 +98,4 @@ def test_number_of_spans_is_limited_and_excess_is_counted(found, monkeypatch):
     monkeypatch.setattr(spans_module, "MAX_SPANS", 4)
     said = [(1, "runs", run(id=f"run-{number}")) for number in range(7)]
     made = found(*said, *said)
-    assert (len(made.runs), made.left_out) == (4, 3)
+    assert (len(made.runs), made.omitted_count) == (4, 3)

@@ -55,7 +55,7 @@ def test_crashed_program_process_is_reported_with_its_location(crashes, master) 
         runner.close()
     assert told == "The program's process was killed (signal 11).", "nothing of the trace is for the person"
     (crash,) = crashes()
-    assert (crash.part, crash.how) == ("behaviour", "the program's process ended by signal 11 (SIGSEGV)")
+    assert (crash.part, crash.cause) == ("behaviour", "the program's process ended by signal 11 (SIGSEGV)")
     assert "Fatal Python error: Segmentation fault" in crash.text
     assert "scheduler.py" in crash.text
 
@@ -105,7 +105,10 @@ def test_crashed_robot_process_is_reported_with_its_output(crashes, world: World
     told = died(world, b"it was hot\n" + TRACE, -11)
     assert told.detail == "it was hot"
     (crash,) = crashes()
-    assert (crash.part, crash.how) == ("robot", "the process of a virtual robot ended by signal 11 (SIGSEGV)")
+    assert (crash.part, crash.cause) == (
+        "robot",
+        "the process of a virtual robot ended by signal 11 (SIGSEGV)",
+    )
     assert "it was hot" in crash.text
     assert TRACE.decode().strip() in crash.text
 
@@ -148,4 +151,4 @@ def test_crashed_master_is_reported_at_next_master_start(crashes) -> None:
         process.wait(WAIT_S)
     start._log_crash()
     (crash,) = crashes()
-    assert (crash.part, crash.how) == ("master", "the master's process ended by signal 11 (SIGSEGV)")
+    assert (crash.part, crash.cause) == ("master", "the master's process ended by signal 11 (SIGSEGV)")

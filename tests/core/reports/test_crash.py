@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from app.core.reports.crash import end_words, fatal_line, is_crash, split_trace
+from app.core.reports.crash import exit_text, fatal_line, is_crash, split_trace
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ from app.core.reports.crash import end_words, fatal_line, is_crash, split_trace
 @pytest.mark.skipif(sys.platform == "win32", reason="its signals have other numbers")
 def test_crash_exit_codes(code: int, words: str) -> None:
     assert is_crash(code)
-    assert end_words(code) == words
+    assert exit_text(code) == words
 
 
 @pytest.mark.parametrize("code", [0, 1, 2, 3, 255, -signal.SIGINT, -signal.SIGTERM, 0xC000013A])
@@ -33,7 +33,7 @@ def test_exit_codes_that_are_not_a_crash(code: int) -> None:
 
 
 def test_unknown_signal_is_described_by_its_number() -> None:
-    assert end_words(-250) == "ended by signal 250"
+    assert exit_text(-250) == "ended by signal 250"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a signal")

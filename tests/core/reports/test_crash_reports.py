@@ -11,7 +11,7 @@ import pytest
 
 from app.core.alerts import Alerts
 from app.core.reports.crash import PARTS, Crash, crash_extra
-from app.core.reports.crash_reports import ALERT, MAX_REPORTS, CrashLog, CrashReports, offer, texts
+from app.core.reports.crash_reports import ALERT, MAX_REPORTS, CrashLog, CrashReports, show_crash_alert, texts
 from nep.version import __version__
 from tests.pseudo import untranslated
 
@@ -126,11 +126,11 @@ def test_only_crash_log_records_become_reports(reports: CrashReports) -> None:
 
 def test_next_start_offers_the_most_severe_crash_once(reports: CrashReports) -> None:
     alerts = Alerts()
-    offer(alerts, reports)
+    show_crash_alert(alerts, reports)
     assert not alerts.has(ALERT)
     for part in ("robot", "studio", "editor"):
         reports.add(Crash(part, "how"))  # type: ignore[arg-type]
-    offer(alerts, reports)
+    show_crash_alert(alerts, reports)
     told = alerts.active[0]
     assert (told.title, told.button, told.action) == (
         "Studio closed unexpectedly last time.",
@@ -138,7 +138,7 @@ def test_next_start_offers_the_most_severe_crash_once(reports: CrashReports) -> 
         "help.report",
     )
     again = Alerts()
-    offer(again, reports)
+    show_crash_alert(again, reports)
     assert not again.active
 
 
@@ -149,7 +149,7 @@ def test_crash_before_an_update_is_reported_with_its_version(reports: CrashRepor
     assert told.startswith("Crash report of NEP Studio 0.0.9\n")
     assert f" by NEP Studio {__version__}\n" in told
     alerts = Alerts()
-    offer(alerts, reports)
+    show_crash_alert(alerts, reports)
     assert alerts.active[0].detail == (
         f"That was NEP Studio 0.0.9; this is {__version__}. "
         "A report helps us fix the problem. Nothing is sent automatically."
@@ -166,7 +166,7 @@ def test_crash_report_with_damaged_first_line_is_offered_without_version(
     assert path is not None
     path.write_text(f"{first}\nand so on", "utf-8")
     alerts = Alerts()
-    offer(alerts, reports)
+    show_crash_alert(alerts, reports)
     assert alerts.active[0].detail.startswith("A report helps")
 
 
@@ -174,6 +174,6 @@ def test_crash_report_with_damaged_first_line_is_offered_without_version(
 def test_crash_messages_are_translated_for_every_part(pseudo: None, reports: CrashReports, part) -> None:
     alerts = Alerts()
     reports.add(Crash(part, "how", version="0.0.9"))
-    offer(alerts, reports)
+    show_crash_alert(alerts, reports)
     told = alerts.active[0]
     assert untranslated(f"{told.title} {told.detail} {told.button}") == []

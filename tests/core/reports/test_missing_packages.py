@@ -7,7 +7,7 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-from app.core.reports.not_installed import EXTRA_MODULES, why_not_imported
+from app.core.reports.not_installed import EXTRA_MODULES, import_problem
 
 ROOT = Path(__file__).resolve().parents[3]
 WITHOUT_THE_EXTRA = """
@@ -44,13 +44,13 @@ def test_missing_extra_is_named_instead_of_a_traceback() -> None:
 
 def test_all_missing_packages_are_named() -> None:
     error = ModuleNotFoundError("No module named 'platformdirs'", name="platformdirs")
-    words = why_not_imported(error, lambda name: name != "PySide6")
+    words = import_problem(error, lambda name: name != "PySide6")
     assert "(PySide6 and platformdirs)" in words
 
 
 def test_other_import_errors_are_not_explained() -> None:
-    assert why_not_imported(ModuleNotFoundError("No module named 'app.odd'", name="app.odd")) == ""
-    assert why_not_imported(ImportError("cannot import name 'x'", name="PySide6")) == ""
+    assert import_problem(ModuleNotFoundError("No module named 'app.odd'", name="app.odd")) == ""
+    assert import_problem(ImportError("cannot import name 'x'", name="PySide6")) == ""
 
 
 def test_checked_modules_belong_to_the_extra() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.core.reports.privacy import HARMLESS, LEFT_OUT, shown_settings, without_home
+from app.core.reports.privacy import OMITTED_TEXT, PUBLIC_SETTINGS, reportable_settings, without_home
 
 HOME = PurePosixPath("/home/Ana María")
 WINDOWS = PureWindowsPath("C:\\Users\\Ana")
@@ -51,17 +51,21 @@ def test_root_home_folder_is_not_removed() -> None:
 
 def test_only_harmless_settings_are_reported_with_values() -> None:
     kept = {"theme": "dark", "network_keys": {"room 3": "swordfish"}, "recent": ["/home/a/Secret.nepb"]}
-    shown = shown_settings(kept)
-    assert shown == {"network_keys": LEFT_OUT, "recent": LEFT_OUT, "theme": "dark"}
+    shown = reportable_settings(kept)
+    assert shown == {"network_keys": OMITTED_TEXT, "recent": OMITTED_TEXT, "theme": "dark"}
 
 
 @given(st.dictionaries(st.text(), st.text(min_size=12), max_size=5))
 def test_unknown_settings_are_reported_without_values(kept: dict[str, str]) -> None:
-    told = json.dumps(shown_settings(kept), ensure_ascii=False)
+    told = json.dumps(reportable_settings(kept), ensure_ascii=False)
     for name, value in kept.items():
-        assert name in HARMLESS or value not in told or value in json.dumps(sorted(kept), ensure_ascii=False)
+        assert (
+            name in PUBLIC_SETTINGS
+            or value not in told
+            or value in json.dumps(sorted(kept), ensure_ascii=False)
+        )
 
 
 @pytest.mark.parametrize("word", ["key", "secret", "password", "code", "token", "recent", "tabs", "networks"])
 def test_harmless_settings_contain_no_private_names(word: str) -> None:
-    assert not [name for name in HARMLESS if word in name]
+    assert not [name for name in PUBLIC_SETTINGS if word in name]

@@ -18,10 +18,10 @@ from app.core.reports.problem_report import (
     ReportedWork,
     ReportParts,
     ReportWriter,
+    describe_contents,
     file_name,
     make_report,
-    what_goes_in,
-    work_words,
+    work_text,
     write_report,
 )
 from app.errors import ReportError
@@ -99,15 +99,16 @@ def test_report_is_created_without_a_log(tmp_path: Path) -> None:
     found = opened(make_report(parts, ""))
     assert "README.txt" in found
     assert not [name for name in found if name.startswith(("log/", "crashes/"))]
-    assert "which is empty" in what_goes_in(parts)[1]
+    assert "which is empty" in describe_contents(parts)[1]
 
 
 def test_user_is_shown_the_report_contents(pseudo: None, parts: ReportParts) -> None:
-    before = what_goes_in(parts)
+    before = describe_contents(parts)
     parts.crashes.add(Crash("studio", "how"))
-    assert len(what_goes_in(parts)) == len(before) + 1
+    assert len(describe_contents(parts)) == len(before) + 1
     assert (
-        untranslated(" ".join([*what_goes_in(parts), work_words(["Mine", "Other"])]), "Mine", "Other") == []
+        untranslated(" ".join([*describe_contents(parts), work_text(["Mine", "Other"])]), "Mine", "Other")
+        == []
     )
 
 

@@ -57,10 +57,10 @@ def place(tmp_path: Path) -> Place:
 
 def test_clean_exit_leaves_no_files(place: Place) -> None:
     run = place.run()
-    run.begin()
-    assert run.is_noted
+    run.start()
+    assert run.is_recorded
     assert len(place.files()) == 3  # mark, lock, trace
-    run.end()
+    run.finish()
     assert place.files() == []
     assert place.run().left() == []
 
@@ -75,7 +75,7 @@ def test_native_crash_is_reported_once_with_its_location(place: Place, number: s
     place.log.joinpath("studio.log").write_text("the last line\n")
     (crash,) = place.run().left()
     assert crash.part == "studio"
-    assert how in crash.how
+    assert how in crash.cause
     assert "deep_inside" in crash.text
     assert "the last line" in crash.text
     assert place.run().left() == []
@@ -86,7 +86,7 @@ def test_native_crash_is_reported_once_with_its_location(place: Place, number: s
 def test_kill_by_the_system_is_reported_as_exit_without_message(place: Place) -> None:
     assert place.ends("os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
     (crash,) = place.run().left()
-    assert "without a word" in crash.how
+    assert "without a word" in crash.cause
     assert place.run().left() == []
 
 
@@ -100,7 +100,7 @@ def test_expected_exit_is_reported_only_if_it_crashed(place: Place) -> None:
 
 def test_running_window_is_not_a_crash(place: Place) -> None:
     own = place.run()
-    own.begin()
+    own.start()
     with place.process("sys.stdin.read()") as other:
         assert other.stdout is not None
         assert other.stdout.readline() == "begun\n"
@@ -109,9 +109,9 @@ def test_running_window_is_not_a_crash(place: Place) -> None:
         other.kill()
         other.wait(60)
         (crash,) = own.left()
-        assert "without a word" in crash.how
-    assert own.is_noted
-    own.end()
+        assert "without a word" in crash.cause
+    assert own.is_recorded
+    own.finish()
     assert place.files() == []
 
 
@@ -187,10 +187,10 @@ def test_system_exit_is_not_a_crash(place: Place) -> None:
 def test_unwritable_run_folder_is_logged_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     (tmp_path / "file").write_text("no folder")
     run = StudioRun(tmp_path / "file" / "runs", tmp_path / "file" / "log")
-    run.begin()
-    run.expect_end()
-    assert not run.is_noted
+    run.start()
+    run.expect_exit()
+    assert not run.is_recorded
     assert run.left() == []
-    run.end()
+    run.finish()
     assert len(caplog.records) == 1
     assert getattr(caplog.records[0], "in_console", False), "the window does not complain"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.awaited import MAX_WORDS, awaited_values
-from app.robots.description.description import parse, td_for
+from app.core.robots.awaited import MAX_VALUES, awaited_values
+from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT
 
-PEPPER = parse(td_for(ROBOT.thing_model, "Pepper"))
+PEPPER = parse(thing_description(ROBOT.thing_model, "Pepper"))
 HEARD = PEPPER.event("heard")
 
 
@@ -51,4 +51,4 @@ def test_invalid_words_are_skipped(word: object) -> None:
 
 
 def test_number_of_offered_words_is_limited() -> None:
-    assert len(words(behaviour(*(hat(f"word {number}") for number in range(100))))) == MAX_WORDS
+    assert len(words(behaviour(*(hat(f"word {number}") for number in range(100))))) == MAX_VALUES

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from app.core.robots.motion.bridged_commands import BridgedCommands
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView, PublisherInfo, TopicInfo
 from tests.core.robots.stop_model.robots import ROVER
 
-ROBOT = parse(td_for(ROVER.thing_model, "Arm"))
+ROBOT = parse(thing_description(ROVER.thing_model, "Arm"))
 
 
 def view(**counts: int) -> GraphView:

@@ -104,10 +104,10 @@ class Studio:
         return self.session.fleet.invoke("Pepper", action, input)
 
     def runs(self, call: Invocation) -> bool:
-        return call.running and self.link.goes_on == ""
+        return call.is_running and self.link.unended_actions == ""
 
     def check_ended(self, call: Invocation, states: Sequence[str]) -> None:
-        assert (call.running, call.state) == (False, states[-1])
+        assert (call.is_running, call.state) == (False, states[-1])
 
     def knows(self, publisher: nep.Publisher) -> bool:
         """The graph shows it, with what its node serves."""
@@ -120,7 +120,7 @@ class Studio:
         return _subscribers(self.session, "/Pepper/command")
 
     def watch(self, _sensor: str) -> AbstractContextManager[object]:
-        return self.session.fleet.look_at("Pepper")
+        return self.session.fleet.watch_sensors("Pepper")
 
     def value(self, sensor: str) -> object:
         return self.link.values.get(sensor)
@@ -137,7 +137,7 @@ class Studio:
         """Those that are connected; what Studio has of Pepper is what it had before."""
         assert self.session.fleet.link("Pepper") is self.link
         assert (self.link.robot, self.link.identity) == self._before
-        links = [link for link in self.session.fleet.links if link.connected]
+        links = [link for link in self.session.fleet.links if link.is_connected]
         return {link.name: (link.robot.topics.command, link.identity.node_id) for link in links}
 
     def claim(self, topic: str) -> str:
@@ -200,7 +200,7 @@ def test_restarted_robot_replaces_its_previous_program(session: Session, master:
     try:
         claimed(session, "/Pepper/description")
         first.close()
-        tick_until(session, lambda: link.connected and link.identity != before)
+        tick_until(session, lambda: link.is_connected and link.identity != before)
         assert any("Pepper was restarted" in record.text for record in session.console.records)
         stop_is_proven(session)
         assert len(second.heard("stop")) == 1
@@ -213,14 +213,14 @@ def test_new_program_with_name_of_a_moving_robot_does_not_prove_its_stop(
 ) -> None:
     """It is frozen, so the master unlists it; the new one answers, and the old one may still move."""
     link = the_link(session)
-    session.document.edited(workspace(started(block("control_wait", SECONDS=number(600)))))
+    session.document.apply_edit(workspace(started(block("control_wait", SECONDS=number(600)))))
     session.runs.run()
-    session.fleet.moved.note(["Pepper"], "behaviour")  # as if the program had used it
+    session.fleet.moved.record_command(["Pepper"], "behaviour")  # as if the program had used it
     before = link.identity
     pepper._node.close()
     thief = WireRobot(master.address)
     try:
-        tick_until(session, lambda: link.connected and link.identity != before)
+        tick_until(session, lambda: link.is_connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
         # the second that it has for its answer is not to go by while the new connection is made
         tick_until(session, lambda: thief._answer.subscribers)
@@ -228,7 +228,7 @@ def test_new_program_with_name_of_a_moving_robot_does_not_prove_its_stop(
         tick_until(session, lambda: session.runs.view().state == "unanswered")
         assert session.runs.view().title == "Pepper (“Pepper”) did not reply"
         assert thief.heard("stop")
-        session.runs.confirm_still()
+        session.runs.confirm_stopped()
         session.tick()  # 33 ms later nobody waits for the old one any more
         stop_is_proven(session)
     finally:
@@ -244,16 +244,16 @@ def test_new_program_does_not_prove_stop_of_a_robot_moved_by_hand(
     tick_until(session, lambda: tried.state == "accepted")
     before = link.identity
     pepper._node.close()
-    tick_until(session, lambda: not link.connected)
+    tick_until(session, lambda: not link.is_connected)
     thief = WireRobot(master.address)
     try:
-        tick_until(session, lambda: link.connected and link.identity != before)
+        tick_until(session, lambda: link.is_connected and link.identity != before)
         tick_until(session, lambda: session.stopper is not None and session.stopper.robots)
         # the second that it has for its answer is not to go by while the new connection is made
         tick_until(session, lambda: thief._answer.subscribers)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
-        session.runs.confirm_still()
+        session.runs.confirm_stopped()
         session.tick()
         stop_is_proven(session)
     finally:
@@ -268,9 +268,9 @@ def test_robot_cannot_claim_topics_of_a_robot_that_connects_later(
     pepper = WireRobot(master.address)
     try:
         link = the_link(session)
-        tick_until(session, lambda: not evil_link.connected)
+        tick_until(session, lambda: not evil_link.is_connected)
         assert "which belongs to Pepper" in claimed(session, "/Evil/description")
-        assert link.connected
+        assert link.is_connected
     finally:
         pepper.close()
 
@@ -399,7 +399,7 @@ def test_invalid_description_is_reported_and_the_previous_one_stays_valid(
     the_link(session, "Rover")
     announcement.publish(wrong)
     assert "The previous description is used." in claimed(session, "/Rover/description")
-    assert session.fleet.link("Rover").connected
+    assert session.fleet.link("Rover").is_connected
 
 
 def test_repeated_descriptions_use_a_fifth_of_window_time_at_most() -> None:
@@ -428,15 +428,15 @@ def test_repeated_descriptions_use_a_fifth_of_window_time_at_most() -> None:
 
 def test_reused_publisher_id_is_not_trusted() -> None:
     senders, view = Senders(), _view({"/Pepper/answer": 7})
-    senders.learn(view, ["/Pepper/answer"])
+    senders.update(view, ["/Pepper/answer"])
     thief = NodeInfo("thief", "thief", "there", 2, "python", "native", 0)
     taken = PublisherInfo(7, "thief", (), False, 0, 0, 0, None, None, None)
     info = TopicInfo("/Pepper/answer", "robot/answer", "json", (taken,))
     message = nep.Message("/Pepper/answer", b"{}", "json", "robot/answer", publisher=7)
-    senders.learn(
+    senders.update(
         GraphView(1, 2, {**view.nodes, "thief": thief}, {"/Pepper/answer": info}), ["/Pepper/answer"]
     )
     assert senders.node_of(message) == "n"
-    senders.learn(GraphView(1, 3, {"thief": thief}, {"/Pepper/answer": info}), ["/Pepper/answer"])
+    senders.update(GraphView(1, 3, {"thief": thief}, {"/Pepper/answer": info}), ["/Pepper/answer"])
     assert senders.node_of(message) == "thief"  # it is the only one that there is
     assert senders.node_of(nep.Message("/x", b"{}", "json", "json")) is None

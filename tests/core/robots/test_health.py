@@ -8,12 +8,12 @@ from typing import cast
 import pytest
 
 from app.core.alerts import ActiveAlert, Alerts
-from app.core.network.decode_checks import Checked
+from app.core.network.decode_checks import CheckResult
 from app.core.network.mailbox import Batch
 from app.core.network.topics import Topics
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import RECOVERY_S, RESTART_TIMEOUT_S, Health
-from app.core.robots.reported_count import GROWING_S, ReportedCount
+from app.core.robots.reported_count import GROWTH_WINDOW_S, ReportedCount
 from nep.messages.message import Message
 from nep.protocol.graph_view import Alert, GraphView, PublisherInfo, SubscriberInfo, TopicInfo
 
@@ -30,7 +30,7 @@ class Case:
         self.health = Health(self.topics, fleet, self.alerts, lambda: self.now)
 
     def look(self, bad: int, good: int = 0, *, unchecked: int = 0, last_good: bool = False) -> None:
-        checked = Checked(bad + good, bad, unchecked, "no json" if bad else "", last_good)
+        checked = CheckResult(bad + good, bad, unchecked, "no json" if bad else "", last_good)
         self.health.update({"/a": checked})
 
     def alert(self) -> ActiveAlert | None:
@@ -91,7 +91,7 @@ def test_alert_of_topic_silent_after_errors_stays_until_unwatched(case: Case) ->
     case.now += 100
     case.health.check()
     assert case.alert() is not None
-    case.health.forget("/a")
+    case.health.discard("/a")
     assert case.alert() is None
 
 
@@ -102,15 +102,15 @@ def test_valid_messages_raise_no_alert(case: Case) -> None:
 
 def test_occupied_ports_are_one_developer_alert_that_opens_the_doctor(case: Case) -> None:
     ports = [Alert(f"port:{port}", f"Port {port} is taken", "Close it.") for port in (7000, 50000, 7777)]
-    case.health.graph_alerts(GraphView(1, 1, alerts=(*ports, Alert("name:x", "2 x", ""))))
+    case.health.update_graph_alerts(GraphView(1, 1, alerts=(*ports, Alert("name:x", "2 x", ""))))
     told = {alert.id: (alert.action, alert.for_developers) for alert in case.alerts.active}
     assert told == {"ports": ("help.doctor", True), "name:x": (None, False)}
     (both,) = [alert.title for alert in case.alerts.active if alert.id == "ports"]
     assert all(number in both for number in ("7000", "50000", "7777"))
-    assert [alert.id for alert in case.alerts.to_tell()] == ["name:x"]
-    case.health.graph_alerts(GraphView(1, 2, alerts=(ports[0],)))
+    assert [alert.id for alert in case.alerts.errors_and_warnings()] == ["name:x"]
+    case.health.update_graph_alerts(GraphView(1, 2, alerts=(ports[0],)))
     assert [alert.title for alert in case.alerts.active] == ["Port 7000 is taken"]
-    case.health.graph_alerts(GraphView(1, 2))
+    case.health.update_graph_alerts(GraphView(1, 2))
     assert not case.alerts.active
 
 
@@ -119,7 +119,7 @@ def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
     return SimpleNamespace(
         name="Rover",
         virtual=virtual,
-        connected=connected,
+        is_connected=connected,
         silent=None,
         robot=shown,
         goes_on="",
@@ -143,10 +143,10 @@ def test_disconnected_real_robot_is_reported_after_a_delay_and_resolved_on_retur
     used = case.alert()
     assert used is not None
     assert (used.severity, used.action) == ("error", "run.stop")
-    case.links[0].connected = True
+    case.links[0].is_connected = True
     case.health.check()
     assert case.alert() is None
-    case.links[0].connected = False
+    case.links[0].is_connected = False
     case.health.check()
     assert case.alert() is None, "the time begins anew"
 
@@ -180,14 +180,14 @@ def test_driver_that_rejects_messages_or_catches_exceptions_is_an_alert_until_it
     assert (alert.id, alert.severity, alert.for_developers) == (f"{kind}:Rover", "warn", True)
     assert "Rover" in alert.title
     assert "12" in alert.title
-    case.now += GROWING_S
+    case.now += GROWTH_WINDOW_S
     count.update(12, case.now)
     case.health.check()
     assert case.alert() is None
     count.update(13, case.now)
     case.health.check()
     assert case.alert() is not None
-    link.connected = False
+    link.is_connected = False
     case.health.check()
     assert case.alert() is None
 
@@ -210,13 +210,13 @@ def test_hidden_camera_of_second_robot_is_not_reported_as_silent(case: Case) -> 
     case.links += [seeing("Pepper"), seeing("Turtle")]
     both = {f"/{name}/camera": camera(name, name == "Pepper") for name in ("Pepper", "Turtle")}
     case.topics.update(GraphView(1, 1, {}, both), 0)
-    case.topics["/Pepper/camera"].watched = True
+    case.topics["/Pepper/camera"].is_watched = True
     case.topics.add("/Pepper/camera", Batch([Message("/Pepper/camera", b"", "image", "image")]), 49)
-    case.topics.age(50, 60 * 10**9)
+    case.topics.update_ages(50, 60 * 10**9)
     case.health.check()
     assert [link.silent for link in case.links] == [None, None]
     assert case.alert() is None
-    case.topics.age(53, 60 * 10**9)
+    case.topics.update_ages(53, 60 * 10**9)
     case.health.check()
     alert = case.alert()
     assert alert is not None, "the one that is looked at is silent"

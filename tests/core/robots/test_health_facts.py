@@ -8,12 +8,12 @@ import pytest
 
 from app.core.network.topics import Topic
 from app.core.robots.health_facts import LOW_PERCENT, HealthFact, facts_of
-from app.core.robots.reported_count import GROWING_S, ReportedCount
+from app.core.robots.reported_count import GROWTH_WINDOW_S, ReportedCount
 from app.core.robots.robot_link import RobotLink
 from app.robots import rize, simulated
-from app.robots.description.description import DataField, Sensor, parse, td_for
+from app.robots.description.description import DataField, Sensor, parse, thing_description
 
-PEPPER = parse(td_for(simulated.ROBOT.thing_model, "Pepper"))
+PEPPER = parse(thing_description(simulated.ROBOT.thing_model, "Pepper"))
 NOW = 1000.0
 
 
@@ -28,7 +28,7 @@ class Case:
         self.link = RobotLink(
             "Pepper",
             PEPPER,
-            answered_s=NOW - 3,
+            replied_s=NOW - 3,
             last_stop="confirmed in 41 ms, at 8:40",
             last_stop_status="ok",
         )
@@ -42,7 +42,7 @@ class Case:
 
     def says(self, title: str) -> tuple[str, str]:
         fact = next(fact for fact in self.facts() if fact.title == title)
-        return fact.status, fact.words
+        return fact.status, fact.text
 
     def with_sensor(self, sensor: Sensor, value: object) -> None:
         self.link.robot = replace(PEPPER, sensors=(*PEPPER.sensors, sensor))
@@ -55,7 +55,7 @@ def case() -> Case:
 
 
 def test_facts_of_a_healthy_robot(case: Case) -> None:
-    assert [(fact.title, fact.status, fact.words) for fact in case.facts()] == [
+    assert [(fact.title, fact.status, fact.text) for fact in case.facts()] == [
         ("Connection", "ok", "last response 3 s ago"),
         ("Battery", "ok", "84 %"),
         ("Stop", "ok", "confirmed in 41 ms, at 8:40"),
@@ -64,18 +64,18 @@ def test_facts_of_a_healthy_robot(case: Case) -> None:
         ("Safety stop", "ok", "stops by itself after 1 s"),
         ("Last response", "ok", f"every {PEPPER.beat_s:g} s during actions"),
     ]
-    assert not any(fact.to_look_at for fact in case.facts())
+    assert not any(fact.needs_attention for fact in case.facts())
 
 
 def test_unknown_facts_are_not_warnings(case: Case) -> None:
-    case.link.answered_s = case.link.last_stop = None
+    case.link.replied_s = case.link.last_stop = None
     case.link.values.clear()
     case.topics.clear()
     assert case.says("Connection") == ("ok", "connected; no request sent yet")
     assert case.says("Battery") == ("off", "not reported yet")
     assert case.says("Stop") == ("off", "not used yet")
     assert case.says("Camera") == ("off", "no image yet")
-    assert not any(fact.to_look_at for fact in case.facts())
+    assert not any(fact.needs_attention for fact in case.facts())
 
 
 def test_unwatched_camera_is_not_a_warning(case: Case) -> None:
@@ -84,14 +84,14 @@ def test_unwatched_camera_is_not_a_warning(case: Case) -> None:
     assert case.says("Camera") == ("off", "ready (not in use)")
     case.topics[camera] = Topic(camera, age_s=15.0)
     assert case.says("Camera") == ("off", "ready (not in use)"), "it sent while somebody looked"
-    case.topics[camera] = Topic(camera, subscribers=1, heard_since=NOW)
+    case.topics[camera] = Topic(camera, subscribers=1, subscribed_since=NOW)
     assert case.says("Camera") == ("off", "no image yet")
 
 
 def test_unresponsive_robot_shows_duration_and_advice(case: Case) -> None:
-    case.link.mute = True
+    case.link.is_unresponsive = True
     assert case.says("Connection") == ("error", "not responding for 3 s; restart it")
-    case.link.answered_s = None
+    case.link.replied_s = None
     case.link.robot = replace(PEPPER, virtual=False)
     assert case.says("Connection") == ("error", "not responding; check that it is switched on")
 
@@ -108,14 +108,14 @@ def test_driver_rejections_and_exceptions_are_a_warning_while_they_increase(
     status, words = case.says(title)
     assert status == "warn"
     assert "12" in words
-    count.grew_s = NOW - GROWING_S
+    count.grew_s = NOW - GROWTH_WINDOW_S
     status, words = case.says(title)
     assert status == "off"
     assert "12" in words
 
 
 def test_disconnected_robot_shows_no_outdated_facts(case: Case) -> None:
-    case.link.connected, case.link.gone_s = False, NOW - 12
+    case.link.is_connected, case.link.gone_s = False, NOW - 12
     assert case.says("Connection") == ("warn", "disconnected 12 s ago; restart it")
     assert [fact.title for fact in case.facts()] == [
         "Connection",
@@ -198,4 +198,4 @@ def test_rize_robot_has_no_watchdog_or_heartbeat_fact(case: Case) -> None:
     assert case.says("Stop") == ("off", "not used yet; this robot can't confirm")
     assert case.says("Safety stop")[0] == "off"
     assert "Last response" not in [fact.title for fact in case.facts()]
-    assert not any(fact.to_look_at for fact in case.facts())
+    assert not any(fact.needs_attention for fact in case.facts())

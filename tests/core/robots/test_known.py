@@ -9,7 +9,7 @@ import pytest
 
 from app.core.network.watches import Watches
 from app.core.robots.fleet import Fleet
-from app.core.robots.known import KEY, LIMIT, KnownRobot, KnownRobots
+from app.core.robots.known import KEY, MAX_ROBOTS, KnownRobot, KnownRobots
 from app.core.storage.settings import Settings
 from app.robots import rize
 
@@ -26,25 +26,25 @@ def settings(tmp_path: Path) -> Settings:
 def test_known_robots_are_sorted_by_last_seen_and_persist(settings, tmp_path) -> None:
     now = iter([100.0, 200.0, 300.0])
     known = KnownRobots(settings, lambda: next(now))
-    known.saw([robot("NAO")])
-    known.saw([robot("Rover")])
-    known.saw([robot("NAO")])
+    known.record([robot("NAO")])
+    known.record([robot("Rover")])
+    known.record([robot("NAO")])
     again = KnownRobots(Settings(tmp_path))
     assert again.robots == (KnownRobot("NAO", 300.0), KnownRobot("Rover", 200.0))
 
 
 def test_virtual_robots_are_not_remembered(settings) -> None:
     known = KnownRobots(settings)
-    known.saw([robot("Pepper", virtual=True)])
+    known.record([robot("Pepper", virtual=True)])
     assert known.robots == ()
 
 
 def test_forgotten_robot_is_known_again_when_it_returns(settings) -> None:
     known = KnownRobots(settings, lambda: 1.0)
-    known.saw([robot("NAO"), robot("Rover")])
-    known.forget("NAO")
+    known.record([robot("NAO"), robot("Rover")])
+    known.discard("NAO")
     assert [one.name for one in known.robots] == ["Rover"]
-    known.saw([robot("NAO")])
+    known.record([robot("NAO")])
     assert {one.name for one in known.robots} == {"NAO", "Rover"}
 
 
@@ -57,11 +57,11 @@ def test_invalid_entries_are_ignored(settings) -> None:
 
 def test_number_of_known_robots_is_limited(settings) -> None:
     known = KnownRobots(settings, lambda: 1.0)
-    known.saw([robot(f"R{number}") for number in range(LIMIT + 3)])
-    assert len(known.robots) == LIMIT
+    known.record([robot(f"R{number}") for number in range(MAX_ROBOTS + 3)])
+    assert len(known.robots) == MAX_ROBOTS
 
 
 def test_robot_that_joins_the_fleet_is_known(settings) -> None:
     fleet = Fleet(Watches(lambda _t: None, lambda _t: None), lambda _what, _job: None, settings=settings)
-    fleet.join(robot("NAO"), "robot_action NAO")
+    fleet.connect(robot("NAO"), "robot_action NAO")
     assert [one.name for one in KnownRobots(settings).robots] == ["NAO"]

@@ -51,10 +51,10 @@ def test_start_without_restored_robots_keeps_the_list(tmp_path: Path) -> None:
 def test_robots_are_not_restored_when_disabled(tmp_path: Path) -> None:
     Settings(tmp_path).set(KEPT, {"Pepper": "pepper"})
     robots = LastRobots(Settings(tmp_path))
-    assert robots.come_back
-    robots.set_come_back(False)
+    assert robots.is_restart_enabled
+    robots.set_restart_enabled(False)
     assert next_start(tmp_path) == {}
-    robots.set_come_back(True)
+    robots.set_restart_enabled(True)
     assert next_start(tmp_path) == {"Pepper": "pepper"}
 
 

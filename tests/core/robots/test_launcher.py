@@ -42,7 +42,7 @@ class World:
 
     def after(self, seconds: float) -> None:
         self.now += seconds
-        self.launcher.follow()
+        self.launcher.start_requested()
 
 
 @pytest.fixture
@@ -144,14 +144,14 @@ def test_second_studio_uses_the_running_pepper(master: Master, tmp_path: Path) -
 
 def test_fleet_knows_running_robots_after_the_first_graph() -> None:
     fleet = Fleet(Watches(lambda _topic: None, lambda _topic: None), lambda _what, _job: None)
-    assert fleet.is_there("Pepper") is None
+    assert fleet.is_present("Pepper") is None
     fleet.update(GraphView(1, 1))
-    assert fleet.is_there("Pepper") is False
+    assert fleet.is_present("Pepper") is False
     fleet.update(GraphView(1, 2, topics={"/Pepper/description": _described()}))
-    assert fleet.is_there("Pepper") is True  # it has not told yet what it can do, but it will
-    assert fleet.is_there("Turtle") is False
+    assert fleet.is_present("Pepper") is True  # it has not told yet what it can do, but it will
+    assert fleet.is_present("Turtle") is False
     fleet.update(GraphView(1, 3))
-    assert fleet.is_there("Pepper") is False
+    assert fleet.is_present("Pepper") is False
 
 
 def _described() -> TopicInfo:
@@ -163,17 +163,17 @@ def test_robot_is_starting_until_connected_or_failed(world: World) -> None:
     launcher = world.launcher
     world.there = None
     launcher.start_virtual_robot("Pepper")
-    assert launcher.coming == ("Pepper",), "also while it is not known whether one is there"
+    assert launcher.starting_robots == ("Pepper",), "also while it is not known whether one is there"
     world.there = False
     world.after(0.1)
-    assert launcher.coming == ("Pepper",)
-    launcher.came("Pepper")
-    assert launcher.coming == ()
+    assert launcher.starting_robots == ("Pepper",)
+    launcher.on_started("Pepper")
+    assert launcher.starting_robots == ()
     launcher.restart_virtual_robot("Pepper")
-    assert launcher.coming == ("Pepper",)
+    assert launcher.starting_robots == ("Pepper",)
     world.processes[-1].die(b"out of order", 1)
     launcher.check()
-    assert launcher.coming == (), "it ended by itself"
+    assert launcher.starting_robots == (), "it ended by itself"
     launcher.start_virtual_robot("Turtle", "diffdrive")
     world.after(STARTING_S)
-    assert launcher.coming == (), "it never came"
+    assert launcher.starting_robots == (), "it never came"

@@ -13,21 +13,21 @@ import nep
 from app.core.robots.motion.gate import MotionGate
 from app.core.robots.motion.permission import MotionPermission
 from app.core.run.acting.sending import SendOrder
-from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.shelf import SavedMessage
 from app.core.session import Session
-from app.robots.description.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, thing_description
 from app.robots.identity import controls_of
 from app.robots.turtle import ROBOT
 from nep.programs.robots import MovingTopics, RobotControls
 from tests.core.waiting import tick_until
 
 TOPIC = "/Rover/drive"
-ORDER = KeptMessage("a", "Go", TOPIC, "json", '{"op": "invoke"}')
+ORDER = SavedMessage("a", "Go", TOPIC, "json", '{"op": "invoke"}')
 
 
 def description(*, virtual: bool) -> dict[str, object]:
     """A robot that does not call its command topic so."""
-    text = json.dumps(td_for(ROBOT.thing_model, "Rover")).replace("/Rover/command", TOPIC)
+    text = json.dumps(thing_description(ROBOT.thing_model, "Rover")).replace("/Rover/command", TOPIC)
     made = json.loads(text)
     made["rb:robot"]["virtual"] = virtual
     return made
@@ -38,12 +38,12 @@ class Robots:
 
     def __init__(self) -> None:
         self.movable: tuple[Robot, ...] = ()
-        self.moving = MovingTopics()
-        self.described: frozenset[str] = frozenset()
+        self.moving_topics = MovingTopics()
+        self.described_topics: frozenset[str] = frozenset()
 
     def come(self, *robots: Robot, others: tuple[RobotControls, ...] = ()) -> None:
         self.movable = robots
-        self.moving = MovingTopics((*map(controls_of, robots), *others))
+        self.moving_topics = MovingTopics((*map(controls_of, robots), *others))
 
 
 @pytest.fixture
@@ -67,22 +67,22 @@ def test_message_that_moves_a_real_robot_waits_for_permission(rover) -> None:
     robots, done = Robots(), []
     permission = MotionPermission()
     gate = MotionGate(permission, robots)
-    assert gate.permits(TOPIC, pytest.fail)
+    assert gate.request_permission(TOPIC, pytest.fail)
     robots.come(rover)
-    assert not gate.permits(TOPIC, lambda: done.append(1))
-    assert "Rover" in gate.refusal(TOPIC)
-    assert "Rover" in gate.refusal("robot_action")
-    assert gate.refusal("/Rover/answer") == ""
+    assert not gate.request_permission(TOPIC, lambda: done.append(1))
+    assert "Rover" in gate.rejection_reason(TOPIC)
+    assert "Rover" in gate.rejection_reason("robot_action")
+    assert gate.rejection_reason("/Rover/answer") == ""
     permission.answer(let=True)
     assert done == [1]
-    assert gate.permits(TOPIC, pytest.fail)
-    assert gate.refusal(TOPIC) == ""
+    assert gate.request_permission(TOPIC, pytest.fail)
+    assert gate.rejection_reason(TOPIC) == ""
     robots.come(replace(rover, name="Fido"))
-    gate.follow()
-    assert "Fido" in gate.refusal(TOPIC)
+    gate.update()
+    assert "Fido" in gate.rejection_reason(TOPIC)
     robots.come(replace(rover, virtual=True))
     assert gate.is_permitted(TOPIC)
-    permission.forget()
+    permission.revoke_all()
     robots.come(rover)
     assert not gate.is_permitted(TOPIC)
 
@@ -91,7 +91,7 @@ def test_robots_without_readable_description_need_permission(rover) -> None:
     robots, permission = Robots(), MotionPermission()
     robots.come(others=(RobotControls("Rover", frozenset({TOPIC})),))
     gate = MotionGate(permission, robots)
-    assert not gate.permits(TOPIC, lambda: None)
+    assert not gate.request_permission(TOPIC, lambda: None)
     assert permission.question is not None
     assert permission.question.title == "Allow Rover to move?"
     permission.answer(let=True)
@@ -99,7 +99,7 @@ def test_robots_without_readable_description_need_permission(rover) -> None:
     robots.come(rover)  # its description was read: the yes was for whoever had this name
     assert not gate.is_permitted(TOPIC)
     robots.come()
-    assert not gate.permits("/Fido/go", lambda: None, "robot/command")
+    assert not gate.request_permission("/Fido/go", lambda: None, "robot/command")
     assert permission.question is not None
     assert permission.question.names == ("the robot on /Fido/go",)
 
@@ -108,7 +108,7 @@ def test_shelf_asks_and_ends_repetition_when_a_real_robot_connects(session: Sess
     acting, permission = session.acting, session.fleet.permission
     moved: list[tuple[object, str]] = []
     acting.on_moved = lambda robots, by: moved.append((robots, by))
-    acting.shelf.put(ORDER)
+    acting.shelf.set_message(ORDER)
     assert acting.send(ORDER, rate_hz=20.0) == ""
     tick_until(session, lambda: acting.outbox.all_repeated)
     with real_robot(session, master.address) as told:
@@ -125,19 +125,19 @@ def test_shelf_asks_and_ends_repetition_when_a_real_robot_connects(session: Sess
         permission.answer(let=True)
         tick_until(session, lambda: len(told) == before + 1)
         assert moved == [(("Rover",), "shelf")]
-        permission.forget()
+        permission.revoke_all()
         acting.outbox.send(
             SendOrder("a", "Go", TOPIC, "json", lambda: {"op": "invoke"})
         )  # as if it had waited for the network
         tick_until(session, lambda: acting.last["a"].kind == "failed")
-        assert "which is not allowed" in acting.last["a"].sentence
+        assert "which is not allowed" in acting.last["a"].message
         assert len(told) == before + 1
 
 
 def test_another_program_of_the_same_name_needs_permission_again(session: Session, master) -> None:
     permission, gate = session.fleet.permission, session.fleet.gate
     with real_robot(session, master.address):
-        assert not gate.permits(TOPIC, lambda: None)
+        assert not gate.request_permission(TOPIC, lambda: None)
         permission.answer(let=True)
         assert gate.is_permitted(TOPIC)
     tick_until(session, lambda: not session.fleet.connected)
@@ -146,4 +146,4 @@ def test_another_program_of_the_same_name_needs_permission_again(session: Sessio
     before = link.identity
     with real_robot(session, master.address):
         tick_until(session, lambda: link.identity != before)
-        assert "Rover" in gate.refusal(TOPIC)
+        assert "Rover" in gate.rejection_reason(TOPIC)

@@ -24,53 +24,53 @@ def ledger() -> Ledger:
 
 
 def test_robot_is_removed_when_its_program_proves_a_stop(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "shelf")
-    ledger.stood_still("Pepper", {"stranger"}, ledger.mark)
+    ledger.record_command(["Pepper"], "shelf")
+    ledger.record_stopped("Pepper", {"stranger"}, ledger.mark)
     assert ledger.names == ("Pepper",)
-    ledger.stood_still("Pepper", {"old"}, ledger.mark)
+    ledger.record_stopped("Pepper", {"old"}, ledger.mark)
     assert ledger.names == ()
 
 
 def test_stop_does_not_prove_commands_sent_after_it_began(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "form", id="1")
+    ledger.record_command(["Pepper"], "form", id="1")
     mark = ledger.mark
-    ledger.note(["Pepper"], "key")
-    ledger.stood_still("Pepper", {"old"}, mark)
+    ledger.record_command(["Pepper"], "key")
+    ledger.record_stopped("Pepper", {"old"}, mark)
     motion = ledger.motion("Pepper")
     assert motion is not None
-    assert motion.by == "key"
+    assert motion.sender == "key"
 
 
 def test_final_reply_ends_only_its_own_motion(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "form", id="1")
-    ledger.note(["Pepper"], "form", id="2")
-    ledger.ended("Pepper", "1")
+    ledger.record_command(["Pepper"], "form", id="1")
+    ledger.record_command(["Pepper"], "form", id="2")
+    ledger.end_motion("Pepper", "1")
     assert "Pepper" in ledger
-    ledger.ended("Pepper", "2")
+    ledger.end_motion("Pepper", "2")
     assert "Pepper" not in ledger
 
 
 def test_final_reply_does_not_end_continuous_motion(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "form")  # a speed: no id
-    ledger.ended("Pepper", "")
+    ledger.record_command(["Pepper"], "form")  # a speed: no id
+    ledger.end_motion("Pepper", "")
     assert "Pepper" in ledger
 
 
 def test_restarted_program_does_not_prove_stop_of_its_possibly_running_predecessor(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "behaviour")
+    ledger.record_command(["Pepper"], "behaviour")
     ledger.now = NEW
     assert ledger.other_programs("Pepper", NEW) == (OLD,)
-    ledger.stood_still("Pepper", {"new"}, ledger.mark)
+    ledger.record_stopped("Pepper", {"new"}, ledger.mark)
     assert "Pepper" in ledger
     ledger.ended_programs.add(OLD)
     assert ledger.other_programs("Pepper", NEW) == ()
     assert "Pepper" in ledger, "its program ended: that alone stops no real robot"
-    ledger.stood_still("Pepper", {"new"}, ledger.mark)
+    ledger.record_stopped("Pepper", {"new"}, ledger.mark)
     assert "Pepper" not in ledger
 
 
 def test_virtual_robot_is_removed_when_its_program_ends(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "behaviour")
+    ledger.record_command(["Pepper"], "behaviour")
     ledger.drop_ended("Pepper")
     assert "Pepper" in ledger
     ledger.ended_programs.add(OLD)
@@ -79,48 +79,48 @@ def test_virtual_robot_is_removed_when_its_program_ends(ledger: Ledger) -> None:
 
 
 def test_confirmation_of_the_user_removes_the_robot(ledger: Ledger) -> None:
-    ledger.note(["Pepper", "Turtle"], "bridge")
+    ledger.record_command(["Pepper", "Turtle"], "bridge")
     ledger.confirm(["Turtle", "Nobody"])
     assert ledger.names == ("Pepper",)
 
 
 def test_cause_of_motion_is_preferred_over_missing_stop_reply(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "alarm")
-    ledger.note(["Pepper"], "stop")
+    ledger.record_command(["Pepper"], "alarm")
+    ledger.record_command(["Pepper"], "stop")
     motion = ledger.motion("Pepper")
     assert motion is not None
-    assert (motion.by, motion.since_s, motion.sentence) == ("alarm", 7.0, motion.sentence)
-    assert "alarm" in motion.sentence
+    assert (motion.sender, motion.since_s, motion.reason) == ("alarm", 7.0, motion.reason)
+    assert "alarm" in motion.reason
     assert ledger.motion("Turtle") is None
 
 
 def test_number_of_motions_is_limited_without_forgetting_any(ledger: Ledger) -> None:
     for number in range(3 * MAX_MOTIONS):
-        ledger.note(["Pepper"], "form", id=str(number))
-        ledger.note(["Pepper"], "key")
+        ledger.record_command(["Pepper"], "form", id=str(number))
+        ledger.record_command(["Pepper"], "key")
     assert len(ledger._motions["Pepper"]) <= MAX_MOTIONS + 2
     for number in range(3 * MAX_MOTIONS):
-        ledger.ended("Pepper", str(number))
+        ledger.end_motion("Pepper", str(number))
     ledger.confirm(["Turtle"])
     assert "Pepper" in ledger
 
 
 def newcomer_after(ledger: Ledger, graphs: int) -> None:
     """Command a robot, which finishes; a twin appears in the graph after ``graphs`` others."""
-    ledger.note(["Pepper"], "form", id="1")
-    ledger.ended("Pepper", "1", OLD)
+    ledger.record_command(["Pepper"], "form", id="1")
+    ledger.end_motion("Pepper", "1", OLD)
     for _ in range(graphs):
-        ledger.take_newcomers({})
-    ledger.take_newcomers({name: [NEW] for name in ledger.sent_to})
+        ledger.record_new_programs({})
+    ledger.record_new_programs({name: [NEW] for name in ledger.recently_commanded})
 
 
 @pytest.mark.parametrize("graphs", [0, 1])
 def test_twin_that_appears_right_after_a_command_may_have_received_it(ledger: Ledger, graphs: int) -> None:
     newcomer_after(ledger, graphs)
     assert ledger.other_programs("Pepper", OLD) == (NEW,)
-    ledger.stood_still("Pepper", {"old"}, ledger.mark)
+    ledger.record_stopped("Pepper", {"old"}, ledger.mark)
     assert "Pepper" in ledger
-    ledger.stood_still("Pepper", {"new"}, ledger.mark)
+    ledger.record_stopped("Pepper", {"new"}, ledger.mark)
     assert "Pepper" not in ledger
 
 
@@ -130,13 +130,13 @@ def test_twin_that_appears_later_has_not_received_the_command(ledger: Ledger) ->
 
 
 def test_twin_with_a_proven_stop_is_not_a_newcomer(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "form", id="1")
-    ledger.stood_still("Pepper", {"old", "new"}, ledger.mark)
-    ledger.take_newcomers({"Pepper": [NEW]})
+    ledger.record_command(["Pepper"], "form", id="1")
+    ledger.record_stopped("Pepper", {"old", "new"}, ledger.mark)
+    ledger.record_new_programs({"Pepper": [NEW]})
     assert "Pepper" not in ledger
 
 
 def test_confirmation_of_the_user_includes_newcomers(ledger: Ledger) -> None:
-    ledger.note(["Pepper"], "key")
+    ledger.record_command(["Pepper"], "key")
     ledger.confirm(["Pepper"])
-    assert ledger.sent_to == ()
+    assert ledger.recently_commanded == ()

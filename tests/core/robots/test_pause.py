@@ -104,9 +104,9 @@ def test_pause_interrupts_walk_and_resume_completes_it(master, pepper, node) -> 
         assert before < WAY_M - 0.05, "it stands still before it has arrived"
         threading.Event().wait(HELD_S)  # what must not happen here is a movement
         assert pose.far() == pytest.approx(before, abs=0.002), "it stands still"
-        runner.go_on()
+        runner.resume()
         ended = heard.until("ended")
-        assert ended.ok, [event.text for event in heard.events]
+        assert ended.is_ok, [event.text for event in heard.events]
         assert pose.far() == pytest.approx(WAY_M, abs=0.03), "no step more than asked for"
     finally:
         runner.close()

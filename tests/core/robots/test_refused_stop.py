@@ -67,21 +67,21 @@ def the_link(session: Session, name: str = "Arm") -> RobotLink:
 
 def test_rejected_stop_is_shown_everywhere(session: Session, arm: Driver) -> None:
     link = the_link(session)
-    assert link.chip == "virtual, ready" if link.virtual else "ready"
+    assert link.chip_text == "virtual, ready" if link.virtual else "ready"
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
     view = session.runs.view()
     assert "the brake does not answer" in view.title
     assert view.title.startswith("Arm may still move")
     assert view.detail == "Switch Arm off by hand."
-    assert (view.result_status, view.confirm) == ("error", "Arm isn't moving")
+    assert (view.result_status, view.confirm_label) == ("error", "Arm isn't moving")
     assert "did not answer" not in f"{view}"
-    assert (link.state, link.chip.removeprefix("virtual, ")) == ("not stopped", "may still move")
+    assert (link.state, link.chip_text.removeprefix("virtual, ")) == ("not stopped", "may still move")
     words, status = robots_chip(session)
     assert (words, status) == ("Arm: may still move", "error")
     (fact,) = (each for each in facts_of(link, session.topics, 0.0, str) if each.title == "Stop")
     assert fact.status == "error"
-    assert "the brake does not answer" in fact.words
+    assert "the brake does not answer" in fact.text
     (alert,) = (each for each in session.alerts.active if each.id == "stop")
     assert (alert.severity, "the brake does not answer" in alert.title) == ("error", True)
     assert any("the brake does not answer" in record.text for record in session.console.records)
@@ -89,7 +89,7 @@ def test_rejected_stop_is_shown_everywhere(session: Session, arm: Driver) -> Non
     session.runs.stop()
     assert session.runs.view().title == "Stopping"  # at once: it was not "Ready" before
     tick_until(session, lambda: session.runs.view().state == "proven")
-    assert link.chip.removeprefix("virtual, ") == "ready"
+    assert link.chip_text.removeprefix("virtual, ") == "ready"
     assert not session.alerts.has("stop")
 
 
@@ -97,7 +97,7 @@ def test_user_can_confirm_that_robot_stands_still_after_rejected_stop(session: S
     link = the_link(session)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    session.runs.confirm_still()
+    session.runs.confirm_stopped()
     assert link.state == "ready"
 
 
@@ -108,15 +108,15 @@ def test_neither_disconnection_nor_new_program_of_same_name_proves_a_stop(
         link = the_link(session)
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "unanswered")
-    tick_until(session, lambda: not link.connected)
-    assert (link.state, link.chip.removeprefix("virtual, ")) == ("not stopped", "may still move")
+    tick_until(session, lambda: not link.is_connected)
+    assert (link.state, link.chip_text.removeprefix("virtual, ")) == ("not stopped", "may still move")
     assert robots_chip(session) == ("Arm: may still move", "error")
     before = link.identity
     other = WireRobot(master.address, "Arm")
     try:
-        tick_until(session, lambda: link.connected and link.identity != before)
+        tick_until(session, lambda: link.is_connected and link.identity != before)
         assert link.state == "not stopped", "the first program may still run"
-        session.runs.confirm_still()
+        session.runs.confirm_stopped()
         tick_until(session, lambda: link.state == "ready")
     finally:
         other.close()
@@ -128,12 +128,12 @@ def test_robot_lost_without_stop_is_asked_again_until_the_user_confirms(
     with nep.node("arm", master=master.address) as node, Driver(ARM, "Arm", node):
         link = the_link(session)
         session.runs.stop_robot("Arm")
-        tick_until(session, lambda: link.not_stopped)
-    tick_until(session, lambda: not link.connected)
+        tick_until(session, lambda: link.stop_problem)
+    tick_until(session, lambda: not link.is_connected)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    assert session.runs.view().confirm == "Arm isn't moving"
-    session.runs.confirm_still()
+    assert session.runs.view().confirm_label == "Arm isn't moving"
+    session.runs.confirm_stopped()
     assert link.state == "away"
     assert robots_chip(session) == ("No robot", "off")
 
@@ -142,7 +142,7 @@ def test_rejected_stop_of_a_single_robot_is_an_alert(session: Session, arm: Driv
     link = the_link(session)
     session.runs.stop_robot("Arm")
     tick_until(session, lambda: session.alerts.has("stop"))
-    assert "the brake does not answer" in link.not_stopped
+    assert "the brake does not answer" in link.stop_problem
 
 
 def test_run_prints_rejection_of_the_robot(master: Master, arm: Driver, tmp_path: Path) -> None:
@@ -177,10 +177,10 @@ def test_pending_stop_is_shown_as_not_ready_everywhere(patient: Session, pepper:
     pepper.silent = {"stop"}
     patient.runs.stop()
     tick_until(patient, lambda: link.state == "stopping", LONG_S)
-    assert link.chip.removeprefix("virtual, ") == "stopping"
+    assert link.chip_text.removeprefix("virtual, ") == "stopping"
     assert robots_chip(patient) == ("Pepper stopping", "running")
     (fact,) = (each for each in facts_of(link, patient.topics, 0.0, str) if each.title == "Stop")
-    assert (fact.status, fact.words) == ("off", "Stop sent; waiting for confirmation")
+    assert (fact.status, fact.text) == ("off", "Stop sent; waiting for confirmation")
     answers(patient, pepper)
     tick_until(patient, lambda: patient.runs.view().state == "proven", LONG_S)
     assert link.state == "ready"
@@ -216,7 +216,7 @@ def test_later_stop_includes_robots_without_reply_to_an_earlier_one(
     pepper.silent = {"stop"}
     patient.runs.stop_robot("Pepper")
     patient.runs._stop(())
-    assert patient.runs._run.asked == ("Pepper",)
+    assert patient.runs._run.robots_to_stop == ("Pepper",)
     answers(patient, pepper, 2)
     tick_until(patient, lambda: patient.runs.view().state == "proven", LONG_S)
     tick_until(patient, lambda: link.state == "ready", LONG_S)
@@ -247,7 +247,7 @@ def test_ongoing_action_is_shown_until_robot_reports_its_end(session: Session, p
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().title == said)
     lives(pepper, "turn")
-    tick_until(session, lambda: link.goes_on == said)
+    tick_until(session, lambda: link.unended_actions == said)
     tick_until(session, lambda: session.alerts.has("moving:Pepper"))
     pepper._say = say_  # type: ignore[method-assign]
     lives(pepper)
@@ -265,14 +265,14 @@ def test_robot_whose_stop_is_always_late_is_asked_only_once_more(session: Sessio
     for stops in (1, 2, 2, 2):  # it is late, says so, and ends at last
         tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
         lives(pepper, "the stop function")
-        tick_until(session, lambda: link.goes_on, LONG_S)
+        tick_until(session, lambda: link.unended_actions, LONG_S)
         assert (
             len({each["id"] for each in pepper.heard("stop")}) == stops
         )  # a stop may be repeated until it is answered
         lives(pepper)
-        tick_until(session, lambda: not link.goes_on, LONG_S)
+        tick_until(session, lambda: not link.unended_actions, LONG_S)
         session.tick()
-    assert (link.state, session.runs.view().confirm) == ("not stopped", "Pepper isn't moving")
+    assert (link.state, session.runs.view().confirm_label) == ("not stopped", "Pepper isn't moving")
     session.runs.stop()  # a person asks: it is given another chance
     tick_until(session, lambda: len(pepper.heard("stop")) == 3, LONG_S)
     tick_until(session, lambda: session.runs.view().state == "unanswered", LONG_S)
@@ -284,11 +284,11 @@ def test_robot_lost_after_reporting_possible_motion_stays_an_error(session: Sess
         told = {"op": "alive", "id": "", "action": "", "state": "running", "not_ended": ["the stop function"]}
         arm._publish(arm.robot.topics.answer, {**told, "error": SAID})
         tick_until(session, lambda: link.state == "not stopped")
-    tick_until(session, lambda: not link.connected)
-    assert (link.state, link.not_stopped) == ("not stopped", SAID)
+    tick_until(session, lambda: not link.is_connected)
+    assert (link.state, link.stop_problem) == ("not stopped", SAID)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    session.runs.confirm_still()
+    session.runs.confirm_stopped()
     assert link.state == "away"
 
 
@@ -329,11 +329,11 @@ def test_late_stop_reply_updates_the_result(session: Session, pepper: WireRobot)
 def test_silent_robots_of_the_program_are_asked_again(session: Session, pepper: WireRobot) -> None:
     the_link(session, "Pepper")
     pepper.silent = {"stop"}
-    session.document.edited(workspace(started(block("control_wait", SECONDS=number(600)))))
+    session.document.apply_edit(workspace(started(block("control_wait", SECONDS=number(600)))))
     session.runs.run()
     runner = session.runs._runner
     assert runner is not None
-    session.runs.on_runner(RunnerEvent("ended", runner.run, silent=("Pepper",)))
+    session.runs.on_runner(RunnerEvent("ended", runner.run, unresponsive_robots=("Pepper",)))
     tick_until(session, lambda: session.runs.view().state == "unanswered")
     assert session.runs.view().title == "Pepper did not reply"
     runner.close()

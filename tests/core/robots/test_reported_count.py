@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.robots.reported_count import GROWING_S, MAX_COUNT, ReportedCount
+from app.core.robots.reported_count import GROWTH_WINDOW_S, MAX_COUNT, ReportedCount
 from tests.core.robots.stop_model.lab import SimulatedLab
 from tests.core.robots.stop_model.network import SimulatedNode
 from tests.core.robots.stop_model.studio import GRAPH_POLL_S
@@ -40,7 +40,7 @@ def test_count_of_restarted_driver_starts_over() -> None:
     assert (count.value, count.is_growing(2.0)) == (0, False)
     count.update(1, 3.0)
     assert count.is_growing(3.0)
-    assert not count.is_growing(3.0 + GROWING_S)
+    assert not count.is_growing(3.0 + GROWTH_WINDOW_S)
 
 
 def test_counts_are_read_only_from_heartbeats_of_the_robot_program(lab: SimulatedLab) -> None:

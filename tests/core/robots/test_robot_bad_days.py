@@ -20,7 +20,7 @@ import nep
 from app.core.network.mailbox import MESSAGES_PER_TOPIC
 from app.core.robots.robot_link import Invocation, RobotLink
 from app.core.session import Session
-from app.robots.description.description import td_for
+from app.robots.description.description import thing_description
 from app.robots.turtle import ROBOT
 from nep.masters.master import Master
 from tests.blocks.samples import block, number, started, workspace
@@ -63,7 +63,7 @@ def turtles(master: Master) -> Iterator[Turtles]:
 def there(session: Session) -> RobotLink:
     def link() -> RobotLink | None:
         found = session.fleet.link("Turtle")
-        ready = found is not None and found.connected and found.publisher is not None
+        ready = found is not None and found.is_connected and found.publisher is not None
         return found if ready and session.stopper is not None and session.stopper.robots else None
 
     tick_until(session, link, FOUND_S)
@@ -75,7 +75,7 @@ def there(session: Session) -> RobotLink:
 def turns_for_long(session: Session) -> None:
     turn = block("robot_diffdrive_do_turn", "x", ROBOT="Turtle", ANGLE=number(360))
     again = block("robot_diffdrive_do_turn", "y", ROBOT="Turtle", ANGLE=number(-360))
-    session.document.edited(workspace(started(turn, again)))
+    session.document.apply_edit(workspace(started(turn, again)))
 
 
 def runs(session: Session, turtles: Turtles) -> None:
@@ -97,7 +97,7 @@ def says_so_at_the_block(session: Session) -> None:
 def well_again(session: Session, turtles: Turtles) -> None:
     """A person says that it stands still; then it can be used as before."""
     there(session)
-    session.runs.confirm_still()
+    session.runs.confirm_stopped()
     runs(session, turtles)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "proven")
@@ -125,14 +125,14 @@ def test_robot_that_hangs_during_an_action_is_reported(session: Session, turtles
     says_so_at_the_block(session)
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
     tried = session.fleet.invoke("Turtle", "light", {})  # the panel says it too
-    tick_until(session, lambda: not tried.running, SAID_S)
+    tick_until(session, lambda: not tried.is_running, SAID_S)
     told = ("not responding", "has gone", "can't be reached")  # as soon as the master knows, it is away
     assert any(words in (tried.error or "") for words in told)
-    if link.connected:
-        assert link.chip == "virtual, does not answer"
+    if link.is_connected:
+        assert link.chip_text == "virtual, does not answer"
     process.send_signal(signal.SIGCONT)
     tick_until(session, lambda: there(session).state == "ready", FOUND_S)
-    with session.fleet.look_at("Turtle"):  # what it was doing does not go on: it was told to stop
+    with session.fleet.watch_sensors("Turtle"):  # what it was doing does not go on: it was told to stop
         tick_until(session, lambda: link.drawing is not None and not link.drawing["moving"])
     well_again(session, turtles)
 
@@ -147,7 +147,7 @@ class Liar:
         self.node = nep.node("liar", master=address)
         self.answers = self.node.new_pub("/Turtle/answer", "robot/answer")
         self._description = self.node.new_pub("/Turtle/description", "robot/description", latched=True)
-        self._description.publish(td_for(ROBOT.thing_model, "Turtle"))
+        self._description.publish(thing_description(ROBOT.thing_model, "Turtle"))
         self.commands: list[Mapping[str, object]] = []
         self.node.new_sub("/Turtle/command", "robot/command", sink=self._take)
 
@@ -189,7 +189,7 @@ def test_duplicate_and_foreign_replies_are_ignored(session: Session, liar: Liar,
     liar.say(tried, "succeeded", output={"moved": 0.5})
     liar.say(tried, "failed", error="no, it did not")
     liar.say(tried, "running")
-    tick_until(session, lambda: not tried.running)
+    tick_until(session, lambda: not tried.is_running)
     again = session.fleet.invoke("Turtle", "light", {})
     liar.say(again, "succeeded")
     tick_until(session, lambda: again.state == "succeeded")  # so the second answer has been read
@@ -245,18 +245,18 @@ def test_feedback_flood_is_handled(session: Session, liar: Liar, tried: Invocati
         for _ in range(60):
             most = max(most, calls_of(session.tick))
             ended.wait(0.02)
-        assert tried.running
+        assert tried.is_running
         assert tried.feedback
     finally:
         ended.set()
         thread.join()
     assert most < MAX_CALLS_A_TICK
     liar.say(tried, "succeeded")
-    tick_until(session, lambda: not tried.running)
+    tick_until(session, lambda: not tried.is_running)
 
 
 def test_robot_that_never_replies_is_reported(session: Session, liar: Liar, tried: Invocation) -> None:
-    tick_until(session, lambda: not tried.running, SAID_S)
+    tick_until(session, lambda: not tried.is_running, SAID_S)
     assert tried.error == "Turtle is not responding. Check that it is switched on."
     assert session.fleet.link("Turtle").state == "not stopped"  # type: ignore[union-attr]
     tick_until(session, lambda: liar.commands[-1]["op"] == "cancel")
@@ -270,6 +270,6 @@ def test_robot_that_falls_silent_during_an_action_is_reported(
 ) -> None:
     liar.say(tried, "running")
     tick_until(session, lambda: tried.state == "running")
-    tick_until(session, lambda: not tried.running, SAID_S)
+    tick_until(session, lambda: not tried.is_running, SAID_S)
     assert tried.error is not None
     assert "stopped responding" in tried.error

@@ -16,7 +16,7 @@ from app.core.network.watches import Watches
 from app.core.robots.announcements import RizeNames
 from app.core.robots.fleet import Fleet
 from app.core.robots.health import RESTART_TIMEOUT_S, Health
-from app.core.robots.robot_link import MAX_AWAY, RobotLink
+from app.core.robots.robot_link import MAX_DISCONNECTED, RobotLink
 from app.core.robots.stop.report import RobotStop, StopReport
 from app.robots.description.description import RobotTopics, topic_of
 from app.robots.identity import Identity
@@ -64,7 +64,7 @@ class Strangers:
         """A robot of this name is announced."""
         topics = RobotTopics(*(topic_of(name, leaf) for leaf in ("description", "command", "answer")))
         made = replace(ANY, name=name, title=name, virtual=False, sensors=(), events=(), topics=topics)
-        self.fleet.join(made, topics.description, Identity(f"node of {name}", name, "elsewhere", 1))
+        self.fleet.connect(made, topics.description, Identity(f"node of {name}", name, "elsewhere", 1))
         link = self.fleet.link(name)
         assert link is not None
         return link
@@ -103,12 +103,12 @@ def test_invented_robots_are_forgotten_and_their_resources_closed(
     strangers: Strangers,
 ) -> None:
     strangers.pass_by(1000)
-    assert len(strangers.fleet.links) == MAX_AWAY
-    assert len(strangers.fleet._names) == MAX_AWAY
+    assert len(strangers.fleet.links) == MAX_DISCONNECTED
+    assert len(strangers.fleet._names) == MAX_DISCONNECTED
     assert strangers.watched == set()
     assert strangers.open_publishers == sorted(topic_of(name, "command") for name in strangers.names)
     strangers.pass_by(500)
-    assert len(strangers.fleet.links) == MAX_AWAY
+    assert len(strangers.fleet.links) == MAX_DISCONNECTED
 
 
 def test_publishers_still_being_opened_are_closed(strangers: Strangers) -> None:
@@ -118,11 +118,11 @@ def test_publishers_still_being_opened_are_closed(strangers: Strangers) -> None:
 
 def test_moved_robot_that_left_is_still_named_by_stop(strangers: Strangers) -> None:
     strangers.come("Pepper")
-    strangers.fleet.moved.note(["Pepper"], "form")
+    strangers.fleet.moved.record_command(["Pepper"], "form")
     strangers.leave()
     strangers.pass_by(1000)
     fleet = strangers.fleet
-    assert fleet.unheard == ("Pepper",)
+    assert fleet.unresponsive == ("Pepper",)
     assert "Pepper" in fleet.stoppable
     (target,) = (each for each in fleet.stop_targets if each.robot.name == "Pepper")
     assert target.is_expected
@@ -138,24 +138,24 @@ def test_important_robots_are_not_forgotten(strangers: Strangers, why: str) -> N
     link = strangers.come("Pepper")
     if why == "proven":
         report = StopReport((RobotStop("Pepper", True, 41.0),), 41.0)
-        fleet.stopped({"Pepper": ("41 ms", "ok")}, report)
+        fleet.apply_stop({"Pepper": ("41 ms", "ok")}, report)
         assert link.has_proven_stop
     elif why == "chosen":
-        fleet.choose("Pepper")
+        fleet.select("Pepper")
     elif why == "used":
         fleet.used = lambda: ("Pepper",)
     elif why == "being stopped":
-        fleet.told_to_stop(["Pepper"])
+        fleet.mark_stopping(["Pepper"])
     else:
-        link.not_stopped = "Pepper may still move"
+        link.stop_problem = "Pepper may still move"
     strangers.leave()
     strangers.pass_by(1000)
     assert fleet.link("Pepper") is link
-    assert len(fleet.links) == MAX_AWAY + 1
+    assert len(fleet.links) == MAX_DISCONNECTED + 1
 
 
 def test_robots_that_replied_are_forgotten_last(strangers: Strangers) -> None:
-    strangers.come("Pepper").answered_s = 1.0
+    strangers.come("Pepper").replied_s = 1.0
     strangers.come("Silent")
     strangers.leave()
     strangers.pass_by(1000)
@@ -187,7 +187,7 @@ def test_alerts_of_forgotten_robots_are_resolved(strangers: Strangers) -> None:
     strangers.pass_by(300)
     health.check()
     assert not alerts.has("robot:Rover")
-    assert len(health._gone_since) == MAX_AWAY
+    assert len(health._gone_since) == MAX_DISCONNECTED
 
 
 def test_running_program_reports_its_robots_to_the_fleet(tmp_path: Path) -> None:
@@ -207,4 +207,4 @@ def test_number_of_rize_robot_names_is_limited() -> None:
     names = RizeNames()
     for number in range(1000):
         names.add(f"Robot{number}")
-    assert len(names._told) <= MAX_AWAY
+    assert len(names._told) <= MAX_DISCONNECTED

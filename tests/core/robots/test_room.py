@@ -10,7 +10,7 @@ import pytest
 import nep
 from app.core.network.mailbox import Batch
 from app.core.network.watches import Watches
-from app.core.robots.room import QUIET_S, SessionRoom
+from app.core.robots.room import SAVE_DELAY_S, SessionRoom
 from app.core.storage.settings import Settings
 from app.robots.virtual.room import Room
 from app.robots.virtual.room_map import TOPIC, RoomMap
@@ -82,10 +82,10 @@ def test_room_is_joined_with_first_robot_and_publishes_saved_state(studio: Studi
 def test_room_is_restored_at_next_start(studio: Studio, tmp_path: Path) -> None:
     studio.room.move("table", 0.5, 0.5, {})
     studio.room.add("person", 1.5, 1.5)
-    studio.later(QUIET_S / 2)
+    studio.later(SAVE_DELAY_S / 2)
     assert Studio(tmp_path).room.room == Room()  # not with every step of a drag
-    studio.later(QUIET_S)
-    studio.later(QUIET_S)
+    studio.later(SAVE_DELAY_S)
+    studio.later(SAVE_DELAY_S)
     again = Studio(tmp_path)
     assert again.room.room == studio.room.room
     again.close()
@@ -100,7 +100,7 @@ def test_room_change_by_a_robot_is_republished_for_late_subscribers(studio: Stud
     assert studio.room.room.thing("ball").x == -1.0
     studio.later(0.1)
     assert studio.told() == []
-    studio.later(QUIET_S)
+    studio.later(SAVE_DELAY_S)
     assert room_of(studio.told()[-1]).thing("ball").x == -1.0
 
 

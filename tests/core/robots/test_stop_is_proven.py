@@ -14,7 +14,7 @@ from app.core.robots.stop.lines import StopTarget
 from app.core.robots.stop.report import RobotStop, StopReport, not_reached
 from app.core.robots.stop.stopper import RobotStopper
 from app.robots.description.description import RobotTopics
-from app.robots.identity import first_to_announce, identity_of
+from app.robots.identity import first_announcer, identity_of
 from nep.errors import AddressInUseError
 from nep.masters.master import Master
 from tests.blocks.fakes import until
@@ -70,7 +70,7 @@ def test_foreign_reply_does_not_prove_stop_of_a_frozen_robot(stopper, pepper, st
     pepper.silent = {"stop"}
     report = stopper.stop_all(["Pepper"], timeout_s=SHORT_S)
     assert stranger.answered.is_set()
-    assert not report.proven
+    assert not report.is_proven
     assert report.robots[0] == RobotStop("Pepper", False, None)
 
 
@@ -85,26 +85,26 @@ def test_foreign_node_that_only_replies_is_named(master, stopper, pepper) -> Non
         until(lambda: bool(pepper.heard("stop")))
         forged.publish({"id": pepper.heard("stop")[0]["id"], "op": "stop", "state": "succeeded"})
         asking.join()
-    assert not reports[0].proven
+    assert not reports[0].is_proven
     assert reports[0].strangers == (("Pepper", "liar"),)
 
 
 def test_two_robots_of_one_name_must_both_reply(master, stopper, pepper) -> None:
     twin = WireRobot(master.address)
     try:
-        stopper.see(stopper._node.graph())
+        stopper.update_graph(stopper._node.graph())
         report = stopper.stop_all(timeout_s=LONG_S)
-        assert report.proven
-        assert [robot.who for robot in report.robots] == ["Pepper", "Pepper (“Pepper”)"]
+        assert report.is_proven
+        assert [robot.full_name for robot in report.robots] == ["Pepper", "Pepper (“Pepper”)"]
         twin.silent = {"stop"}
         told: list[RobotStop] = []
         report = stopper.stop_all(timeout_s=SHORT_S, on_answer=told.append)
-        assert [(each.answered, each.waits) for each in told] == [(True, True), (False, False)]
-        assert (report.proven, report.silent) == (False, ("Pepper",))
-        assert report.robots[1].sentence == "Pepper (“Pepper”) did not reply. Switch it off by hand."
+        assert [(each.is_confirmed, each.is_waiting) for each in told] == [(True, True), (False, False)]
+        assert (report.is_proven, report.unconfirmed_names) == (False, ("Pepper",))
+        assert report.robots[1].message == "Pepper (“Pepper”) did not reply. Switch it off by hand."
         twin.silent, pepper.silent = set(), {"stop"}
         report = stopper.stop_all(timeout_s=SHORT_S)
-        assert [robot.answered for robot in report.robots] == [False, True]
+        assert [robot.is_confirmed for robot in report.robots] == [False, True]
     finally:
         twin.close()
 
@@ -112,37 +112,40 @@ def test_two_robots_of_one_name_must_both_reply(master, stopper, pepper) -> None
 def test_other_subscriber_of_the_commands_is_named(master, stopper) -> None:
     with nep.node("motor box", master=master.address) as node:
         node.new_sub("/Pepper/command", "robot/command")
-        stopper.see(stopper._node.graph())
+        stopper.update_graph(stopper._node.graph())
         report = stopper.stop_all(timeout_s=LONG_S)
-    assert report.proven
+    assert report.is_proven
     said = "Pepper (“motor box”) also receives the commands and can't confirm"
-    assert [robot.sentence for robot in report.robots][1:] == [said]
+    assert [robot.message for robot in report.robots][1:] == [said]
 
 
 def test_many_other_subscribers_are_one_line(master, stopper) -> None:
     nodes = [nep.node(f"listener {number}", master=master.address) for number in range(6)]
     for node in nodes:
         node.new_sub("/Pepper/command", "robot/command")
-    stopper.see(stopper._node.graph())
+    stopper.update_graph(stopper._node.graph())
     report = stopper.stop_all(timeout_s=LONG_S)
     for node in nodes:
         node.close()
     assert [robot.program for robot in report.robots] == ["", "6 programs"]
-    assert report.proven
+    assert report.is_proven
 
 
 def test_first_announcing_program_is_the_robot(master, stopper, pepper) -> None:
     twin = WireRobot(master.address)
     try:
         view = stopper._node.graph()
-        first = first_to_announce(view, "/Pepper/description")
+        first = first_announcer(view, "/Pepper/description")
         assert first is not None
         assert first.node_id == pepper._node.id
-        assert identity_of(view, twin._node.id).words.startswith("“Pepper” on ")
+        assert identity_of(view, twin._node.id).display_name.startswith("“Pepper” on ")
         stopper.set_robots([StopTarget(pepper.described, identity_of(view, twin._node.id))])
         twin.silent = {"stop"}
         report = stopper.stop_all(timeout_s=SHORT_S)
-        assert [(robot.program, robot.answered) for robot in report.robots] == [("", False), ("Pepper", True)]
+        assert [(robot.program, robot.is_confirmed) for robot in report.robots] == [
+            ("", False),
+            ("Pepper", True),
+        ]
     finally:
         twin.close()
 
@@ -151,20 +154,20 @@ def test_stop_is_also_sent_to_topics_of_earlier_descriptions(master, stopper, pe
     """The robot says that its commands are elsewhere now, and still hears the old topic only."""
     moved = RobotTopics("/Pepper/description", "/Pepper/other_command", "/Pepper/other_answer")
     changed = replace(pepper.described, topics=moved)
-    stopper.set_robots([StopTarget(changed, topics=(pepper.described.topics,))])
+    stopper.set_robots([StopTarget(changed, earlier_topics=(pepper.described.topics,))])
     report = stopper.stop_all(timeout_s=LONG_S)
-    assert report.proven
+    assert report.is_proven
     assert pepper.heard("stop")
 
 
 def test_robot_that_stop_was_not_sent_to_is_named() -> None:
     report = StopReport((RobotStop("Pepper", True, 3.0),), 3.0)
-    whole = report.with_asked(["Pepper", "Turtle"], "no master answers")
-    assert (whole.proven, whole.silent) == (False, ("Turtle",))
+    whole = report.with_unreached(["Pepper", "Turtle"], "no master answers")
+    assert (whole.is_proven, whole.unconfirmed_names) == (False, ("Turtle",))
     said = "Stop was not sent to Turtle: no master answers. Switch it off by hand."
-    assert whole.robots[1].sentence == said
-    assert report.with_asked(["Pepper"]) is report
-    assert not_reached("Turtle").wrong == "Stop was not sent to Turtle"
+    assert whole.robots[1].message == said
+    assert report.with_unreached(["Pepper"]) is report
+    assert not_reached("Turtle").problem == "Stop was not sent to Turtle"
 
 
 class Broken:
@@ -199,8 +202,8 @@ def test_failed_connection_is_named_and_does_not_affect_other_robots(master, bro
         assert stopper.robots == ("Turtle",)
         assert list(stopper.problems) == ["Pepper"]
         report = stopper.stop_all(timeout_s=LONG_S)
-        assert (report.proven, report.silent) == (False, ("Pepper",))
-        assert report.robots[0].sentence.startswith("Stop can't be sent to Pepper: ")
+        assert (report.is_proven, report.unconfirmed_names) == (False, ("Pepper",))
+        assert report.robots[0].message.startswith("Stop can't be sent to Pepper: ")
         assert broken.tried == 2  # once more at the stop
     finally:
         stopper.close()
@@ -213,7 +216,7 @@ def test_failed_connection_is_retried_at_stop(broken, pepper) -> None:
         stopper.set_robots([pepper.described])
         broken.full.clear()
         report = stopper.stop_all(timeout_s=LONG_S)
-        assert report.proven
+        assert report.is_proven
         assert [robot.name for robot in report.robots] == ["Pepper"]
         assert (stopper.robots, dict(stopper.problems)) == (("Pepper",), {})
     finally:
@@ -224,18 +227,18 @@ def test_late_stop_reply_is_accepted(stopper, pepper) -> None:
     pepper.silent = {"stop"}
     late: list[RobotStop] = []
     report = stopper.stop_all(timeout_s=0.1, on_late=late.append)
-    assert not report.proven
+    assert not report.is_proven
     (command,) = pepper.heard("stop")
     pepper._say(command, "failed", "the brake is stuck")
     until(lambda: len(late) == 1)
-    assert late[0].wrong == "Pepper may still move: the brake is stuck"
+    assert late[0].problem == "Pepper may still move: the brake is stuck"
     assert report.with_late(late[0]).robots == (late[0],)
     pepper._say(command, "succeeded")
     until(lambda: len(late) == 2)
-    assert report.with_late(late[1]).proven
+    assert report.with_late(late[1]).is_proven
     pepper._say(command, "failed", "moves again")
     pepper._say(command, "succeeded")
-    assert stopper.stop_all(timeout_s=0.1, on_late=late.append).silent == ("Pepper",)
+    assert stopper.stop_all(timeout_s=0.1, on_late=late.append).unconfirmed_names == ("Pepper",)
     assert len(late) == 2
     assert report.with_late(RobotStop("Other", True, 1.0)) is report
 
@@ -258,8 +261,8 @@ def test_late_reply_callback_can_use_the_stopper(stopper, pepper) -> None:
     publisher = pepper._answer._spec.id
     topic, payload = pepper.described.topics.answer, json.dumps(answer).encode()
     with stopper._changed:
-        asked.unknown.put(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
-    stopper.see(stopper._node.graph())
+        asked.unknown_replies.add(nep.Message(topic, payload, "json", "robot/answer", publisher=publisher))
+    stopper.update_graph(stopper._node.graph())
     until(lambda: free == [True])
 
 
@@ -268,5 +271,5 @@ def test_rejection_message_of_the_robot_is_sanitized(stopper, pepper) -> None:
     words = "Pepper may still move: the brake\x1b[2J\n does not answer." + "!" * 1000
     pepper._say = lambda command, state, error="": say_(command, "failed", words)
     (stopped,) = stopper.stop_all(timeout_s=LONG_S).robots
-    assert stopped.wrong.startswith("Pepper may still move: the brake [2J does not answer.!")
-    assert len(stopped.wrong) <= 200
+    assert stopped.problem.startswith("Pepper may still move: the brake [2J does not answer.!")
+    assert len(stopped.problem) <= 200

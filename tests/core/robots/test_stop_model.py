@@ -262,9 +262,9 @@ class StopModel(RuleBasedStateMachine):
     def confirm_standing_still(self) -> None:
         report = self.studio.session.runs.state.report
         assert report is not None
-        for robot in [each for each in self.told if each.name in report.silent]:
+        for robot in [each for each in self.told if each.name in report.unconfirmed_names]:
             del self.told[robot]
-        self.studio.session.runs.confirm_still()
+        self.studio.session.runs.confirm_stopped()
         self.lab.settle()
 
     @rule(seconds=waits)
@@ -292,8 +292,8 @@ class StopModel(RuleBasedStateMachine):
         answered = self.answered[self.press_of_all]
         for robot, commands in self.told.items():
             if robot.id not in answered and any(place < self.pressed_at for place in commands.values()):
-                assert not report.proven, f"{robot} is called stopped and did not answer"
-                assert robot.name in report.silent, (
+                assert not report.is_proven, f"{robot} is called stopped and did not answer"
+                assert robot.name in report.unconfirmed_names, (
                     f"{robot} was told to move, did not answer and is not named"
                 )
 

@@ -76,7 +76,7 @@ def test_robot_lost_while_moving_is_named_until_it_answers_or_a_person_confirms(
         view, report = runs.view(), runs.state.report
         assert (view.state, view.result_status) == ("unanswered", "error")
         assert report is not None
-        assert report.silent == ("Pepper",)
+        assert report.unconfirmed_names == ("Pepper",)
         assert "form" in view.detail, "what moved it is said"
         assert not view.can_run
         assert link.last_stop_status == "error"
@@ -86,7 +86,7 @@ def test_robot_lost_while_moving_is_named_until_it_answers_or_a_person_confirms(
         lab.stop()
         assert (runs.view().state, runs.view().result_status) == ("proven", "ok")
     else:
-        runs.confirm_still()
+        runs.confirm_stopped()
     assert moved.names == ()
     lab.advance(GRAPH_POLL_S)
     assert runs.view().can_run
@@ -109,14 +109,14 @@ def test_robot_that_reported_the_end_of_its_motion_is_not_named(lab: SimulatedLa
 def test_stop_names_the_cause_of_motion(lab: SimulatedLab, by: str) -> None:
     pepper, session = lab.start_robot("Pepper"), lab.studio.session
     lab.wait_for_link("Pepper")
-    session.fleet.moved.note(["Pepper"], by)
+    session.fleet.moved.record_command(["Pepper"], by)
     pepper.node.close()
     lab.advance(2 * CHECK_INTERVAL_S)
     motion = session.fleet.moved.motion("Pepper")
     assert motion is not None
     assert session.alerts.has("moving:Pepper")
     lab.stop()
-    assert motion.sentence in session.runs.view().detail
+    assert motion.reason in session.runs.view().detail
 
 
 def test_stop_without_robots_ends_ready_and_proves_nothing(lab: SimulatedLab) -> None:
@@ -151,7 +151,7 @@ def test_stop_pressed_before_the_connection_is_delivered_late_and_reported(lab: 
 def test_stop_is_not_delivered_late_after_a_person_confirmed(lab: SimulatedLab) -> None:
     pepper, runs = start_unreachable_robot(lab), lab.studio.session.runs
     lab.stop()
-    runs.confirm_still()
+    runs.confirm_stopped()
     connect(lab, pepper)
     assert lab.stops_received(pepper) == 0
     assert runs.view().can_run
@@ -230,7 +230,7 @@ def test_invented_robots_do_not_prevent_stop_of_a_real_robot(
     assert lab.stops_received(pepper) == 1
     report = lab.studio.session.runs.state.report
     assert report is not None
-    assert "Pepper" in report.still
+    assert "Pepper" in report.stopped_names
 
 
 def test_robot_whose_lease_expired_after_its_reply_still_receives_stop(lab: SimulatedLab) -> None:
@@ -259,12 +259,12 @@ def test_reply_of_another_program_does_not_prove_a_stop(lab: SimulatedLab) -> No
 def test_robot_known_only_by_its_command_topic_receives_stop_and_is_named(lab: SimulatedLab) -> None:
     unknown, runs = lab.start_robot("X"), lab.studio.session.runs
     unknown.node.unlist()  # it announces nothing
-    lab.studio.session.fleet.moved.note(["/X/command"], "shelf")
+    lab.studio.session.fleet.moved.record_command(["/X/command"], "shelf")
     lab.advance(GRAPH_POLL_S)
     lab.stop()
     assert lab.stops_received(unknown) == 1
     report = runs.state.report
     assert report is not None
-    assert report.silent == ("/X/command",)
-    runs.confirm_still()
+    assert report.unconfirmed_names == ("/X/command",)
+    runs.confirm_stopped()
     assert runs.view().can_run

@@ -51,7 +51,7 @@ def used_by_a_program(session: Session, node: nep.Node) -> Iterator[None]:
     driver.start()
     try:
         tick_until(session, lambda: within_reach(session))
-        session.document.edited(blink_and_wait())
+        session.document.apply_edit(blink_and_wait())
         session.runs.run()
         tick_until(session, lambda: "w" in session.runs.running_blocks)
         yield
@@ -95,7 +95,7 @@ def test_user_can_confirm_that_a_lost_robot_stands_still(session: Session) -> No
     tick_until(session, lambda: not session.fleet.connected)
     session.runs.stop()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    session.runs.confirm_still()
+    session.runs.confirm_stopped()
     tick_until(session, lambda: not within_reach(session))
 
 

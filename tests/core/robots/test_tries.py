@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
-from app.core.robots.robot_link import TRIES_KEPT, Invocation, Payload, RobotLink
-from app.core.robots.tries import FIRST_ANSWER_S, GRACE_S, Tries
-from app.robots.description.description import Action, Robot, parse, td_for
+from app.core.robots.robot_link import MAX_PAST_INVOCATIONS, Invocation, Payload, RobotLink
+from app.core.robots.tries import FIRST_REPLY_TIMEOUT_S, GRACE_S, ManualInvocations
+from app.robots.description.description import Action, Robot, parse, thing_description
 from app.robots.turtle import ROBOT
 
 
@@ -22,9 +22,9 @@ class Bench:
     reachable: bool = True
 
     def __post_init__(self) -> None:
-        robot: Robot = parse(td_for(ROBOT.thing_model, "Turtle"))
+        robot: Robot = parse(thing_description(ROBOT.thing_model, "Turtle"))
         self.link = RobotLink("Turtle", robot)
-        self.tries = Tries(self.send, self.rested.append, lambda: self.now, lambda: 1e9)
+        self.tries = ManualInvocations(self.send, self.rested.append, lambda: self.now, lambda: 1e9)
 
     def send(self, _link: RobotLink, command: Payload) -> bool:
         self.sent.append(command)
@@ -36,16 +36,16 @@ class Bench:
         return found
 
     def begin(self, name: str = "move", **given: object) -> Invocation:
-        return self.tries.begin(self.link, self.action(name), given)
+        return self.tries.start(self.link, self.action(name), given)
 
     def answer(self, made: Invocation, state: str, **more: object) -> None:
         told = {"id": made.id, "op": "invoke", "action": made.action, "state": state}
-        self.tries.answer(self.link, {**told, **more})
+        self.tries.apply_reply(self.link, {**told, **more})
 
     def pass_time(self, seconds: float, *, alive: bool = False) -> None:
         self.now += seconds
         if alive:
-            self.tries.answer(self.link, {"op": "alive", "id": "", "state": "running"})
+            self.tries.apply_reply(self.link, {"op": "alive", "id": "", "state": "running"})
         self.tries.check_timeouts([self.link])
 
 
@@ -59,34 +59,34 @@ def test_trial_passes_through_its_states_and_is_kept(bench) -> None:
     assert bench.sent[0]["input"] == {"distance": 0.5}
     assert made.state == "sent"
     bench.answer(made, "accepted", replaces=["turn"])
-    assert (made.state, made.replaces, made.left_s) == ("accepted", ("turn",), None)
+    assert (made.state, made.replaces, made.remaining_s) == ("accepted", ("turn",), None)
     bench.answer(made, "running")
     bench.now += 4
     bench.answer(made, "running", feedback={"moved": 0.2})
     assert made.feedback == {"moved": 0.2}
-    assert made.left_s == 56.0
+    assert made.remaining_s == 56.0
     bench.answer(made, "succeeded", output={"moved": 0.5})
     assert (made.state, made.output, made.elapsed_s) == ("succeeded", {"moved": 0.5}, 4.0)
-    assert not made.running
+    assert not made.is_running
     assert bench.rested == ["Turtle"]
-    assert list(bench.link.tried) == [made]
+    assert list(bench.link.past_invocations) == [made]
 
 
 def test_only_newest_trials_are_kept(bench) -> None:
-    for _ in range(TRIES_KEPT + 5):
+    for _ in range(MAX_PAST_INVOCATIONS + 5):
         bench.answer(bench.begin("light"), "succeeded")
-    assert len(bench.link.tried) == TRIES_KEPT
+    assert len(bench.link.past_invocations) == MAX_PAST_INVOCATIONS
 
 
 def test_trial_fails_after_three_seconds_without_reply(bench) -> None:
     made = bench.begin()
-    bench.pass_time(FIRST_ANSWER_S - 0.1)
-    assert made.running
+    bench.pass_time(FIRST_REPLY_TIMEOUT_S - 0.1)
+    assert made.is_running
     bench.pass_time(0.2)
     assert (made.state, made.error) == ("failed", "Turtle is not responding. Check that it is switched on.")
     assert bench.sent[-1]["op"] == "cancel"  # should it wake up
-    assert (bench.link.state, bench.link.chip) == ("silent", "virtual, not responding")
-    bench.tries.answer(bench.link, {"op": "alive", "id": ""})
+    assert (bench.link.state, bench.link.chip_text) == ("silent", "virtual, not responding")
+    bench.tries.apply_reply(bench.link, {"op": "alive", "id": ""})
     assert bench.link.state == "ready"
 
 
@@ -96,7 +96,7 @@ def test_trial_fails_two_seconds_after_robot_falls_silent(bench) -> None:
     bench.answer(made, "running")
     for _ in range(20):
         bench.pass_time(0.5, alive=True)  # it lives, and goes on
-    assert made.running
+    assert made.is_running
     bench.pass_time(2.1)
     assert made.state == "failed"
     assert made.error is not None
@@ -109,9 +109,9 @@ def test_robot_without_heartbeat_is_awaited_until_the_time_limit(bench) -> None:
     made = bench.begin()
     bench.answer(made, "running")
     bench.pass_time(59.0)
-    assert made.running
+    assert made.is_running
     bench.pass_time(1.0 + GRACE_S / 2)
-    assert made.running  # the robot may say so itself
+    assert made.is_running  # the robot may say so itself
     bench.pass_time(GRACE_S)
     assert (made.state, made.error) == ("failed", "move took longer than 60 s")
     assert bench.sent[-1]["op"] == "cancel"
@@ -142,7 +142,7 @@ def test_time_in_robot_queue_does_not_count_towards_time_limit(bench) -> None:
 def test_foreign_and_invalid_replies_do_not_end_a_trial(bench, answer) -> None:
     made = bench.begin()
     bench.answer(made, "running")
-    bench.tries.answer(bench.link, {**answer, "id": made.id} if answer.get("mine") else answer)
+    bench.tries.apply_reply(bench.link, {**answer, "id": made.id} if answer.get("mine") else answer)
     assert made.state == "running"
 
 

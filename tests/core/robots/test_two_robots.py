@@ -29,7 +29,7 @@ def node(master: Master) -> Iterator[nep.Node]:
 def there(session: Session, *names: str) -> None:
     def all_of_them() -> bool:
         links = [session.fleet.link(name) for name in names]
-        ready = all(link is not None and link.connected and link.publisher is not None for link in links)
+        ready = all(link is not None and link.is_connected and link.publisher is not None for link in links)
         return bool(ready and session.stopper is not None and set(names) <= set(session.stopper.robots))
 
     tick_until(session, all_of_them, FOUND_S)
@@ -47,14 +47,14 @@ def test_pepper_and_turtle_work_in_one_behaviour(session: Session, node: nep.Nod
     with Driver(simulated.ROBOT, "Pepper", node), Driver(turtle.ROBOT, "Turtle", node):
         there(session, "Pepper", "Turtle")
         light = block("robot_diffdrive_do_light", ROBOT="Turtle", COLOUR="#ff0000")
-        session.document.edited(workspace(started(say("Go"), turn(20), light, write(text("both")))))
+        session.document.apply_edit(workspace(started(say("Go"), turn(20), light, write(text("both")))))
         assert not [p for p in session.document.problems() if p.severity == "error"]
         session.runs.run()
         tick_until(session, lambda: "both" in printed(session), FOUND_S)
         assert {"Pepper says “Go”", "Turtle turns 20 °"} <= set(printed(session))
         tick_until(session, lambda: session.runs.view().state == "proven")
         assert session.runs.view().result_status == "ok"
-        with session.fleet.look_at("Turtle"):
+        with session.fleet.watch_sensors("Turtle"):
             link = session.fleet.link("Turtle")
             assert link is not None
             tick_until(session, lambda: link.drawing is not None)
@@ -70,7 +70,7 @@ def test_panels_show_the_chosen_robot_or_the_first_connected(session: Session, n
             shown = session.fleet.current
             assert shown is not None
             assert shown.name == "Pepper"
-            session.fleet.choose("Turtle")
+            session.fleet.select("Turtle")
             assert session.fleet.current is session.fleet.link("Turtle")
         tick_until(session, lambda: len(session.fleet.connected) == 1, FOUND_S)
         assert session.fleet.current is session.fleet.link("Pepper")  # the chosen one has gone
@@ -83,7 +83,7 @@ def test_real_robot_does_not_move_before_permission(session: Session, node: nep.
     with Driver(REAL, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
-        session.document.edited(workspace(started(turn(180, "x"))))
+        session.document.apply_edit(workspace(started(turn(180, "x"))))
         moving = session.fleet.permission
         with pytest.raises(MayNotMoveError):
             session.fleet.invoke("Turtle", "move", {"distance": 0.5})
@@ -111,13 +111,13 @@ def test_behaviour_that_publishes_on_a_robot_topic_needs_permission_and_is_stopp
         heard: list[object] = []
         node.new_sub("/Turtle/command", sink=lambda messages: heard.extend(m.payload for m in messages))
         publish = block("messages_publish", "p", TOPIC=topic, VALUE=text("drive"))
-        session.document.edited(workspace(started(publish, wait(600))))
+        session.document.apply_edit(workspace(started(publish, wait(600))))
         session.runs.run()
         moving = session.fleet.permission
         assert not session.runs.active
         assert moving.question is not None
         assert moving.question.title == "Allow Turtle to move?"
-        assert "“move”" in moving.question.sentence
+        assert "“move”" in moving.question.message
         session.tick()
         assert "drive" not in heard
         moving.answer(let=True)
@@ -135,7 +135,7 @@ def test_robot_that_connects_during_a_run_is_not_moved_by_published_messages(
     again = block(
         "control_repeat", TIMES=number(10_000), BODY=[publish, block("control_wait", SECONDS=number(0.05))]
     )
-    session.document.edited(workspace(started(again)))
+    session.document.apply_edit(workspace(started(again)))
     session.runs.run()  # nobody is there: nothing to ask about
     tick_until(session, lambda: session.runs.running_blocks, FOUND_S)
     with Driver(REAL, "Turtle", node):
@@ -151,7 +151,7 @@ def test_permission_continues_the_requested_run_without_asking_again(
     with Driver(REAL, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
-        session.document.edited(workspace(started(turn(180, "x"))))
+        session.document.apply_edit(workspace(started(turn(180, "x"))))
         session.runs.run()
         session.fleet.permission.answer(let=True)
         tick_until(session, lambda: session.runs.running_blocks == ("x",), FOUND_S)
@@ -190,14 +190,14 @@ def test_pause_halts_a_driving_robot_and_resume_lets_it_drive_again(session: Ses
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
-        session.document.edited(workspace(started(drive("d", turn=60), wait(30))))
+        session.document.apply_edit(workspace(started(drive("d", turn=60), wait(30))))
         assert not [p for p in session.document.problems() if p.severity == "error"]
         session.runs.run()
         tick_until(session, lambda: session.runs.running_blocks == ("w",), FOUND_S)
         tick_until(session, lambda: not wheels.still())
         session.runs.pause()
         tick_until(session, lambda: session.runs.view().state == "paused" and wheels.still())
-        session.runs.go_on()
+        session.runs.resume()
         tick_until(session, lambda: not wheels.still())
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "proven")
@@ -208,13 +208,13 @@ def test_step_does_not_leave_a_robot_driving(session: Session, node: nep.Node) -
     with Driver(turtle.ROBOT, "Turtle", node) as driver:
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
-        session.document.edited(workspace(started(drive("d", turn=60), wait(30))))
+        session.document.apply_edit(workspace(started(drive("d", turn=60), wait(30))))
         session.runs.step()
         tick_until(session, lambda: session.runs.stopped_blocks == ("d",), FOUND_S)
         session.runs.step()
         tick_until(session, lambda: session.runs.stopped_blocks == ("w",), FOUND_S)
         tick_until(session, wheels.still)
-        session.runs.go_on()
+        session.runs.resume()
         tick_until(session, lambda: not wheels.still())
         session.runs.stop()
         tick_until(session, lambda: session.runs.view().state == "proven")
@@ -226,7 +226,7 @@ def test_slow_motion_does_not_lengthen_a_drive(session: Session, node: nep.Node)
         there(session, "Turtle")
         wheels = driver.body.wheels  # type: ignore[attr-defined]
         first = wheels.pose()[:2]
-        session.document.edited(workspace(started(drive("d", speed=-0.2), wait(0.5), drive("h"))))
+        session.document.apply_edit(workspace(started(drive("d", speed=-0.2), wait(0.5), drive("h"))))
         session.runs.set_pace(1.5)
         session.runs.run()
         tick_until(session, lambda: session.runs.running_blocks == ("h",), FOUND_S)

@@ -20,7 +20,7 @@ from app.core.robots.launcher import VirtualProcesses
 from app.core.robots.motion.permission import MayNotMoveError, MotionPermission
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.robots.description.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, thing_description
 from app.robots.identity import Identity
 from app.robots.turtle import ROBOT
 from nep.masters.master import Master
@@ -58,20 +58,20 @@ def process() -> Iterator[subprocess.Popen[bytes]]:
 
 def test_process_started_here_is_own(process: subprocess.Popen[bytes]) -> None:
     known = VirtualProcesses(MODULES, lambda: [process.pid])
-    assert known.is_ours(Identity("n", "Turtle", HERE, process.pid))
-    assert known.is_ours(Identity("n", "Turtle", HERE, os.getpid()))
+    assert known.is_started_by_studio(Identity("n", "Turtle", HERE, process.pid))
+    assert known.is_started_by_studio(Identity("n", "Turtle", HERE, os.getpid()))
 
 
 def test_process_that_only_mentions_the_module_is_not_own(process: subprocess.Popen[bytes]) -> None:
-    assert not VirtualProcesses(MODULES).is_ours(Identity("n", "Turtle", HERE, process.pid))
+    assert not VirtualProcesses(MODULES).is_started_by_studio(Identity("n", "Turtle", HERE, process.pid))
 
 
 def test_process_on_another_computer_or_unknown_process_is_not_own(process: subprocess.Popen[bytes]) -> None:
     known = VirtualProcesses(MODULES, lambda: [process.pid])
-    assert not known.is_ours(Identity("n", "Turtle", "another-computer", process.pid))
-    assert not known.is_ours(Identity("n", "Turtle", HERE, None))
-    assert not known.is_ours(Identity("n", "Turtle", HERE, 2**31 - 1))
-    assert not known.is_ours(Identity("n", "Turtle", HERE, 1))
+    assert not known.is_started_by_studio(Identity("n", "Turtle", "another-computer", process.pid))
+    assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, None))
+    assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, 2**31 - 1))
+    assert not known.is_started_by_studio(Identity("n", "Turtle", HERE, 1))
 
 
 def test_virtual_robot_of_another_studio_of_this_user_is_own(master: Master) -> None:
@@ -79,8 +79,8 @@ def test_virtual_robot_of_another_studio_of_this_user_is_own(master: Master) -> 
     made = subprocess.Popen(command, env={**os.environ, "NEP_MASTER": master.address})
     try:
         until(lambda: bool(psutil.Process(made.pid).cmdline()))  # the system knows it a moment after it began
-        assert VirtualProcesses(MODULES).is_ours(Identity("n", "Turtle", HERE, made.pid))
-        assert not VirtualProcesses(("app.robots.simulated",)).is_ours(
+        assert VirtualProcesses(MODULES).is_started_by_studio(Identity("n", "Turtle", HERE, made.pid))
+        assert not VirtualProcesses(("app.robots.simulated",)).is_started_by_studio(
             Identity("n", "Turtle", HERE, made.pid)
         )
     finally:
@@ -115,7 +115,7 @@ def fleet(tmp_path: Path) -> Fleet:
 
 
 def turtle(*, virtual: bool = True) -> Robot:
-    return replace(parse(td_for(ROBOT.thing_model, "Turtle")), virtual=virtual)
+    return replace(parse(thing_description(ROBOT.thing_model, "Turtle")), virtual=virtual)
 
 
 def asks(fleet: Fleet) -> bool:
@@ -128,20 +128,20 @@ def asks(fleet: Fleet) -> bool:
 
 
 def test_foreign_robot_that_claims_to_be_virtual_needs_permission(fleet: Fleet) -> None:
-    fleet.join(turtle(), "/Turtle/description", STRANGE)
+    fleet.connect(turtle(), "/Turtle/description", STRANGE)
     link = fleet.link("Turtle")
     assert link is not None
-    assert (link.virtual, link.robot.virtual, link.chip) == (False, False, "ready")
+    assert (link.virtual, link.robot.virtual, link.chip_text) == (False, False, "ready")
     assert asks(fleet)
 
 
 def test_real_robot_that_now_claims_to_be_virtual_needs_permission(fleet: Fleet) -> None:
     mine = Identity("1", "Turtle", HERE, os.getpid())
-    fleet.join(turtle(), "/Turtle/description", mine)
+    fleet.connect(turtle(), "/Turtle/description", mine)
     assert not asks(fleet)
-    fleet.join(turtle(virtual=False), "/Turtle/description", mine)
+    fleet.connect(turtle(virtual=False), "/Turtle/description", mine)
     assert asks(fleet)
-    fleet.join(turtle(virtual=True), "/Turtle/description", mine)
+    fleet.connect(turtle(virtual=True), "/Turtle/description", mine)
     assert asks(fleet)
 
 
@@ -157,38 +157,38 @@ class World:
 
 def test_world_of_a_foreign_robot_is_not_changed_before_permission(fleet: Fleet) -> None:
     """What it calls its world may be a topic that moves something real."""
-    fleet.join(turtle(), "/Turtle/description", STRANGE)
+    fleet.connect(turtle(), "/Turtle/description", STRANGE)
     link, world = fleet.link("Turtle"), World()
     assert link is not None
     link.world = cast("Publisher", world)
-    fleet.world("Turtle", {"touch": "head"})
+    fleet.change_world("Turtle", {"touch": "head"})
     assert fleet.permission.question is not None
     assert world.changes == []
     fleet.permission.answer(let=True)
     assert world.changes == [{"touch": "head"}]
-    fleet.join(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
-    fleet.world("Turtle", {"reset": True})
+    fleet.connect(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
+    fleet.change_world("Turtle", {"reset": True})
     assert len(world.changes) == 2
 
 
 def test_permission_applies_to_this_program_and_permanent_permission_to_its_computer(
     fleet: Fleet, tmp_path: Path
 ) -> None:
-    fleet.join(turtle(virtual=False), "/Turtle/description", STRANGE)
+    fleet.connect(turtle(virtual=False), "/Turtle/description", STRANGE)
     assert asks(fleet)
     fleet.permission.answer(let=True)
     assert not asks(fleet)
-    fleet.join(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # started anew
+    fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="2"))  # started anew
     assert asks(fleet)
     fleet.permission.answer(let=True, always=True)
-    fleet.join(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="3"))
+    fleet.connect(turtle(virtual=False), "/Turtle/description", replace(STRANGE, node_id="3"))
     assert not asks(fleet)
     for other in (replace(STRANGE, host="evil"), replace(STRANGE, node="evil")):
-        fleet.join(turtle(virtual=False), "/Turtle/description", other)
+        fleet.connect(turtle(virtual=False), "/Turtle/description", other)
         assert asks(fleet)
     kept = MotionPermission(Settings(tmp_path), lambda _name: STRANGE)
-    assert kept.allowed(turtle(virtual=False))
-    assert not MotionPermission(Settings(tmp_path)).allowed(turtle(virtual=False))
+    assert kept.is_allowed(turtle(virtual=False))
+    assert not MotionPermission(Settings(tmp_path)).is_allowed(turtle(virtual=False))
 
 
 def test_foreign_virtual_robot_on_the_network_needs_permission(session: Session, master: Master) -> None:
@@ -206,21 +206,21 @@ def test_foreign_virtual_robot_on_the_network_needs_permission(session: Session,
 
 
 def test_only_virtual_robots_return_to_start_position_and_only_on_request(fleet: Fleet) -> None:
-    fleet.join(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
-    stranger = parse(td_for(ROBOT.thing_model, "Other"))
-    fleet.join(stranger, "/Other/description", replace(STRANGE, node_id="3"))
+    fleet.connect(turtle(), "/Turtle/description", Identity("1", "Turtle", HERE, os.getpid()))
+    stranger = parse(thing_description(ROBOT.thing_model, "Other"))
+    fleet.connect(stranger, "/Other/description", replace(STRANGE, node_id="3"))
     worlds = {"Turtle": World(), "Other": World()}
     for name, world in worlds.items():
         link = fleet.link(name)
         assert link is not None
         link.world = cast("Publisher", world)
-    fleet.to_start(["Turtle", "Other", "Nobody"])
+    fleet.return_to_start(["Turtle", "Other", "Nobody"])
     assert worlds["Turtle"].changes == [{"start": ["Turtle"]}]
     assert worlds["Other"].changes == []
     assert fleet.permission.question is None
-    fleet.choose_start(begins=False)
-    fleet.to_start(["Turtle"])
+    fleet.set_resets_at_start(begins=False)
+    fleet.return_to_start(["Turtle"])
     assert len(worlds["Turtle"].changes) == 1
-    fleet.choose_start(begins=True)
-    fleet.to_start(["Turtle"])
+    fleet.set_resets_at_start(begins=True)
+    fleet.return_to_start(["Turtle"])
     assert len(worlds["Turtle"].changes) == 2

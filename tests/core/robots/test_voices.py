@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from app.core.robots.stop.report import StopReport
-from app.core.robots.voices import MAX_S, MAX_WAITING, SOUND, Heard, Notes, RobotVoices, Speaker
+from app.core.robots.voices import MAX_S, MAX_WAITING, SOUND_SETTING, Notes, RobotSound, RobotVoices, Speaker
 from app.core.storage.settings import Settings
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
 from tests.ui.fakes import Session
 
@@ -44,7 +44,7 @@ class Case:
     def __init__(self, *names: str) -> None:
         self.session = Session()
         for name in names:
-            self.session.join(parse(td_for(PEPPER.thing_model, name)))
+            self.session.join(parse(thing_description(PEPPER.thing_model, name)))
         self.speaker = FakeSpeaker()
         speaker: Speaker = self.speaker
         self.session.voices.speaker = speaker
@@ -82,10 +82,10 @@ def test_each_utterance_is_spoken_once_without_a_visible_panel(case) -> None:
 
 def test_robot_state_is_not_watched_when_sound_is_off(case) -> None:
     assert {STATE.format("Pepper"), STATE.format("Ginger")} <= case.session.source.wanted
-    case.session.voices.switch(on=False)
+    case.session.voices.set_on(on=False)
     case.session.tick()
     assert STATE.format("Pepper") not in case.session.source.wanted
-    case.session.voices.switch(on=True)
+    case.session.voices.set_on(on=True)
     case.session.tick()
     assert STATE.format("Pepper") in case.session.source.wanted
 
@@ -99,12 +99,12 @@ def test_two_robots_speak_in_turn_and_caption_names_the_speaker(case) -> None:
     case.speaker.busy = False
     case.session.tick()
     assert case.said == ["A long story", "And I say"]
-    said = case.session.voices.saying
+    said = case.session.voices.current
     assert said is not None
-    assert (said.robot, said.words) == ("Ginger", "And I say")
+    assert (said.robot, said.text) == ("Ginger", "And I say")
     case.speaker.busy = False
     case.session.tick()
-    assert case.session.voices.saying is None
+    assert case.session.voices.current is None
 
 
 def test_queue_of_waiting_utterances_is_bounded_and_drops_are_logged(case) -> None:
@@ -134,7 +134,7 @@ def test_interrupted_utterance_is_silenced_at_once(case, how) -> None:
     case.tell("Pepper", "A long story", 0.2)
     case.tell("Ginger", "Me, too", 0.95)
     if how == "gone":
-        case.session.fleet.link("Pepper").connected = False
+        case.session.fleet.link("Pepper").is_connected = False
         case.session.tick()
     else:
         case.tell("Pepper", None)
@@ -144,9 +144,9 @@ def test_interrupted_utterance_is_silenced_at_once(case, how) -> None:
 def test_stop_silences_all_speech_including_queued(case) -> None:
     case.tell("Pepper", "A long story", 0.2)
     case.tell("Ginger", "Me, too", 0.95)
-    case.session.fleet.told_to_stop(["Pepper", "Ginger"])
+    case.session.fleet.mark_stopping(["Pepper", "Ginger"])
     words = {"Pepper": ("answered", "ok"), "Ginger": ("answered", "ok")}
-    case.session.fleet.stopped(words, StopReport((), 0.0))
+    case.session.fleet.apply_stop(words, StopReport((), 0.0))
     case.tell("Pepper", "A long story", 0.3)  # it says so for one more moment
     assert case.speaker.did[-1] == "stop"
     case.speaker.busy = False
@@ -156,10 +156,10 @@ def test_stop_silences_all_speech_including_queued(case) -> None:
 
 def test_disabling_sound_silences_at_once_and_enabling_waits_for_next_utterance(case) -> None:
     case.tell("Pepper", "A long story", 0.2)
-    case.session.voices.switch(on=False)
+    case.session.voices.set_on(on=False)
     assert case.speaker.did[-1] == "stop"
-    assert case.session.settings.get(SOUND, True) is False
-    case.session.voices.switch(on=True)
+    assert case.session.settings.get(SOUND_SETTING, True) is False
+    case.session.voices.set_on(on=True)
     case.session.tick()
     case.tell("Pepper", "The end")
     assert case.said[-1] == "The end"
@@ -189,19 +189,19 @@ def test_tones_play_alongside_speech_and_end_when_interrupted(case) -> None:
     ],
 )
 def test_invalid_sound_is_silent(wrong) -> None:
-    assert Heard.parse({"sound": wrong, "speech": 3, "spoken": "x", "volume": True}) == Heard()
+    assert RobotSound.parse({"sound": wrong, "speech": 3, "spoken": "x", "volume": True}) == RobotSound()
 
 
 def test_sound_duration_is_limited() -> None:
-    notes = Heard.parse({"sound": {"number": 1, "notes": [[440, 0.9]] * 40}}).notes
+    notes = RobotSound.parse({"sound": {"number": 1, "notes": [[440, 0.9]] * 40}}).notes
     assert sum(seconds for _hz, seconds in notes) <= MAX_S
 
 
 def test_no_speech_without_a_speaker() -> None:
     session = Session()
-    session.join(parse(td_for(PEPPER.thing_model, "Pepper")))
+    session.join(parse(thing_description(PEPPER.thing_model, "Pepper")))
     voices: RobotVoices = session.voices
-    voices.follow()
+    voices.update()
     voices.silence()
     assert STATE.format("Pepper") not in session.source.wanted
     assert isinstance(session.settings, Settings)

@@ -31,37 +31,39 @@ def waiting(seconds: dict[str, object] | None, lines: str = "Hello") -> dict[str
 
 def test_error_of_stopped_program_is_cleared_when_its_block_changes(document: Document) -> None:
     soon = text("soon")
-    document.edited(waiting(soon))
+    document.apply_edit(waiting(soon))
     errors = BlockErrors()
-    errors.begin(RequestedRun(document))
-    errors.put({"w": "“wait” needs a number"}, not_started=False)
-    assert not errors.forget_repaired()
-    document.edited(waiting(soon, "Other"))
-    assert not errors.forget_repaired()
-    document.edited(waiting(number(2), "Other"))
-    assert errors.forget_repaired()
+    errors.start_run(RequestedRun(document))
+    errors.set_errors({"w": "“wait” needs a number"}, not_started=False)
+    assert not errors.discard_fixed()
+    document.apply_edit(waiting(soon, "Other"))
+    assert not errors.discard_fixed()
+    document.apply_edit(waiting(number(2), "Other"))
+    assert errors.discard_fixed()
     assert errors.by_block == {}
 
 
 def test_error_of_deleted_block_is_cleared(document: Document) -> None:
     soon = text("soon")
-    document.edited(waiting(soon))
+    document.apply_edit(waiting(soon))
     errors = BlockErrors()
-    errors.begin(RequestedRun(document))
-    errors.put({"w": "“wait” needs a number"}, not_started=False)
-    document.edited(workspace(started()))
-    assert errors.forget_repaired()
+    errors.start_run(RequestedRun(document))
+    errors.set_errors({"w": "“wait” needs a number"}, not_started=False)
+    document.apply_edit(workspace(started()))
+    assert errors.discard_fixed()
 
 
 def test_error_that_prevented_start_is_cleared_when_blocks_are_fixed(document: Document) -> None:
     wait = block("control_wait_until", "w")
-    document.edited(workspace(started(wait)))
+    document.apply_edit(workspace(started(wait)))
     wanted, errors = RequestedRun(document), BlockErrors()
-    errors.begin(wanted)
-    errors.put(wanted.problems(document.program()), not_started=True)
+    errors.start_run(wanted)
+    errors.set_errors(wanted.problems(document.program()), not_started=True)
     assert list(errors.by_block) == ["w"]
-    document.edited(workspace(started(block("messages_write", VALUE=text("Hello")), wait)))
-    assert not errors.forget_repaired()
-    document.edited(workspace(started(block("control_wait_until", "w", CONDITION=block("values_boolean")))))
-    until(errors.forget_repaired)
+    document.apply_edit(workspace(started(block("messages_write", VALUE=text("Hello")), wait)))
+    assert not errors.discard_fixed()
+    document.apply_edit(
+        workspace(started(block("control_wait_until", "w", CONDITION=block("values_boolean"))))
+    )
+    until(errors.discard_fixed)
     assert errors.by_block == {}

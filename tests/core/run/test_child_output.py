@@ -9,7 +9,15 @@ from collections.abc import Callable, Iterable
 
 import pytest
 
-from app.core.run.child_output import BYTES_PER_S, CHUNK, LINES_PER_S, MAX_LINE_LENGTH, PAUSE_S, Gate, Output
+from app.core.run.child_output import (
+    BYTES_PER_S,
+    CHUNK,
+    LINES_PER_S,
+    MAX_LINE_LENGTH,
+    PAUSE_S,
+    Output,
+    RateLimiter,
+)
 
 LINE = b'{"is": "print", "text": "x"}\n'
 
@@ -99,10 +107,10 @@ def test_reader_below_its_rate_does_not_pause() -> None:
 
 def test_rate_limit_reopens_after_a_second() -> None:
     now = [0.0]
-    gate = Gate(3, lambda: now[0])
+    gate = RateLimiter(3, lambda: now[0])
     assert [gate.passes() for _ in range(5)] == [True, True, True, False, False]
-    assert gate.take_kept_back() == 0  # not while it is shut
+    assert gate.take_rejected_count() == 0  # not while it is shut
     now[0] = 1.1
     assert gate.passes()
-    assert gate.take_kept_back() == 2
-    assert gate.take_kept_back() == 0
+    assert gate.take_rejected_count() == 2
+    assert gate.take_rejected_count() == 0

@@ -7,7 +7,7 @@ from typing import cast
 
 import pytest
 
-from app.core.robots.stop.report import OneStopped, StopDone, StopReport
+from app.core.robots.stop.report import RobotStopped, StopDone, StopReport
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.runner import Runner
 from app.core.run.stop_job import stop_program, stop_robot
@@ -68,8 +68,8 @@ def test_stop_is_unproven_when_stopper_and_runner_raise(monkeypatch: pytest.Monk
     stop(steps, posted.append, 2, "Arm")
     (_, done) = posted
     assert isinstance(done, StopDone)
-    assert (done.number, done.report.silent) == (2, ("Arm",))
-    assert done.report.robots[0].wrong == "Stop was not sent to Arm: OSError: out of order"
+    assert (done.number, done.report.unconfirmed_names) == (2, ("Arm",))
+    assert done.report.robots[0].problem == "Stop was not sent to Arm: OSError: out of order"
 
 
 def test_stop_of_one_robot_is_unproven_when_the_stopper_raises(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,8 +77,8 @@ def test_stop_of_one_robot_is_unproven_when_the_stopper_raises(monkeypatch: pyte
     posted = list[object]()
     stop_robot(posted.append, cast("RobotStopper", Steps()), "Arm", 3)
     (stopped,) = posted
-    assert isinstance(stopped, OneStopped)
-    assert (stopped.report.silent, stopped.mark) == (("Arm",), 3)
+    assert isinstance(stopped, RobotStopped)
+    assert (stopped.report.unconfirmed_names, stopped.mark) == (("Arm",), 3)
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_error_in_stop_message_does_not_leave_run_stopping(
     runs._stop(("Arm",))
     monkeypatch.setattr(f"app.core.run.{place}", failing)
     with pytest.raises(OSError, match="out of order"):
-        runs.on_stop(StopDone(runs._stop_number, StopReport((), 1.0).with_asked(["Arm"])))
+        runs.on_stop(StopDone(runs._stop_number, StopReport((), 1.0).with_unreached(["Arm"])))
     assert (runs._run.state, session.fleet.moved.names) == ("unanswered", ("Arm",))
 
 
@@ -116,14 +116,14 @@ def test_empty_behaviour_shows_run_hint_until_an_edit(session: Session) -> None:
     assert not runs.active
     assert (runs.view().state, runs.view().title) == ("ready", "Nothing to run yet")
     assert "when started" in runs.view().detail
-    session.document.edited({"blocks": {"blocks": [{"type": "events_started", "id": "a"}]}})
+    session.document.apply_edit({"blocks": {"blocks": [{"type": "events_started", "id": "a"}]}})
     until(lambda: title_at_next_tick(session) == "Ready")  # on a busy computer it is compiled beside
 
 
 def test_new_behaviour_clears_run_hint(session: Session) -> None:
     session.runs.step()
     assert session.runs.view().title == "Nothing to run yet"
-    session.document.edited({"blocks": {"blocks": []}})
+    session.document.apply_edit({"blocks": {"blocks": []}})
     session.documents.new()
     until(lambda: title_at_next_tick(session) == "Ready")
 
@@ -131,14 +131,14 @@ def test_new_behaviour_clears_run_hint(session: Session) -> None:
 def test_run_with_a_problem_shows_reason_until_fixed(session: Session) -> None:
     wait = {"type": "control_wait", "id": "wait"}
     hat = {"type": "events_started", "id": "hat", "next": {"block": wait}}
-    session.document.edited({"blocks": {"blocks": [hat]}})
+    session.document.apply_edit({"blocks": {"blocks": [hat]}})
     session.runs.run()
     assert not session.runs.active
     view = session.runs.view()
     assert (view.state, view.title) == ("ready", "Not started")
     assert "needs a number" in view.detail
     assert session.runs.block_errors == {"wait": view.detail}
-    session.document.edited({"blocks": {"blocks": [{"type": "events_started", "id": "hat"}]}})
+    session.document.apply_edit({"blocks": {"blocks": [{"type": "events_started", "id": "hat"}]}})
     until(lambda: title_at_next_tick(session) == "Ready")
 
 
@@ -147,7 +147,7 @@ def test_view_is_cached_per_tick_and_updated_after_actions(session: Session) -> 
     before = runs.view()
     assert runs.view() is before
     runs.set_pace(0.5)
-    assert runs.view().slow
+    assert runs.view().is_slow
     runs.run()
     assert runs.view().title == "Nothing to run yet"
     now = runs.view()

@@ -13,7 +13,7 @@ class Document:
         self.edits = 0
         self.compiled: Program | None = program("a")
 
-    def newest(self) -> Program | None:
+    def newest_program(self) -> Program | None:
         return self.compiled
 
     def edited(self, runnable: str) -> None:
@@ -31,20 +31,20 @@ def test_no_edit_is_reported_before_the_first_run() -> None:
 
 def test_edit_is_reported_until_undone_or_run() -> None:
     edits, document = EditsSinceRun(), Document()
-    edits.ran(document, program("a"))
+    edits.set_program(document, program("a"))
     assert not edits.has_edits()
     document.edited("b")
     assert edits.has_edits()
     document.edited("a")
     assert not edits.has_edits()
     document.edited("b")
-    edits.ran(document, program("b"))
+    edits.set_program(document, program("b"))
     assert not edits.has_edits()
 
 
 def test_edit_state_is_unchanged_during_background_compilation() -> None:
     edits, document = EditsSinceRun(), Document()
-    edits.ran(document, program("a"))
+    edits.set_program(document, program("a"))
     document.compiled = None
     assert not edits.has_edits()
     document.edited("b")
@@ -53,7 +53,7 @@ def test_edit_state_is_unchanged_during_background_compilation() -> None:
 
 def test_connected_robot_is_not_an_edit() -> None:
     edits, document = EditsSinceRun(), Document()
-    edits.ran(document, program("a"))
+    edits.set_program(document, program("a"))
     document.compiled = program("a, and what the robot does")
     assert not edits.has_edits()
     document.edited("a")

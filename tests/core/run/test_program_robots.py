@@ -26,22 +26,22 @@ def test_program_is_informed_of_unreadable_robots_without_repetition() -> None:
     fleet = SimpleNamespace(
         connected=(),
         moved=MovedRobots(),
-        moving=MovingTopics(),
+        moving_topics=MovingTopics(),
         revision=1,
         link=lambda _name: None,
         permission=SimpleNamespace(permits=lambda *_words: True),
     )
     program = Program()
     robots = ProgramRobots(fleet)  # type: ignore[arg-type]
-    robots.begin(program, (), {})  # type: ignore[arg-type]
-    robots.follow()
+    robots.start(program, (), {})  # type: ignore[arg-type]
+    robots.update()
     assert program.told == []
     fleet.moving = MovingTopics([ROVER])
-    robots.follow()
-    robots.follow()
+    robots.update()
+    robots.update()
     fleet.moving = MovingTopics([ROVER])  # another graph, the same robots
-    robots.follow()
+    robots.update()
     assert program.told == [{"/Rover/command": ("Rover",), "robot_action": ("Rover",)}]
-    robots.begin(program, (), {})  # type: ignore[arg-type]
-    robots.follow()
+    robots.start(program, (), {})  # type: ignore[arg-type]
+    robots.update()
     assert len(program.told) == 2  # it was started with the connected robots only

@@ -21,7 +21,7 @@ import pytest
 import nep
 from app import resources
 from app.robots import simulated, turtle
-from app.robots.description.description import td_for
+from app.robots.description.description import thing_description
 from app.robots.driver.driver import Driver
 from app.run import FAILED, INTERRUPTED, MAY_NOT_MOVE, OK, ROBOT_MISSING, UNUSABLE, run_file
 from nep.masters.master import Master
@@ -212,7 +212,7 @@ def test_publishing_on_a_robot_topic_needs_permission(master, tmp_path):
 
 def test_virtual_robot_starts_at_its_start_position_or_keeps_its_current_one(master, tmp_path):
     light = block("robot_diffdrive_do_light", ROBOT="Turtle", COLOUR="#ff0000")
-    described = td_for(turtle.ROBOT.thing_model, "Turtle")
+    described = thing_description(turtle.ROBOT.thing_model, "Turtle")
     content = {"format": "nep-behaviour", "version": 1, "name": "Light", "robots": {"Turtle": described}}
     path = tmp_path / "light.nepb"
     path.write_text(json.dumps(content | {"workspace": workspace(started(light))}))

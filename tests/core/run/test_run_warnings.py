@@ -10,7 +10,7 @@ SAID = "“walk” was replaced by “turn”"
 def test_warning_stays_at_its_block_with_count_until_next_run() -> None:
     log: list[str] = []
     warnings = RunWarnings(log.append)
-    warnings.begin()
+    warnings.reset()
     assert warnings.by_block == {}
     warnings.add("a", SAID, 1)
     assert warnings.by_block == {"a": SAID}
@@ -22,7 +22,7 @@ def test_warning_stays_at_its_block_with_count_until_next_run() -> None:
     assert warnings.by_block == {}
     warnings.add("a", SAID, 13)
     assert warnings.by_block == {"a": f"{SAID} (13 times)"}
-    warnings.begin()
+    warnings.reset()
     assert warnings.by_block == {}
 
 
@@ -30,14 +30,14 @@ def test_repeated_warning_does_not_flood_the_console() -> None:
     log: list[str] = []
     warnings = RunWarnings(log.append)
     for _run in range(2):
-        warnings.begin()
+        warnings.reset()
         for count in range(1, 124):
             warnings.add("a", SAID, count)
         warnings.end()
         warnings.end()
         assert log == [SAID, f"{SAID} (10 times)", f"{SAID} (100 times)", f"{SAID} (123 times)"]
         log.clear()
-    warnings.begin()
+    warnings.reset()
     warnings.add("a", SAID, 1)
     warnings.end()
     assert log == [SAID]

@@ -135,7 +135,7 @@ def test_program_runs_and_ends(runner, heard, master):
     made.start(program(write(text("Hi"))), [], master.address)
     assert made.wait(LONG_S)
     assert [event.kind for event in heard.events if event.kind != "running"] == ["ready", "print", "ended"]
-    assert heard.events[-1].ok
+    assert heard.events[-1].is_ok
     assert heard.until("print").text == "Hi"
     assert made.state == "ended"
     assert {event.run for event in heard.events} == {made.run}
@@ -151,7 +151,7 @@ def test_program_continues_with_the_answer(runner, heard, master):
     made.answer(asked.question, "Ada “x”")
     assert heard.until("ask", question=0)
     assert heard.until("print").text == "Ada “x”"
-    assert heard.until("ended").ok
+    assert heard.until("ended").is_ok
 
 
 def test_question_includes_its_choices(runner, heard, master):
@@ -169,12 +169,12 @@ def test_pause_step_and_resume(runner, heard, master):
     made = runner()
     first, second = write(text("1")) | {"id": "a"}, write(text("2")) | {"id": "b"}
     made.start(program(first, second), [], master.address, paused=True)
-    assert heard.until("paused").says == "write “1” to the console"
+    assert heard.until("paused").description == "write “1” to the console"
     assert made.state == "paused"
     made.step()
     assert heard.until("paused", blocks=("b",))
-    made.go_on()
-    assert heard.until("ended").ok
+    made.resume()
+    assert heard.until("ended").is_ok
 
 
 def test_running_program_can_be_paused(runner, heard, master):
@@ -184,10 +184,10 @@ def test_running_program_can_be_paused(runner, heard, master):
     made.pause()
     assert heard.until("paused").blocks
     assert made.state == "paused"
-    made.go_on()
+    made.resume()
     assert made.state == "running"
     made.stop()
-    assert heard.until("ended").ok
+    assert heard.until("ended").is_ok
 
 
 def test_stop_ends_endless_program_at_once(runner, heard, master):
@@ -221,7 +221,7 @@ def test_stop_interrupts_a_block_that_computes_endlessly(runner, heard, master):
             return made
 
         assert stopping_s(begin) < STOP_WITHIN_S
-    assert heard.until("ended").ok  # it was stopped: that is no failure of its own
+    assert heard.until("ended").is_ok  # it was stopped: that is no failure of its own
 
 
 @pytest.mark.parametrize("command", [HANGS, IGNORES], ids=["hangs", "ignores everything"])
@@ -243,7 +243,7 @@ def test_crashed_child_is_reported(runner, heard):
     made = runner(CRASHES)
     made.start(program(), [], None)
     ended = heard.until("ended")
-    assert not ended.ok
+    assert not ended.is_ok
     assert ended.text == f"The program's process was killed (signal {signal.SIGABRT.value})."
     assert stopping_s(lambda: made) < STOP_WITHIN_S  # there is nothing to wait for
 
@@ -271,7 +271,7 @@ def test_child_ignores_ctrl_c_of_the_terminal(runner, heard, master):
     made.pause()
     assert heard.until("paused").blocks  # it lives
     made.stop()
-    assert heard.until("ended").ok
+    assert heard.until("ended").is_ok
 
 
 def test_invalid_events_are_skipped(runner, heard):
@@ -304,9 +304,9 @@ def test_robot_is_stopped_when_the_window_process_dies(runner, heard, master, pe
     made = runner()
     wanted = compile_behaviour(workspace(started(say("Hi"))), [pepper.described])
     made.start(wanted, [pepper.described.source], master.address)
-    heard.until("running", says="Pepper says “Hi”")
+    heard.until("running", description="Pepper says “Hi”")
     made._commands.put(None)  # what the operating system does with a dead parent's pipe
-    assert heard.until("ended").ok
+    assert heard.until("ended").is_ok
     with pepper.changed:
         assert pepper.changed.wait_for(lambda: bool(pepper.heard("stop")), LONG_S)
 
@@ -316,8 +316,8 @@ def test_error_event_has_block_and_message(runner, heard, master):
     half = block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0))
     made.start(program(write(half)), [], master.address)
     error = heard.until("error")
-    assert (error.blocks, error.text, error.ok) == (("v",), "“÷” can't divide by 0.", False)
-    assert not heard.until("ended").ok
+    assert (error.blocks, error.text, error.is_ok) == (("v",), "“÷” can't divide by 0.", False)
+    assert not heard.until("ended").is_ok
 
 
 def test_frozen_studio_runs_itself_as_child(monkeypatch):
@@ -337,6 +337,6 @@ def test_variable_values_are_received_and_can_be_set(runner, heard, master):
     started_runner = runner()
     started_runner.start(compile_behaviour(saved, []), [], master.address)
     heard.until("variables", values=(VariableValue("n", "number", "3"),))
-    started_runner.put_variable("n", 5)
-    assert heard.until("ended").ok
+    started_runner.set_variable("n", 5)
+    assert heard.until("ended").is_ok
     heard.until("variables", values=(VariableValue("n", "number", "5"),))

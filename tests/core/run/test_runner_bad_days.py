@@ -10,7 +10,7 @@ import time
 import psutil
 import pytest
 
-from app.core.run.child_process import MAX_BYTES
+from app.core.run.child_process import MAX_MEMORY_BYTES
 from app.core.run.runner import EVENTS_PER_S, Runner
 from tests.core.run.test_runner import LONG_S, STOP_WITHIN_S, Heard, heard, program, stopping_s
 
@@ -64,7 +64,7 @@ def printed(heard: Heard) -> list[str]:
 def test_program_over_memory_limit_is_killed_and_reported(started, heard) -> None:
     started(EATS, most_bytes=200_000_000)
     ended = heard.until("ended")
-    assert not ended.ok
+    assert not ended.is_ok
     assert ended.text == "The program used more than 0.2 GB of memory and was stopped."
 
 
@@ -74,7 +74,7 @@ def test_memory_of_child_processes_counts_towards_limit(started, heard) -> None:
 
 
 def test_default_memory_limit_is_one_gigabyte() -> None:
-    assert Runner(lambda _event: None)._most_bytes == MAX_BYTES == 1_000_000_000
+    assert Runner(lambda _event: None)._most_bytes == MAX_MEMORY_BYTES == 1_000_000_000
 
 
 # ---- floods ----------------------------------------------------------------------------------------
@@ -97,7 +97,7 @@ def test_gigabyte_of_output_is_counted_and_stop_works_at_once(started, heard) ->
     began = time.monotonic()
     assert stopping_s(begin) < STOP_WITHIN_S
     seconds = time.monotonic() - began
-    assert heard.until("ended").ok
+    assert heard.until("ended").is_ok
     assert shares[0] < 0.5  # reading the flood leaves the window more than half of a processor
     assert me.memory_info().rss - before < 60_000_000
     (told, *_) = printed(heard)

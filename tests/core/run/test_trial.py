@@ -15,12 +15,12 @@ def began(stack: Stack | None) -> tuple[Trial, str]:
     """A trial whose program runs, and the words of its block."""
     document = Document()
     document.set_connected([robot("Pepper")])
-    document.edited(workspace(started(say("Hi") | {"id": "hi"})))
+    document.apply_edit(workspace(started(say("Hi") | {"id": "hi"})))
     wanted = RequestedRun(document, stack=stack)
     program = wanted.program()
     assert program is not None
     made = Trial()
-    made.begin(wanted)
+    made.prepare(wanted)
     return made, made.start(program, [robot("Pepper")])
 
 
@@ -30,7 +30,7 @@ def test_tried_value_is_shown_with_its_unit() -> None:
     assert trial.value is None
     assert trial.parse_line("84") == "84 %"
     assert trial.value is not None
-    assert (trial.value.block, trial.value.words) == ("bat", "84 %")
+    assert (trial.value.block, trial.value.text) == ("bat", "84 %")
 
 
 def test_empty_line_is_an_unknown_value() -> None:
@@ -41,7 +41,7 @@ def test_empty_line_is_an_unknown_value() -> None:
 def test_next_run_clears_the_tried_value() -> None:
     trial, _words = began(BATTERY)
     trial.parse_line("84")
-    trial.begin(RequestedRun(Document()))
+    trial.prepare(RequestedRun(Document()))
     assert trial.value is None
     assert trial.parse_line("printed") is None
 

@@ -12,7 +12,7 @@ def document(*connected: str) -> Document:
     made = Document()
     made.set_connected([robot("Pepper"), robot("Ada")])
     gap = block("control_wait_until", "gap")
-    made.edited(workspace(started(say("Hi") | {"id": "hi"}, say("Hi", "Ada") | {"id": "ada"}, gap)))
+    made.apply_edit(workspace(started(say("Hi") | {"id": "hi"}, say("Hi", "Ada") | {"id": "ada"}, gap)))
     made.set_connected([robot(name) for name in connected])
     return made
 
@@ -24,7 +24,7 @@ def test_requested_behaviour_runs_completely() -> None:
     assert program is not None
     assert list(wanted.problems(program)) == ["gap"], "robots that are missing are skipped"
     assert wanted.label(program) == ""
-    assert not wanted.gives_value
+    assert not wanted.has_value
 
 
 def test_requested_stack_is_named_by_its_first_block() -> None:
@@ -47,7 +47,7 @@ def test_requested_value_has_its_unit() -> None:
     wanted = RequestedRun(document("Pepper"), stack=Stack("bat", "value", battery))
     program = wanted.program()
     assert program is not None
-    assert wanted.gives_value
+    assert wanted.has_value
     assert wanted.unit(program, [robot("Pepper")]) == "%"
     assert wanted.unit(program, []) == ""
     assert wanted.problems(program) == {}

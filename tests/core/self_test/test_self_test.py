@@ -15,7 +15,7 @@ import pytest
 from app.__main__ import main
 from app.core.self_test.report import Report
 from app.core.self_test.surroundings import UnwritableFolderError, prepare
-from app.core.self_test.test import is_of_windows
+from app.core.self_test.test import is_windows_program
 
 ROOT = Path(__file__).parents[3]
 HANGS = """
@@ -61,14 +61,14 @@ def told(folder: Path) -> dict:
 def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
     path = tmp_path / "report.json"
     report = Report(path, {"web": True})
-    report.begin("window", "the window", 5.0)
+    report.start_step("window", "the window", 5.0)
     half = told(tmp_path)
     assert not half["ok"]
     assert half["why"] == "Studio exited during the self-test; its last step was “window”."
     assert half["steps"][0]["ms"] is None
     report.record_success("it was painted")
     report.mark("first_paint")
-    assert report.end()
+    assert report.finish()
     whole = told(tmp_path)
     assert (whole["ok"], whole["why"], whole["web"], whole["frozen"]) == (True, "", True, False)
     step = whole["steps"][0]
@@ -83,10 +83,10 @@ def test_report_is_valid_at_any_moment(tmp_path: Path) -> None:
 
 def test_first_failure_is_the_reported_reason(tmp_path: Path) -> None:
     report = Report(tmp_path / "report.json", {})
-    report.begin("robot", "the virtual robot", 5.0)
+    report.start_step("robot", "the virtual robot", 5.0)
     report.fail("The robot does not exist.")
     report.fail("The window did not close.")
-    assert not report.end()
+    assert not report.finish()
     whole = told(tmp_path)
     assert (whole["ok"], whole["why"]) == (False, "The robot does not exist.")
     assert (whole["steps"][0]["ok"], whole["steps"][0]["said"]) == (False, "The robot does not exist.")
@@ -96,12 +96,12 @@ def test_unwritable_report_is_a_failure(tmp_path: Path) -> None:
     folder = tmp_path / "gone"
     folder.mkdir()
     report = Report(folder / "report.json", {})
-    report.begin("window", "the window", 5.0)
+    report.start_step("window", "the window", 5.0)
     (folder / "report.json").unlink()
     folder.rmdir()
     folder.write_text("a file is there now", "utf-8")
-    assert not report.end()
-    assert report.why.startswith("The report can't be written (")
+    assert not report.finish()
+    assert report.failure.startswith("The report can't be written (")
 
 
 def test_self_test_has_its_own_home_and_master(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ def test_unwritable_folder_is_reported_without_opening_a_window(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Where there are no alarms pytest-timeout has a thread, for which the end of a process would not wait.
-    monkeypatch.setattr("app.__main__.still_running", lambda within_s: ())
+    monkeypatch.setattr("app.__main__.join_threads", lambda within_s: ())
     (tmp_path / "file").write_text("", "utf-8")
     before = dict(os.environ)
     assert main(["--selftest", str(tmp_path / "file" / "below")]) == 2
@@ -186,11 +186,11 @@ class ItsProgram:
 
 def test_windows_system_processes_are_not_part_of_the_test() -> None:
     for program in (r"C:\Windows\explorer.exe", r"c:\windows\System32\conhost.exe"):
-        assert is_of_windows(ItsProgram(program), r"C:\Windows")
-        assert is_of_windows(ItsProgram("", (program, "/desktop")), r"C:\Windows")
+        assert is_windows_program(ItsProgram(program), r"C:\Windows")
+        assert is_windows_program(ItsProgram("", (program, "/desktop")), r"C:\Windows")
     studio = r"C:\Users\山田 太郎\AppData\Local\Programs\NEP Studio\nep-studio.exe"
     for program in (studio, r"C:\Windows of mine\a.exe"):
-        assert not is_of_windows(ItsProgram(program), r"C:\Windows")
-        assert not is_of_windows(ItsProgram("", (program, r"C:\Windows\a.exe")), r"C:\Windows")
-    assert not is_of_windows(ItsProgram(""), r"C:\Windows")  # it has ended
-    assert not is_of_windows(ItsProgram("/usr/bin/python3"), "")
+        assert not is_windows_program(ItsProgram(program), r"C:\Windows")
+        assert not is_windows_program(ItsProgram("", (program, r"C:\Windows\a.exe")), r"C:\Windows")
+    assert not is_windows_program(ItsProgram(""), r"C:\Windows")  # it has ended
+    assert not is_windows_program(ItsProgram("/usr/bin/python3"), "")

@@ -137,7 +137,7 @@ def test_losses_after_message_with_invalid_time_are_counted() -> None:
     seqs = ((1, ORIGIN), (2, 2**64 - 1), (5, ORIGIN + 10**8), (5 + 4, ORIGIN + 2 * 10**8))
     made = [Message("/a", b'{"x": 2}', "json", "json", stamp_ns=s, seq=n, publisher=1) for n, s in seqs]
     case.feed.add({"/a": Batch(made)})
-    assert (case.curves.lost, case.curves.unread) == (2 + 3, 1)
+    assert (case.curves.lost, case.curves.unread_count) == (2 + 3, 1)
 
 
 def test_value_can_change_its_type() -> None:
@@ -148,7 +148,7 @@ def test_value_can_change_its_type() -> None:
     )
     assert points(x) == [(0.0, 1, False), (0.3, 2, True)]
     assert x.states is not None
-    runs = [(run.begin_s, run.end_s, run.word) for run in x.states.runs(0, 9)]
+    runs = [(run.begin_s, run.end_s, run.value) for run in x.states.runs(0, 9)]
     assert runs == [(0.1, 0.3, "up"), (0.3, 0.4, None), (0.4, 0.4, "true")]
     assert x.is_state
     assert x.last is True
@@ -334,10 +334,10 @@ def test_every_list_element_is_a_separate_curve() -> None:
 def test_misspelled_field_is_reported_with_suggestion() -> None:
     case = Case()
     sped = case.curve("/a.sped")
-    assert case.curves.advice(sped) == ""
+    assert case.curves.no_values_reason(sped) == ""
     case.send("/a", (0.0, {"speed": 1, "pose": {"x": 1}}))
-    assert case.curves.advice(sped) == "/a.sped does not exist. Did you mean /a.speed?"
-    assert "Choose one" in case.curves.advice(case.curve("/a.pose"))
+    assert case.curves.no_values_reason(sped) == "/a.sped does not exist. Did you mean /a.speed?"
+    assert "Choose one" in case.curves.no_values_reason(case.curve("/a.pose"))
     with pytest.raises(CurveError, match="did you mean /a"):
         case.curves.add("/aa.x")
 
@@ -388,7 +388,7 @@ def test_csv_written_in_parts_is_identical(monkeypatch, rows_at_once) -> None:
     case.send("/a", *((n / 10, {"x": n, "word": "up" if n % 4 < 2 else "down"}) for n in range(20)))
     case.send("/b", *((n / 7, {"y": -n}) for n in range(14)))
     whole = "".join(csv_lines(columns_of(made), ORIGIN))
-    monkeypatch.setattr("app.core.series.csv_export.ROWS_AT_ONCE", rows_at_once)
+    monkeypatch.setattr("app.core.series.csv_export.ROWS_PER_CHUNK", rows_at_once)
     parts = list(csv_lines(columns_of(made), ORIGIN))
     assert "".join(parts) == whole
     assert len(whole.splitlines()) == 1 + len({*(n / 10 for n in range(20)), *(n / 7 for n in range(14))})

@@ -10,10 +10,10 @@ from app.core.series.field_path import (
     ALL,
     MISSING,
     FieldPath,
-    completed,
+    complete,
     fields_of,
     kind_of_value,
-    meant_field,
+    nearest_field,
 )
 from app.core.series.formula import ExpressionSource, FieldSource, parse
 from app.errors import CurveError
@@ -139,14 +139,14 @@ def test_number_and_depth_of_suggested_fields_are_limited() -> None:
 
 def test_tab_completes_the_common_prefix() -> None:
     known = ["/odom.pose.x", "/odom.pose.y", "/odometer.km"]
-    assert completed("/o", known) == "/odom"
-    assert completed("/odom.", known) == "/odom.pose."
-    assert completed("/odom.pose.x", known) == "/odom.pose.x"
-    assert completed("/x", known) == "/x"
-    assert completed("/odome", known) == "/odometer."
+    assert complete("/o", known) == "/odom"
+    assert complete("/odom.", known) == "/odom.pose."
+    assert complete("/odom.pose.x", known) == "/odom.pose.x"
+    assert complete("/x", known) == "/x"
+    assert complete("/odome", known) == "/odometer."
 
 
 def test_similar_field_is_suggested() -> None:
-    assert meant_field(FieldPath.parse("pose.y[0]"), MESSAGE) is not None
-    assert meant_field(FieldPath.parse("okk"), MESSAGE) == "ok"
-    assert meant_field(FieldPath.parse("zzzzzz"), json.loads("{}")) is None
+    assert nearest_field(FieldPath.parse("pose.y[0]"), MESSAGE) is not None
+    assert nearest_field(FieldPath.parse("okk"), MESSAGE) == "ok"
+    assert nearest_field(FieldPath.parse("zzzzzz"), json.loads("{}")) is None

@@ -67,8 +67,8 @@ def test_window_functions_can_be_nested() -> None:
     found = parse("mean(derivative(/odom.x) - /odom.v, 2 s)", TOPICS)
     assert isinstance(found, WindowSource)
     assert (found.kind, found.window_s) == ("mean", 2.0)
-    assert isinstance(found.of, ExpressionSource)
-    assert str(found.of.inputs[0]) == "derivative(/odom.x)"
+    assert isinstance(found.source, ExpressionSource)
+    assert str(found.source.inputs[0]) == "derivative(/odom.x)"
     assert str(found) == "mean(derivative(/odom.x) - /odom.v, 2 s)"
     assert str(parse(str(found), TOPICS)) == str(found)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.core.series.samples import MAX_LATENESS_S, RAW_PER_COLUMN, SHIFTS, Figures, Samples
+from app.core.series.samples import MAX_LATENESS_S, RAW_PER_COLUMN, SHIFTS, RangeStats, Samples
 
 Row = tuple[float, float, bool]
 ODD = [math.nan, math.inf, -math.inf, float(2**64 - 1), 1.7e308, -1.7e308, 0.0, -0.0, 5e-324]
@@ -140,11 +140,11 @@ def test_figures_of_a_range_match_its_samples(made, one, other) -> None:
     length = rows[-1][0]
     begin, end = sorted((one * length, other * length))
     inside = [value for time_s, value, _gap in rows if begin <= time_s <= end]
-    found = samples.figures(begin, end)
+    found = samples.stats(begin, end)
     if not inside:
-        assert found == Figures()
+        assert found == RangeStats()
         return
-    assert (found.count, found.least, found.most) == (len(inside), min(inside), max(inside))
+    assert (found.count, found.minimum, found.most) == (len(inside), min(inside), max(inside))
     assert found.mean == pytest.approx(
         math.fsum(inside) / len(inside), rel=1e-9, abs=1e-9 * max(map(abs, inside))
     )
@@ -164,7 +164,7 @@ def test_drawn_line_has_every_peak_and_crosses_no_gap(made, columns, one, other)
         assert drawn.min() <= min(v for _t, v in inside)
         assert drawn.max() >= max(v for _t, v in inside)
         assert set(drawn.tolist()) <= {v for _t, v, _gap in rows}, "nothing is invented"
-    if line.is_whole:
+    if line.is_complete:
         gaps_inside = sum(gap for t, _v, gap in rows if begin < t <= end)
         assert int(np.isnan(line.values).sum()) >= gaps_inside
     else:
@@ -179,7 +179,7 @@ def test_long_gap_is_not_drawn_at_any_zoom_level() -> None:
     samples = Samples()
     samples.extend(times, np.sin(times), gaps)
     line = samples.line(0, 120, 300)
-    assert not line.is_whole
+    assert not line.is_complete
     (broken,) = np.flatnonzero(np.isnan(line.values))
     assert line.times[broken - 1] < 50.5
     assert line.times[broken + 1] > 69.5
@@ -277,8 +277,8 @@ def test_oldest_samples_are_evicted_and_counted_with_correct_figures() -> None:
     assert len(samples) <= 8192
     assert samples.begun + len(samples) == 40_000
     assert samples.values.tolist() == rows[samples.begun :]
-    found = samples.figures(0, 1e9)
-    assert (found.least, found.most) == (min(rows[samples.begun :]), max(rows[samples.begun :]))
+    found = samples.stats(0, 1e9)
+    assert (found.minimum, found.maximum) == (min(rows[samples.begun :]), max(rows[samples.begun :]))
     assert samples.size_bytes < 8192 * 80
 
 
@@ -286,21 +286,21 @@ def test_late_sample_updates_existing_peaks() -> None:
     samples = Samples()
     times = np.arange(5000) / 1000
     samples.extend(times, np.zeros(5000), np.zeros(5000, dtype=bool))
-    assert samples.figures(0, 10).most == 0
+    assert samples.stats(0, 10).maximum == 0
     samples.add(4.2, 99.0)
-    assert samples.figures(0, 10).most == 99.0
-    assert samples.figures(0, 10).count == 5001
-    assert samples.figures(4.3, 10).most == 0
+    assert samples.stats(0, 10).maximum == 99.0
+    assert samples.stats(0, 10).count == 5001
+    assert samples.stats(4.3, 10).maximum == 0
 
 
 def test_overflowing_mean_is_unknown_instead_of_wrong() -> None:
     samples = filled([(float(n), 1.7e308, False) for n in range(1 << SHIFTS[-1])])
-    assert samples.figures(0, 1e9) == Figures(1 << SHIFTS[-1], 1.7e308, 1.7e308, None)
+    assert samples.stats(0, 1e9) == RangeStats(1 << SHIFTS[-1], 1.7e308, 1.7e308, None)
 
 
 def test_step_to_previous_and_next_sample() -> None:
     samples = filled([(1.0, 1, False), (2.0, 2, False), (3.0, 3, True)])
-    assert [samples.beside(2.0, step) for step in (-2, -1, 1, 2)] == [None, 1.0, 3.0, None]
+    assert [samples.time_at_step(2.0, step) for step in (-2, -1, 1, 2)] == [None, 1.0, 3.0, None]
     assert samples.at(0.5) is None
     assert samples.at(1.5) == (1.0, 1.0)
     assert samples.at(2.5) is None, "nothing is known in a gap"

@@ -24,12 +24,12 @@ def test_states_that_change_within_a_step_are_reduced_to_a_single_state() -> Non
     assert len(every) == 8000
     few = list(states.runs(-1, 100, step_s=0.5, without=("false",)))
     assert len(few) <= 20
-    assert {run.word for run in few} == {"true"}
+    assert {run.value for run in few} == {"true"}
     assert all(run in every for run in few)
     assert few[-1].end_s == states.last_s
     assert all(later.begin_s - sooner.begin_s < 0.51 for sooner, later in pairwise(few))
-    assert states.words(0, 0.0005) == {"false"}
-    assert states.words(-1, 100) == {"true", "false"}
+    assert states.values_in(0, 0.0005) == {"false"}
+    assert states.values_in(-1, 100) == {"true", "false"}
 
 
 def test_unknown_states_are_skipped_only_on_request() -> None:
@@ -37,9 +37,9 @@ def test_unknown_states_are_skipped_only_on_request() -> None:
     states.add(1.0, "")
     states.add(2.0, None)
     states.add(3.0, "up")
-    assert [run.word for run in states.runs(0, 9)] == ["", None, "up"]
-    assert [run.word for run in states.runs(0, 9, without=())] == ["", "up"]
-    assert states.words(0, 9) == {"", "up"}
+    assert [run.value for run in states.runs(0, 9)] == ["", None, "up"]
+    assert [run.value for run in states.runs(0, 9, without=())] == ["", "up"]
+    assert states.values_in(0, 9) == {"", "up"}
     assert list(States().runs(0, 9, step_s=1.0)) == []
 
 
@@ -49,6 +49,6 @@ def test_unknown_states_are_skipped_only_on_request() -> None:
 def test_change_count_and_duration_match_the_runs(begin_s: float, end_s: float) -> None:
     states = dense(100)
     runs = list(states.runs(begin_s, end_s))
-    assert states.changes(begin_s, end_s) == max(0, len(runs) - 1)
-    lasted = [min(run.end_s, end_s) - max(run.begin_s, begin_s) for run in runs if run.word == "true"]
-    assert states.lasted_s("true", begin_s, end_s) == pytest.approx(sum(max(0.0, each) for each in lasted))
+    assert states.change_count(begin_s, end_s) == max(0, len(runs) - 1)
+    lasted = [min(run.end_s, end_s) - max(run.begin_s, begin_s) for run in runs if run.value == "true"]
+    assert states.duration_s("true", begin_s, end_s) == pytest.approx(sum(max(0.0, each) for each in lasted))

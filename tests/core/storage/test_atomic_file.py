@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from app.core.documents.file_format import read_file
-from app.core.documents.journal import Journal, left_behind
-from app.core.documents.versions import bring_here, keep_earlier
-from app.core.storage.atomic_file import read_whole, write_atomically
+from app.core.documents.journal import Journal, unsaved_work
+from app.core.documents.versions import move_old_versions, save_version
+from app.core.storage.atomic_file import read_regular_file, write_atomically
 from app.core.storage.settings import Settings
 from app.errors import DocumentError
 from nep.system.replace_file import replace_file
@@ -116,14 +116,14 @@ def test_stale_temporary_files_are_deleted_but_not_those_in_use(tmp_path: Path) 
 def test_regular_file_is_read_completely(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"x" * 1000)
-    assert read_whole(path, 1000) == b"x" * 1000
+    assert read_regular_file(path, 1000) == b"x" * 1000
     if os.name == "posix":  # Windows lets not everybody make links
         (tmp_path / "link").symlink_to(path)
-        assert read_whole(tmp_path / "link", 1000) == b"x" * 1000
+        assert read_regular_file(tmp_path / "link", 1000) == b"x" * 1000
     with pytest.raises(OSError, match=r"the limit is 0 MB"):
-        read_whole(path, 999)
+        read_regular_file(path, 999)
     with pytest.raises(FileNotFoundError):
-        read_whole(tmp_path / "none")
+        read_regular_file(tmp_path / "none")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs pipes and devices that look like files")
@@ -140,11 +140,11 @@ def test_non_regular_file_is_rejected_with_reason(tmp_path: Path, kind: str) -> 
     if kind.startswith("link"):
         path.symlink_to(real if "pipe" in kind else "/dev/zero")
     with pytest.raises(OSError, match=r"a folder, a pipe or a device, not a file"):
-        read_whole(path)
+        read_regular_file(path)
     with pytest.raises(DocumentError, match="can't read "):
         read_file(path)
-    assert keep_earlier(path, tmp_path / "earlier") is None
-    assert left_behind(tmp_path) == []
+    assert save_version(path, tmp_path / "earlier") is None
+    assert unsaved_work(tmp_path) == []
     assert Settings(tmp_path).get("a", 1) == 1
     Settings(tmp_path).set("a", 2)
     assert Settings(tmp_path).get("a", 1) == 2
@@ -182,12 +182,12 @@ def test_user_data_files_are_private_regardless_of_umask(tmp_path: Path) -> None
     Journal(home / "journal").write("x", None, "{}", {})
     document = tmp_path / "mine.nepb"
     document.write_bytes(b"{}")
-    kept = keep_earlier(document, home / "earlier")
+    kept = save_version(document, home / "earlier")
     assert kept is not None
     assert modes(home) == {".": 0o700, "settings.json": 0o600, "journal": 0o700, "earlier": 0o700}
     assert set(modes(home / "journal").values()) == {0o700, 0o600}
     assert modes(home / "earlier") == {".": 0o700, kept.copy.name: 0o600}
-    kept.put_back()
+    kept.restore()
     assert document.stat().st_mode & 0o777 == 0o666  # a behaviour stays as shared as it was
 
 
@@ -215,8 +215,8 @@ def test_permissions_of_files_from_earlier_versions_are_tightened_at_start(tmp_p
     (home / "earlier" / "settings.json").rename(home / "earlier" / "settings.json.nepb")
     (home / "somebody's.sh").write_text("")
     Settings(home)
-    left_behind(home / "journal")
-    bring_here(home / "earlier", home / "earlier")
+    unsaved_work(home / "journal")
+    move_old_versions(home / "earlier", home / "earlier")
     for folder in (home, home / "journal", home / "earlier"):
         found = modes(folder)
         assert found.pop(".") == 0o700

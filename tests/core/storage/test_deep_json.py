@@ -20,8 +20,8 @@ def stack(blocks: int) -> dict[str, object]:
 @pytest.mark.parametrize("blocks", [1, 400, 600, 3000])
 def test_deeply_nested_json_round_trips(blocks: int) -> None:
     text = deep_json.dumps(stack(blocks))
-    assert deep_json.same(deep_json.loads(text), stack(blocks))
-    assert deep_json.same(deep_json.loads(deep_json.dumps(stack(blocks), indent=1)), stack(blocks))
+    assert deep_json.are_equal(deep_json.loads(text), stack(blocks))
+    assert deep_json.are_equal(deep_json.loads(deep_json.dumps(stack(blocks), indent=1)), stack(blocks))
 
 
 def test_invalid_json_raises_value_error_and_excessive_depth_raises_recursion_error() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from app.core.documents.backpack import Backpack
 from app.core.documents.file_format import BehaviourFile, read_file, write_file
-from app.core.documents.journal import left_behind, of_newer
+from app.core.documents.journal import newer_work_names, unsaved_work
 from app.core.storage.settings import FORMAT, Settings
 from app.errors import DocumentError
 from app.ui.shell.docking.workbench import STATE_VERSION
@@ -105,24 +105,24 @@ def test_layout_state_version_is_tied_to_the_settings_format() -> None:
 def test_unsaved_work_of_a_newer_version_is_listed_and_not_modified(tmp_path: Path) -> None:
     before = write(tmp_path / "a.json", {**JOURNAL, "format": 2, "workspace": "in another way"})
     write(tmp_path / "b.json", {**JOURNAL, "name": "Other", "format": 1})
-    assert of_newer(tmp_path) == ["Mine"]
-    assert [each.name for each in left_behind(tmp_path)] == ["Other"]
+    assert newer_work_names(tmp_path) == ["Mine"]
+    assert [each.name for each in unsaved_work(tmp_path)] == ["Other"]
     assert (tmp_path / "a.json").read_bytes() == before
 
 
 def test_unsaved_work_of_an_older_version_is_restored(tmp_path: Path) -> None:
     write(tmp_path / "a.json", JOURNAL)
-    (found,) = left_behind(tmp_path)
+    (found,) = unsaved_work(tmp_path)
     assert (found.name, found.workspace) == ("Mine", {"blocks": 1})
-    assert of_newer(tmp_path) == []
-    assert of_newer(tmp_path / "none") == []
+    assert newer_work_names(tmp_path) == []
+    assert newer_work_names(tmp_path / "none") == []
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"format": 2}', '{"format": 2, "pid": []}'])
 def test_invalid_journal_is_ignored(tmp_path: Path, content: str) -> None:
     (tmp_path / "a.json").write_text(content)
-    assert of_newer(tmp_path) == []
-    assert left_behind(tmp_path) == []
+    assert newer_work_names(tmp_path) == []
+    assert unsaved_work(tmp_path) == []
 
 
 # ---- the backpack
@@ -133,16 +133,16 @@ def test_backpack_of_a_newer_version_is_not_modified(tmp_path: Path) -> None:
     backpack = Backpack(tmp_path)
     backpack.reload_if_changed()
     assert backpack.items == ()
-    assert backpack.take_trouble() == (
+    assert backpack.take_problem() == (
         "the backpack in “backpack.json” belongs to a newer NEP Studio and is unchanged; "
         "blocks you add here are saved separately"
     )
-    backpack.put([{"type": "control_wait"}])
+    backpack.add([{"type": "control_wait"}])
     assert (tmp_path / "backpack.json").read_bytes() == before
     again = Backpack(tmp_path)
     again.reload_if_changed()
     assert [item.block["type"] for item in again.items] == ["control_wait"]
-    assert again.take_trouble() == ""
+    assert again.take_problem() == ""
 
 
 def test_own_backpack_file_in_an_unreadable_newer_format_is_backed_up(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_own_backpack_file_in_an_unreadable_newer_format_is_backed_up(tmp_path: 
         write(tmp_path / name, {"backpack": 2})
     backpack = Backpack(tmp_path)
     backpack.reload_if_changed()
-    assert "damaged" in backpack.take_trouble()
+    assert "damaged" in backpack.take_problem()
     assert json.loads((tmp_path / "backpack.json").read_text()) == {"backpack": 2}
     assert json.loads((tmp_path / "backpack.format-1.damaged.json").read_text()) == {"backpack": 2}
 
@@ -182,6 +182,6 @@ def test_unknown_fields_of_a_behaviour_file_are_preserved_on_save(tmp_path: Path
         },
     )
     found = read_file(path)
-    write_file(path, BehaviourFile("Other", found.workspace, found.robots, found.others))
+    write_file(path, BehaviourFile("Other", found.workspace, found.robots, found.unknown_fields))
     assert json.loads(path.read_text())["later"] == [1]
     assert json.loads(path.read_text())["workspace"] == {"later": {"inside": 1}}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.storage.kept_file import KeptFile, read_kept
+from app.core.storage.kept_file import StoredFile, read_stored
 from nep.errors import NepError
 
 
@@ -24,8 +24,8 @@ def words(data: bytes) -> tuple[list[str], str]:
     return kept, "" if len(kept) == len(data) else "there are figures in it"
 
 
-def read(path: Path, most_bytes: int = 100) -> KeptFile[list[str]]:
-    return read_kept(path, words, NewerError, most_bytes)
+def read(path: Path, most_bytes: int = 100) -> StoredFile[list[str]]:
+    return read_stored(path, words, NewerError, most_bytes)
 
 
 @pytest.fixture
@@ -38,10 +38,10 @@ def beside(path: Path) -> Path:
 
 
 def test_valid_file_is_read_and_missing_file_is_empty(path: Path) -> None:
-    assert read(path) == KeptFile()
-    assert read(path / "below") == KeptFile()
+    assert read(path) == StoredFile()
+    assert read(path / "below") == StoredFile()
     path.write_bytes(b"ab")
-    assert read(path) == KeptFile(["a", "b"])
+    assert read(path) == StoredFile(["a", "b"])
     assert not beside(path).exists()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.core.storage.settings import RECENT_LIMIT, Settings, home, kept_language
+from app.core.storage.settings import RECENT_LIMIT, Settings, home, saved_language
 from app.errors import SettingsError
 
 
@@ -62,17 +62,17 @@ def test_language_is_read_without_modifying_any_file(
 ) -> None:
     if kept is not None:
         (tmp_path / "settings.json").write_bytes(kept)
-    assert kept_language(tmp_path) == language
+    assert saved_language(tmp_path) == language
     assert [each.read_bytes() for each in tmp_path.iterdir()] == ([] if kept is None else [kept])
 
 
 def test_language_from_the_separate_file_overrides_newer_settings(tmp_path: Path) -> None:
     (tmp_path / "settings.json").write_text('{"format": 99, "language": "ja"}', "utf-8")
-    assert kept_language(tmp_path) == "ja"
+    assert saved_language(tmp_path) == "ja"
     Settings(tmp_path).set("language", "fr")
-    assert kept_language(tmp_path) == "fr"
+    assert saved_language(tmp_path) == "fr"
     (tmp_path / "settings.json").write_text('{"language": "es"}', "utf-8")
-    assert kept_language(tmp_path) == "es"
+    assert saved_language(tmp_path) == "es"
 
 
 def test_recent_files_are_newest_first_without_duplicates_or_missing_files(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_recent_file_with_non_utf_8_name_is_saved_with_the_other_settings(
     settings.add_recent(tmp_path / name)
     settings.set("theme", "dark")
     again = Settings(tmp_path / "home")
-    assert [file.path.name for file in again.recent_known] == [name]
+    assert [file.path.name for file in again.all_recent] == [name]
     assert again.get("theme", "light") == "dark"
     assert again.damaged is None
 

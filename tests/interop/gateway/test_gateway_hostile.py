@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from nep.programs.gateway.framing import FrameError, Shape
-from nep.programs.gateway.requests import Request, RequestError, read_request
+from nep.programs.gateway.requests import Request, RequestError, parse_request
 
 pytestmark = [pytest.mark.ports]
 
@@ -47,7 +47,7 @@ quick = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCh
 @settings(max_examples=300, deadline=None)
 def test_request_is_parsed_or_rejected_with_a_message(data, port):
     try:
-        understood = isinstance(read_request(data, port), Request)
+        understood = isinstance(parse_request(data, port), Request)
     except RequestError as error:
         understood = bool(str(error))
     assert understood
@@ -62,7 +62,7 @@ def test_frame_is_parsed_or_rejected_with_a_frame_error(frame, framing, codec):
     except FrameError as error:
         understood = bool(str(error))
     assert understood
-    assert shape.wants(frame) in {True, False}
+    assert shape.matches_filter(frame) in {True, False}
 
 
 @quick

@@ -6,7 +6,7 @@ import orjson
 
 from nep.messages.message import Message
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule, Alarms
-from nep.programs.alarms.alarms import Carrier
+from nep.programs.alarms.alarms import ActionStarter
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, SubscriberInfo, TopicInfo
 
 MIDNIGHT_S = 1_790_000_000.0
@@ -15,7 +15,7 @@ MIDNIGHT_S = 1_790_000_000.0
 class Scene:
     """Alarms whose clock stands still; `now` is monotonic."""
 
-    def __init__(self, *rules: AlarmRule, carriers: dict[str, Carrier] | None = None) -> None:
+    def __init__(self, *rules: AlarmRule, carriers: dict[str, ActionStarter] | None = None) -> None:
         self.now = 100.0
         self.alarms = Alarms(
             rules, carriers=carriers, clock=lambda: self.now, clock_s=lambda: MIDNIGHT_S + self.now
@@ -32,7 +32,7 @@ class Scene:
 
     def happened(self) -> list[tuple[str, object]]:
         """What happened since the last time."""
-        return [(event.kind, event.seen) for event in self.alarms.tick()]
+        return [(event.kind, event.value) for event in self.alarms.tick()]
 
     def send(self, topic: str, *payloads: object) -> list[tuple[str, object]]:
         """A batch of messages arrives."""
@@ -60,7 +60,7 @@ class Scene:
         there = {
             f"id-{name}": NodeInfo(f"id-{name}", name, "here", 1, "python", "native", 0) for name in nodes
         }
-        self.alarms.evaluator.see(GraphView(epoch, self.revision, there, told))
+        self.alarms.evaluator.update_graph(GraphView(epoch, self.revision, there, told))
         return self.happened()
 
     def state(self) -> str:
@@ -76,5 +76,5 @@ def message(topic: str, payload: object) -> Message:
 
 def rule(kind: str, name: str, *does: AlarmAction, id: str = "r", **more: object) -> AlarmRule:
     """A rule; what is not of its condition is its own."""
-    own = {key: more.pop(key) for key in ("calm_s", "is_on", "snoozed_until_s") if key in more}
+    own = {key: more.pop(key) for key in ("calm_s", "is_enabled", "snoozed_until_s") if key in more}
     return AlarmRule(id, AlarmCondition(kind, name, **more), does, **own)  # type: ignore[arg-type]

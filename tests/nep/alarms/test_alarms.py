@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nep.programs.alarms import AlarmAction
-from nep.programs.alarms.alarms import RETRY_S
+from nep.programs.alarms.alarms import RETRY_DELAY_S
 from nep.programs.alarms.history import MAX_RECORDS, AlarmHistory, AlarmRecord
 from tests.nep.alarms.scene import MIDNIGHT_S, Scene, rule
 
@@ -47,9 +47,9 @@ def test_actions_run_once_in_order_and_are_recorded() -> None:
     scene.wait(0.2)
     assert hands.done == [("on", "stop"), ("on", "banner")]
     (record,) = scene.alarms.history
-    assert [deed.kind for deed in record.deeds] == ["stop", "banner", "sound"]
-    assert record.deeds[-1].words == "this action is not available here"  # nobody carries out a sound
-    assert record.words == "r of /d is 0, below 1"
+    assert [deed.kind for deed in record.action_results] == ["stop", "banner", "sound"]
+    assert record.action_results[-1].text == "this action is not available here"  # nobody carries out a sound
+    assert record.cause == "r of /d is 0, below 1"
     assert not scene.alarms.is_busy
 
 
@@ -59,14 +59,14 @@ def test_failed_call_is_retried_while_the_alarm_is_active() -> None:
     scene = scene_with(CALL, hands=hands)
     near(scene)
     scene.wait(0.1)
-    assert 0 < (scene.alarms.retry_in_s("r") or 0) <= RETRY_S
-    scene.wait(RETRY_S + 1)
+    assert 0 < (scene.alarms.retry_in_s("r") or 0) <= RETRY_DELAY_S
+    scene.wait(RETRY_DELAY_S + 1)
     assert len(hands.done) == 2
     hands.well = True
-    scene.wait(RETRY_S + 1)
+    scene.wait(RETRY_DELAY_S + 1)
     assert scene.alarms.retry_in_s("r") is None
-    assert [deed.words for deed in scene.alarms.history.records[-1].deeds] == ["answered"]
-    scene.wait(3 * RETRY_S)
+    assert [deed.text for deed in scene.alarms.history.records[-1].action_results] == ["answered"]
+    scene.wait(3 * RETRY_DELAY_S)
     assert len(hands.done) == 3
 
 
@@ -76,12 +76,12 @@ def test_retry_is_cancelled_when_the_alarm_clears_or_the_rule_is_removed() -> No
     scene = scene_with(CALL, hands=hands)
     near(scene)
     far(scene)
-    scene.wait(RETRY_S + 5)
+    scene.wait(RETRY_DELAY_S + 5)
     assert len(hands.done) == 1
     near(scene)
     scene.wait(1)
     scene.alarms.remove("r")
-    scene.wait(RETRY_S + 5)
+    scene.wait(RETRY_DELAY_S + 5)
     assert len(hands.done) == 2
 
 
@@ -96,7 +96,7 @@ def test_action_that_raises_does_not_block_the_next_one() -> None:
     near(scene)
     scene.wait(0.1)
     assert hands.done == [("on", "banner")]
-    assert [deed.words for deed in scene.alarms.history.records[0].deeds] == ["no arm", "answered"]
+    assert [deed.text for deed in scene.alarms.history.records[0].action_results] == ["no arm", "answered"]
 
 
 def test_snoozed_alarm_runs_no_action_but_is_recorded_in_the_history() -> None:
@@ -129,7 +129,7 @@ def test_history_is_bounded_and_counts_occurrences() -> None:
     for number in range(MAX_RECORDS + 10):
         history.add(AlarmRecord("a" if number % 2 else "b", "x", float(number), is_on=number == 509))
     assert len(history) == MAX_RECORDS
-    assert history.since("a", 500.0) == 5
+    assert history.count_since("a", 500.0) == 5
     last = history.last("a")
     assert last is not None
     assert last.at_s == 509.0

@@ -9,9 +9,9 @@ import threading
 import pytest
 
 from nep.cli.values import json_of
-from nep.programs.alarms.evaluator import LARGE_BYTES
+from nep.programs.alarms.evaluator import LARGE_MESSAGE_BYTES
 from nep.programs.alarms.losses import TopicLosses
-from nep.programs.alarms.sentences import condition_words, seen_words
+from nep.programs.alarms.sentences import condition_text, current_value_text
 from nep.protocol.graph_view import SubscriberInfo, TopicInfo
 from tests.nep.alarms.scene import MIDNIGHT_S, Scene, message, rule
 
@@ -40,7 +40,7 @@ def test_silence_alarm_reports_its_duration_and_clears_on_a_message() -> None:
     scene.send("/cam", 1)
     (record,) = scene.alarms.history
     assert [kind for kind, _seen in scene.wait(1)] == ["off"]
-    assert record.lasted_s == pytest.approx(2.1, abs=0.25)
+    assert record.duration_s == pytest.approx(2.1, abs=0.25)
     assert not record.is_on
 
 
@@ -48,7 +48,7 @@ def test_silence_alarm_covers_a_closed_publisher_and_ignores_a_missing_master() 
     scene = Scene(rule("silent", "/cam", for_s=1.0))
     scene.graph(("/cam",))
     scene.send("/cam", 1)
-    scene.alarms.evaluator.see(None)
+    scene.alarms.evaluator.update_graph(None)
     scene.wait(0.5)
     scene.send("/cam", 1)
     assert scene.wait(0.8) == []
@@ -90,10 +90,10 @@ def test_huge_integer_is_described_in_words(kind: str, huge: int) -> None:
     assert what == "on"
     assert json.loads(json_of(seen)) == (None if abs(huge) > 1e308 else seen)
     (record,) = scene.alarms.history
-    assert record.words
+    assert record.cause
     state = scene.alarms.evaluator.state(scene.alarms.rules[0])
-    assert seen_words(scene.alarms.rules[0].condition, state.seen)
-    assert condition_words(scene.alarms.rules[0].condition)
+    assert current_value_text(scene.alarms.rules[0].condition, state.value)
+    assert condition_text(scene.alarms.rules[0].condition)
 
 
 def test_repeated_nan_is_not_a_change() -> None:
@@ -118,9 +118,9 @@ def test_incomparable_value_triggers_no_alarm_and_is_reported(payload: object) -
     scene.graph(("/d",))
     assert scene.send("/d", payload) == []
     state = scene.alarms.evaluator.state(scene.alarms.rules[0])
-    assert state.trouble in {"missing", "no_number", "unreadable"}
+    assert state.problem in {"missing", "no_number", "unreadable"}
     assert scene.send("/d", {"r": 0.3}) == [("on", 0.3)]
-    assert scene.alarms.evaluator.state(scene.alarms.rules[0]).trouble == ""
+    assert scene.alarms.evaluator.state(scene.alarms.rules[0]).problem == ""
 
 
 def test_condition_must_hold_without_interruption_for_its_duration() -> None:
@@ -145,7 +145,7 @@ def test_flapping_condition_is_one_alarm_with_a_count() -> None:
     assert [kind for kind, _seen in events] == ["on", "off"]
     (record,) = scene.alarms.history
     assert record.count == 3
-    assert record.lasted_s == pytest.approx(2.5, abs=0.2)
+    assert record.duration_s == pytest.approx(2.5, abs=0.2)
 
 
 def test_alarm_stays_active_within_the_hysteresis_margin() -> None:
@@ -176,7 +176,7 @@ def test_leave_alarm_requires_a_known_node_and_a_complete_graph() -> None:
     scene.graph(nodes=(), epoch=2)  # a new master, who does not know it yet
     assert scene.wait(2) == []
     scene.graph(nodes=("lidar",), epoch=2)
-    scene.alarms.evaluator.see(None)
+    scene.alarms.evaluator.update_graph(None)
     assert scene.wait(20) == []
     assert scene.graph(nodes=(), epoch=2) == [("on", None)]
     scene.graph(nodes=("lidar",), epoch=2)
@@ -238,7 +238,7 @@ def test_restarted_subscriber_does_not_count_as_loss() -> None:
 def test_only_one_large_message_per_batch_is_decoded_and_the_others_counted() -> None:
     scene = Scene(rule("above", "/big", path="n", limit=5))
     scene.graph(("/big",))
-    large = [message("/big", {"n": n, "x": "x" * LARGE_BYTES}) for n in (9, 9, 1)]
+    large = [message("/big", {"n": n, "x": "x" * LARGE_MESSAGE_BYTES}) for n in (9, 9, 1)]
     assert scene.send("/big", *large) == []
     assert scene.alarms.evaluator.skipped == 2
     assert scene.send("/big", large[0]) == [("on", 9)]
@@ -253,13 +253,15 @@ def test_unchanged_rules_keep_their_state_and_a_removed_rule_clears_its_alarm() 
     scene.alarms.remove("goes")
     assert [kind for kind, _ in scene.happened()] == ["off"]
     assert scene.state() == "on"
-    scene.alarms.put(rule("below", "/d", path="other", limit=1))
+    scene.alarms.set_rule(rule("below", "/d", path="other", limit=1))
     assert [kind for kind, _ in scene.happened()] == ["off"]
     assert scene.state() == "well"  # it was heard
 
 
 def test_disabled_or_invalid_rule_is_not_watched() -> None:
-    scene = Scene(rule("silent", "/cam", for_s=1.0, is_on=False), rule("silent", "", for_s=1.0, id="new"))
+    scene = Scene(
+        rule("silent", "/cam", for_s=1.0, is_enabled=False), rule("silent", "", for_s=1.0, id="new")
+    )
     scene.graph(("/cam",))
     assert scene.wait(5) == []
     phases = [state.phase for state in scene.alarms.evaluator.states.values()]

@@ -11,15 +11,22 @@ from hypothesis import strategies as st
 
 from nep.errors import NepError
 from nep.programs.alarms import AlarmAction, AlarmFile, AlarmRule
-from nep.programs.alarms.history import AlarmDeed, AlarmHistory, AlarmRecord, record_plain
-from nep.programs.alarms.rule import ACTION_KINDS, KINDS, NEEDS_LIMIT, NODE_KINDS, VALUE_KINDS, problem_of
-from nep.programs.alarms.rule_file import EXAMPLE, alarms_text, read_alarms, read_text
-from nep.programs.alarms.sentences import rule_words
+from nep.programs.alarms.history import ActionResult, AlarmHistory, AlarmRecord, record_to_plain
+from nep.programs.alarms.rule import (
+    ACTION_KINDS,
+    KINDS,
+    KINDS_WITH_LIMIT,
+    NODE_KINDS,
+    VALUE_KINDS,
+    problem_of,
+)
+from nep.programs.alarms.rule_file import EXAMPLE, encode_alarms, parse_alarms, read_alarms
+from nep.programs.alarms.sentences import rule_text
 from tests.nep.alarms.scene import rule
 
 
 def read(text: str, **how: bool) -> AlarmFile:
-    return read_text(text.encode("utf-8", "surrogatepass"), "f.json", **how)
+    return parse_alarms(text.encode("utf-8", "surrogatepass"), "f.json", **how)
 
 
 def of(*alarms: object) -> str:
@@ -36,7 +43,7 @@ def every_rule() -> list[AlarmRule]:
         more: dict[str, object] = {"id": kind, "for_s": 3.0}
         if kind in VALUE_KINDS:
             more["path"] = "a[0].b"
-        if kind in NEEDS_LIMIT:
+        if kind in KINDS_WITH_LIMIT:
             more["limit"] = 5
         made.append(rule(kind, "n" if kind in NODE_KINDS else "/t", *actions, **more))
     return made
@@ -44,12 +51,12 @@ def every_rule() -> list[AlarmRule]:
 
 def test_every_rule_round_trips() -> None:
     rules = every_rule()
-    rules[0] = rule("silent", "/t", for_s=2.0, is_on=False, calm_s=9.0, snoozed_until_s=5.0)
+    rules[0] = rule("silent", "/t", for_s=2.0, is_enabled=False, calm_s=9.0, snoozed_until_s=5.0)
     rules.append(rule("is_not", "/t", path='["a key"]', limit='“quoted” \n"', margin=0.5, id="text"))
     rules.append(rule("equals", "/t", path=".", limit=True, id="yes"))
     assert [problem_of(each) for each in rules] == [None] * len(rules)
-    assert read_text(alarms_text(rules), "f").rules == tuple(rules)
-    assert len({rule_words(each) for each in rules}) == len(rules)
+    assert parse_alarms(encode_alarms(rules), "f").rules == tuple(rules)
+    assert len({rule_text(each) for each in rules}) == len(rules)
 
 
 def test_example_file_is_valid() -> None:
@@ -129,11 +136,11 @@ def test_invalid_alarm_file_is_rejected_also_in_lenient_mode(text: str, said: st
 
 def test_non_utf_8_missing_and_oversized_files_are_rejected(tmp_path) -> None:
     with pytest.raises(NepError, match=r"line 2 of 'f' .*UTF-8"):
-        read_text(b'{\n"\xff": 1}', "f")
+        parse_alarms(b'{\n"\xff": 1}', "f")
     with pytest.raises(NepError, match="cannot be read"):
         read_alarms(tmp_path / "none.json")
     with pytest.raises(NepError, match="larger than"):
-        read_text(b" " * 4_000_001, "f")
+        parse_alarms(b" " * 4_000_001, "f")
 
 
 def test_duplicate_alarm_id_is_rejected() -> None:
@@ -144,12 +151,12 @@ def test_duplicate_alarm_id_is_rejected() -> None:
 
 def test_history_round_trips_and_damaged_records_are_skipped() -> None:
     history = AlarmHistory([AlarmRecord("a", "x is 1", 12.5, 3.0, count=2, was_snoozed=True)])
-    history.records[0].add(AlarmDeed("call", "not responding"))
-    history.records[0].add(AlarmDeed("call", "answered"))
-    again = read_text(alarms_text([], history), "f").history
+    history.records[0].add(ActionResult("call", "not responding"))
+    history.records[0].add(ActionResult("call", "answered"))
+    again = parse_alarms(encode_alarms([], history), "f").history
     assert again is not None
-    assert [record_plain(each) for each in again] == [record_plain(each) for each in history]
-    assert again.records[0].deeds == [AlarmDeed("call", "answered")]
+    assert [record_to_plain(each) for each in again] == [record_to_plain(each) for each in history]
+    assert again.records[0].action_results == [ActionResult("call", "answered")]
     strange = [
         None,
         {},
@@ -159,7 +166,9 @@ def test_history_round_trips_and_damaged_records_are_skipped() -> None:
     ]
     found = read(json.dumps({"alarms": [], "history": strange})).history
     assert found is not None
-    assert [(each.words, each.deeds, each.count, each.lasted_s) for each in found] == [("w", [], 1, None)]
+    assert [(each.cause, each.action_results, each.count, each.duration_s) for each in found] == [
+        ("w", [], 1, None)
+    ]
 
 
 KEYS = st.sampled_from(["when", "do", "topic", "node", "is", "than", "for_s", "value", "on", "id", "call"])
@@ -177,4 +186,4 @@ def test_every_alarm_in_a_file_is_loaded_or_reported(alarms: list[object]) -> No
     text = json.dumps({"alarms": alarms})
     kept = read(text, lenient=True)
     assert len(kept.rules) + len(kept.problems) == len(alarms)
-    assert read_text(alarms_text(kept.rules), "f").rules == kept.rules
+    assert parse_alarms(encode_alarms(kept.rules), "f").rules == kept.rules

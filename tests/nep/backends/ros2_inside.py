@@ -14,9 +14,9 @@ import pytest
 
 import nep
 from nep.backends.ros2 import MessageTypes, message_types
-from nep.backends.ros2.library import dds
-from nep.backends.ros2.names import user_data_of
-from nep.backends.ros2.topics import DdsTopics, sample_of
+from nep.backends.ros2.library import load_dds
+from nep.backends.ros2.names import decode_user_data
+from nep.backends.ros2.topics import DdsTopics, create_sample
 from nep.geometry import Header, Point, Pose, PoseStamped, Time
 from tests.nep.backends.ros2_programs import (  # noqa: F401 - fixtures
     Bytes,
@@ -180,7 +180,7 @@ def test_killed_subscriber_does_not_block_the_publisher(make: Make) -> None:
 def test_unresponsive_subscriber_is_named_and_waited_for_only_until_the_timeout(
     make: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("nep.backends.ros2.publisher.HANDSHAKE_S", 0.2)
+    monkeypatch.setattr("nep.backends.ros2.publisher.HANDSHAKE_TIMEOUT_S", 0.2)
     node = make("a")
     code = "sub = node.new_sub('t')\nsay('ready')\nsay(sub.listen(timeout_s=60)[1])"
     with nep_program(code) as other:
@@ -223,7 +223,7 @@ sys.stdin.read()
 
 def discovered(topic: str) -> tuple[object, object]:
     """A participant of its own, and what it finds of a topic's only writer."""
-    library = dds()
+    library = load_dds()
     participant = library.domain.DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
     reader = library.builtin.BuiltinDataReader(participant, library.builtin.BuiltinTopicDcpsPublication)
     found: list[object] = []
@@ -239,10 +239,10 @@ def discovered(topic: str) -> tuple[object, object]:
 def test_writer_announces_type_and_qos_as_ros_2_expects(make: Make) -> None:
     make("a").new_pub("/chatter", "std_msgs/msg/String", qos="sensor")
     participant, found = discovered("rt/chatter")
-    policies = dds().qos.Policy
+    policies = load_dds().qos.Policy
     assert found.type_name == "std_msgs::msg::dds_::String_"  # type: ignore[attr-defined]
     qos = found.qos  # type: ignore[attr-defined]
-    told = user_data_of(qos[policies.Userdata].data)
+    told = decode_user_data(qos[policies.Userdata].data)
     assert told["typehash"] == "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     assert policies.Reliability.BestEffort in qos
     assert policies.Durability.Volatile in qos
@@ -265,7 +265,7 @@ say([each.name for each in node.graph().nodes.values()])
 def test_discovery_topic_has_the_type_hash_of_ros_2(make: Make) -> None:
     make("a").new_pub("t")
     participant, found = discovered("ros_discovery_info")
-    told = user_data_of(found.qos[dds().qos.Policy.Userdata].data)  # type: ignore[attr-defined]
+    told = decode_user_data(found.qos[load_dds().qos.Policy.Userdata].data)  # type: ignore[attr-defined]
     assert told == {"typehash": "RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e"}
     participant.__del__()  # type: ignore[attr-defined]
 
@@ -275,10 +275,10 @@ def test_ros_discovery_info_lists_nodes_with_their_readers_and_writers(make: Mak
     first, second = make("talker"), make("arm/left/grip per")
     pub, sub = first.new_pub("t", "std_msgs/String"), second.new_sub("t", "std_msgs/String")
     writer, readers = pub._transport._writer.guid.bytes, sub._transport.gids
-    library, types = dds(), message_types()
+    library, types = load_dds(), message_types()
     participant = library.domain.DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
     topics = DdsTopics(library, types, participant)
-    reader = topics.state_reader("ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo")
+    reader = topics.create_state_reader("ros_discovery_info", "rmw_dds_common/msg/ParticipantEntitiesInfo")
     told: list[bytes] = []
 
     def has_come() -> bool:
@@ -472,10 +472,10 @@ def test_forged_match_messages_are_ignored(make: Make, caplog: pytest.LogCapture
     node = make("a")
     pub, sub = node.new_pub("t"), node.new_sub("t")
     own = pub._transport._writer.guid.bytes
-    library, types, kind = dds(), message_types(), "std_msgs/msg/UInt8MultiArray"
+    library, types, kind = load_dds(), message_types(), "std_msgs/msg/UInt8MultiArray"
     participant = library.domain.DomainParticipant(int(os.environ["ROS_DOMAIN_ID"]))
     topics = DdsTopics(library, types, participant)
-    writer, stranger = topics.state_writer("nep_matches", kind), bytes(range(16))
+    writer, stranger = topics.create_state_writer("nep_matches", kind), bytes(range(16))
     matches = node._transport._participant.matches
     eventually(lambda: bool(writer.get_matched_subscriptions()))
     mine = own[:12] + b"1234"
@@ -487,7 +487,7 @@ def test_forged_match_messages_are_ignored(make: Make, caplog: pytest.LogCapture
         bytes(10**6),
         stranger * 2 + own,
     ):
-        writer.write(sample_of(topics.sample_class(kind), types.encode(kind, {"data": data})))
+        writer.write(create_sample(topics.sample_class(kind), types.encode(kind, {"data": data})))
     eventually(lambda: matches.is_confirmed(own, stranger, stranger))
     assert not matches.is_confirmed(own, b"another one" + bytes(5), stranger)
     participant.__del__()

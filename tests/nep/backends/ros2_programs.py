@@ -11,7 +11,7 @@ from itertools import count
 import pytest
 
 import nep
-from nep.backends.ros2.environment import configuration
+from nep.backends.ros2.environment import cyclonedds_config
 from tests.nep.programs import GREETINGS_S, Program, eventually, running
 
 Make = Callable[[str], nep.Node]
@@ -72,7 +72,7 @@ def nep_program(code: str, **environment: str) -> Iterator[Program]:
 
 def killed_soon() -> dict[str, str]:
     """For a program that is to be killed: others see after a second that it is gone, not after ten."""
-    settings = configuration({})
+    settings = cyclonedds_config({})
     assert settings is not None
     return {"CYCLONEDDS_URI": settings.replace("<Discovery>", "<Discovery><LeaseDuration>1s</LeaseDuration>")}
 

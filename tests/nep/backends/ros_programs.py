@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from nep.backends.ros.library import PLACES
+from nep.backends.ros.library import SEARCH_FOLDERS
 from tests.nep.programs import eventually
 
 NEEDED = ("rospy", "rosmaster", "std_msgs", "sensor_msgs", "geometry_msgs")
@@ -23,7 +23,7 @@ NO_ROS = (
     "ROS 1 is missing (Debian: python3-rospy python3-rosmaster python3-sensor-msgs python3-geometry-msgs)"
 )
 HAS_ROS = shutil.which("rosmaster") is not None and any(
-    all((Path(place) / each).is_dir() for each in NEEDED) for place in PLACES
+    all((Path(place) / each).is_dir() for each in NEEDED) for place in SEARCH_FOLDERS
 )
 FIND_ROS = "from nep.backends.ros.library import library; library()\nimport rospy\n"
 """With what a program begins that is one of ROS and none of nep."""

@@ -293,7 +293,7 @@ def test_master_answers_every_request_and_keeps_serving(
             answers = 0
             while True:
                 assert attacker.poll(5000), "the master does not answer any more"
-                number, answer = encoding.decode_answer(attacker.recv())
+                number, answer = encoding.decode_reply(attacker.recv())
                 if number == call:
                     assert isinstance(answer, Done)
                     break
@@ -327,7 +327,7 @@ def ask_with_id(dealer: zmq.Socket[bytes], master: Master, size: int) -> None:
         body = encoding.encode_request(AddSubscriber(said, record), 3)
     dealer.send(body)
     assert dealer.poll(2000)
-    assert isinstance(encoding.decode_answer(dealer.recv())[1], Refused)
+    assert isinstance(encoding.decode_reply(dealer.recv())[1], Refused)
     dealer.send(encoding.encode_request(Ping(), 4))
     assert dealer.poll(2000)
 
@@ -339,7 +339,7 @@ ANSWERS = (
     | VALUES.map(pack)
     | st.builds(
         lambda name, call, what: pack({"is": name, "re": call, "what": what}),
-        st.sampled_from([*encoding._ANSWERS, "fly"]),
+        st.sampled_from([*encoding._REPLIES, "fly"]),
         st.integers(0, 20) | VALUES,
         st.dictionaries(
             st.sampled_from(
@@ -372,7 +372,7 @@ def test_node_survives_invalid_replies_of_a_master(
                 name = encoding._REQUEST_NAMES[type(asked.request)]  # type: ignore[index]
                 answered.append(asked.request)
                 reply = Found(9, 1) if name in {"subscriber+", "join"} else Done(9, 1)
-                router.send_multipart([sender, encoding.encode_answer(reply, asked.call)])
+                router.send_multipart([sender, encoding.encode_reply(reply, asked.call)])
                 if name == until:
                     return sender
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.backends.base import QuickPublish
+from nep.backends.base import PublishHooks
 from nep.backends.zeromq.pending_batch import BATCH_WINDOW_NS, MAX_DELAY_NS, MAX_PENDING, PendingBatch
 from nep.errors import ClosedError, WireError
 from nep.masters.master import Master
@@ -68,7 +68,7 @@ def heard(socket: zmq.Socket[bytes], count: int) -> list[tuple[int, int]]:
         if len(parts) > 1:
             said.append((1, wire.read_header(parts[1]).seq))
             continue
-        _topic, head, body = wire.apart(parts[0])
+        _topic, head, body = wire.split_single_part(parts[0])
         header = wire.read_header(head)
         said.append((len(entries(body)) if header.flags & BATCH else 1, header.seq))
     return said
@@ -235,7 +235,7 @@ def test_reader_keeps_only_max_messages_of_a_batch(node: nep.Node) -> None:
     )  # as if they came in one part
     message = sub.receive(0.0)
     assert message is not None
-    bounded = sub._transport._bounded_locked(sub._transport.ready.popleft())
+    bounded = sub._transport._drop_excess_locked(sub._transport.ready.popleft())
     assert bounded is not None
     assert bytes(bounded.data) == b"\3"
     assert sub.lost == 2
@@ -253,11 +253,11 @@ def test_batching_requires_permission_and_readers_that_support_it() -> None:
     batch = PendingBatch(may_wait=True)
     batch.open_window(1000)
     assert batch.until_ns == 0  # nobody has said that he reads batches
-    batch.allow(reads_batches=True)
+    batch.set_allowed(reads_batches=True)
     batch.open_window(1000)
     assert batch.until_ns == 1000 + BATCH_WINDOW_NS
     never = PendingBatch(may_wait=False)
-    never.allow(reads_batches=True)
+    never.set_allowed(reads_batches=True)
     never.open_window(1000)
     assert (never.is_allowed, never.until_ns) == (False, 0)
 
@@ -294,7 +294,7 @@ def test_clock_set_back_does_not_delay_a_flush() -> None:
 def test_batch_round_trips(messages: list[tuple[int, bytes]], seq: int) -> None:
     stamps, payloads = [each[0] for each in messages], [each[1] for each in messages]
     part = batch_part(b"t\0", wire.form_of(3, 0), seq, 9, stamps, payloads)
-    topic, head, body = wire.apart(part)
+    topic, head, body = wire.split_single_part(part)
     assert (topic, wire.read_header(head)) == (b"t\0", wire.Header(3, BATCH, seq, stamps[0], 9, len(body)))
     read = entries(body)
     assert [each.stamp_ns for each in read] == stamps
@@ -312,7 +312,7 @@ def test_invalid_batch_is_rejected_with_a_reason(body: bytes) -> None:
 
 
 class _HeardWay:
-    is_heard = True
+    has_subscribers = True
     is_closed = False
     problem = ""
 
@@ -326,7 +326,7 @@ class _HeardWay:
 def test_encoded_payload_is_not_encoded_again() -> None:
     encoded: list[object] = []
     passed: list[object] = []
-    asked = QuickPublish(
+    asked = PublishHooks(
         _HeardWay(), None, lambda payload: encoded.append(payload) or b"", None, passed.append
     )
     publish = PendingBatch(may_wait=False).publish_function(asked, _HeardWay(), threading.Lock())

@@ -49,7 +49,7 @@ def test_local_socket_is_used_regardless_of_start_order(node: nep.Node, first: s
     else:
         sub = node.new_sub("t", "string")
         pub = node.new_pub("t", "string")
-    name = bindings.local_name(endpoint(node, "t"))
+    name = bindings.unix_socket_name(endpoint(node, "t"))
     assert ends(sub) == [name]
     pub.publish("first")
     message = sub.receive(30.0)
@@ -71,7 +71,7 @@ def test_environment_variable_disables_local_sockets(node: nep.Node, monkeypatch
     pub = node.new_pub("t", "string")
     sub = node.new_sub("t", "string")
     assert ends(sub) == [endpoint(node, "t")]
-    assert not is_bound(bindings.local_name(endpoint(node, "t")))
+    assert not is_bound(bindings.unix_socket_name(endpoint(node, "t")))
     pub.publish("first")
     assert sub.receive(30.0) is not None
 
@@ -82,7 +82,7 @@ def test_tcp_is_used_where_a_sandbox_forbids_local_sockets(
     def forbidden(_self: socket.socket, _address: object) -> None:
         raise PermissionError
 
-    monkeypatch.setattr(bindings, "_probed", set())
+    monkeypatch.setattr(bindings, "_probe_results", set())
     pub = node.new_pub("t", "string")
     with monkeypatch.context() as sandbox:
         sandbox.setattr(socket.socket, "connect", forbidden)
@@ -105,7 +105,7 @@ def test_local_name_taken_by_another_program_falls_back_to_tcp(
                 holder.listen()
             return f"ipc://@{name}"
 
-        monkeypatch.setattr(bindings, "local_name", take)
+        monkeypatch.setattr(bindings, "unix_socket_name", take)
         pub = node.new_pub("t", "string")
         monkeypatch.undo()
         sub = node.new_sub("t", "string")
@@ -115,6 +115,6 @@ def test_local_name_taken_by_another_program_falls_back_to_tcp(
 
 
 def test_only_loopback_endpoints_have_a_local_name() -> None:
-    assert bindings.local_name("tcp://127.0.0.1:4711") == "ipc://@nep-4711"
-    assert bindings.local_name("tcp://192.168.1.20:4711") == ""
-    assert bindings.local_name("") == ""
+    assert bindings.unix_socket_name("tcp://127.0.0.1:4711") == "ipc://@nep-4711"
+    assert bindings.unix_socket_name("tcp://192.168.1.20:4711") == ""
+    assert bindings.unix_socket_name("") == ""

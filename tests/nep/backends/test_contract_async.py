@@ -13,7 +13,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from nep.nodes.loop_wait import give_way, loop_wait
+from nep.nodes.loop_wait import loop_wait, yield_to_loop
 from tests.nep.meeting import Make
 from tests.nep.programs import eventually, running
 
@@ -40,7 +40,7 @@ def run(task: Coroutine[Any, Any, Any]) -> Any:
 async def armed(sub: nep.Subscriber) -> None:
     """Until the loop's thread waits for this one."""
     while sub._transport not in loop_wait()._wait._armed:
-        await give_way()
+        await yield_to_loop()
 
 
 def waiting_threads() -> int:
@@ -88,7 +88,7 @@ def test_many_subscribers_of_a_loop_share_one_thread(make: Make) -> None:
     async def main() -> list[list[object]]:
         tasks = [asyncio.create_task(read(n)) for n in range(30)]
         for number in range(10):
-            await give_way()
+            await yield_to_loop()
             for pub in pubs:
                 pub.publish(number)
         return list(await asyncio.gather(*tasks))
@@ -122,7 +122,7 @@ def test_cancelled_receive_consumes_no_message(make: Make) -> None:
         for n in range(20):
             task = asyncio.create_task(sub.receive_async())
             for _ in range(n):
-                await give_way()
+                await yield_to_loop()
             task.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await task
@@ -200,7 +200,7 @@ def test_message_flood_does_not_starve_other_coroutines(make: Make) -> None:
     async def other() -> None:
         while True:
             turns.append(len(turns))
-            await give_way()
+            await yield_to_loop()
 
     async def main() -> None:
         for n in range(2000):
@@ -222,7 +222,7 @@ def test_spin_runs_functions_and_coroutine_functions_one_at_a_time(make: Make) -
     async def slow(payload: object) -> None:
         events.append(("begin", payload))
         for _ in range(100):
-            await give_way()
+            await yield_to_loop()
         events.append(("end", payload))
 
     def quick(message: nep.Message) -> None:
@@ -249,7 +249,7 @@ def test_timers_and_other_coroutines_run_during_an_async_spin(make: Make) -> Non
     fired: list[int] = []
 
     async def tick() -> None:
-        await give_way()
+        await yield_to_loop()
         fired.append(len(fired))
         pub.publish(len(fired))
 
@@ -283,7 +283,7 @@ def test_callbacks_added_and_stop_requested_from_other_threads_wake_an_async_spi
 
         spin = asyncio.create_task(node.spin_async())
         for _ in range(100):
-            await give_way()
+            await yield_to_loop()
         assert not spin.done()
         await asyncio.to_thread(node.new_callback, "t", "json", callback)
         pub = await asyncio.to_thread(other.new_pub, "t")
@@ -303,7 +303,7 @@ def test_async_spin_answers_service_calls(master: Master, backend: str) -> None:
 
         async def main() -> None:
             spin = asyncio.create_task(node.spin_async())
-            await give_way()
+            await yield_to_loop()
             await asyncio.to_thread(node.new_server, "double", lambda n: 2 * n)  # type: ignore[operator]
             for n in range(20):
                 assert await client.acall(n) == 2 * n
@@ -321,7 +321,7 @@ def test_exception_in_a_callback_propagates_from_async_spin(make: Make, is_corou
         raise ZeroDivisionError
 
     async def fail_later(_payload: object) -> None:
-        await give_way()
+        await yield_to_loop()
         raise ZeroDivisionError
 
     node.new_callback("example", "json", fail_later if is_coroutine else fail)
@@ -464,7 +464,7 @@ def test_killed_publisher_does_not_disturb_a_waiting_loop(master: Master) -> Non
             async def main() -> None:
                 assert await sub.listen_async(30.0) == (True, 1)
                 waiting = asyncio.create_task(sub.listen_async())
-                await give_way()
+                await yield_to_loop()
                 program.process.kill()
                 await asyncio.to_thread(program.process.wait)
                 with nep.node("c") as other:

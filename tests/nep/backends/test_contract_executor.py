@@ -135,7 +135,7 @@ def test_servers_answer_calls_during_a_spin_of_several_nodes(
     make: Nodes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wait without a wake takes an hour."""
-    monkeypatch.setattr("nep.nodes.executor.SLICE_S", 3600.0)
+    monkeypatch.setattr("nep.nodes.executor.WAIT_SLICE_S", 3600.0)
     nodes = [make("a", "zeromq"), make("b", "memory")]
     thread = threading.Thread(target=nep.spin, args=nodes)
     thread.start()

@@ -11,7 +11,7 @@ import nep
 from nep.backends.zenoh.early import EarlyMessages
 from nep.backends.zeromq.loss import EARLY_MESSAGES_S, PublisherTracker
 from nep.masters.master import Master
-from nep.messages.history import HISTORY_BYTES, History
+from nep.messages.history import MAX_HISTORY_BYTES, History
 from nep.protocol.requests import PublisherRecord, RemotePublisher
 from nep.protocol.wire import Header
 from tests.nep.meeting import Make
@@ -225,7 +225,7 @@ def test_history_evicts_the_oldest_beyond_its_limits() -> None:
     empty: History[int] = History(0)
     empty.add(1, 1)
     assert not empty
-    assert HISTORY_BYTES == 64 * 2**20
+    assert MAX_HISTORY_BYTES == 64 * 2**20
 
 
 def _remote(history: int) -> RemotePublisher:
@@ -255,17 +255,17 @@ def test_early_messages_wait_for_the_history_and_are_bounded() -> None:
     now = [0.0]
     sources = PublisherTracker()
     early: EarlyMessages[bytes] = EarlyMessages(sources, 3, lambda: now[0])
-    assert not early.keep(Header(1, 1, 7, 0, 5), b"7", 2), "nobody has met it"
+    assert not early.queue_if_early(Header(1, 1, 7, 0, 5), b"7", 2), "nobody has met it"
     sources.add_listed(_remote(2))
     for seq in (9, 7, 8):
-        assert early.keep(Header(1, 1, seq, 0, 5), b"%d" % seq, 2)
-    assert not early.keep(Header(1, 1, 10, 0, 5), b"10", 2), "there is room for three"
+        assert early.queue_if_early(Header(1, 1, seq, 0, 5), b"%d" % seq, 2)
+    assert not early.queue_if_early(Header(1, 1, 10, 0, 5), b"10", 2), "there is room for three"
     assert sources.count_message(5, 7, is_alone=True)
     assert early.pop(5) == [b"8", b"9"], "those that the history had are left out"
     assert early.pop(5) == []
     sources.get(5).has_echoed = True
-    assert not early.keep(Header(1, 1, 11, 0, 5), b"11", 2), "it has replied"
+    assert not early.queue_if_early(Header(1, 1, 11, 0, 5), b"11", 2), "it has replied"
     sources.get(5).has_echoed = False
-    assert early.keep(Header(1, 1, 12, 0, 5), b"12", 2)
+    assert early.queue_if_early(Header(1, 1, 12, 0, 5), b"12", 2)
     now[0] = 20.0
-    assert not early.keep(Header(1, 1, 13, 0, 5), b"13", 2)
+    assert not early.queue_if_early(Header(1, 1, 13, 0, 5), b"13", 2)

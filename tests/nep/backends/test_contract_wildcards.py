@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 
 import nep
-from nep.backends.zenoh.keys import data_key, data_keys, hello_key, hellos_keys, topic_of
+from nep.backends.zenoh.keys import data_key, hello_key, pattern_data_key, pattern_hellos_key, topic_of
 from nep.errors import WireError
 from nep.masters.graph import Graph
 from nep.masters.master import Master
@@ -376,9 +376,9 @@ def test_plain_topics_are_not_patterns(topic: str) -> None:
 @pytest.mark.parametrize("topic", ["/robot/a/camera", "/robot", "/a", "camera", "a/b/x/c", "a/x y/b/ü/c"])
 def test_zenoh_key_expressions_cover_every_matching_topic(pattern: str, topic: str) -> None:
     zenoh = pytest.importorskip("zenoh")
-    heard = zenoh.KeyExpr(data_keys(pattern)).intersects(zenoh.KeyExpr(data_key(topic)))
+    heard = zenoh.KeyExpr(pattern_data_key(pattern)).intersects(zenoh.KeyExpr(data_key(topic)))
     assert heard or not matches(pattern, topic)
-    answered = zenoh.KeyExpr(hellos_keys(pattern)).intersects(zenoh.KeyExpr(hello_key(topic, 7)))
+    answered = zenoh.KeyExpr(pattern_hellos_key(pattern)).intersects(zenoh.KeyExpr(hello_key(topic, 7)))
     assert answered is heard
     assert topic_of(data_key(topic)) == topic_of(hello_key(topic, 7)) == topic
 
@@ -416,7 +416,7 @@ def test_registrations_beyond_the_limit_are_rejected() -> None:
     graph = Graph(1, 0.0, learn_s=0.0)
 
     def ask(request: AddSubscriber | AddPublisher, number: int) -> object:
-        return graph.apply(request, 1, 0.0, f"route {number}", is_foreign=True)[-1].answer
+        return graph.apply(request, 1, 0.0, f"route {number}", is_foreign=True)[-1].body
 
     for each in range(1, PATTERNS_MAX + 1):
         assert not isinstance(ask(_pattern(0, each), 0), Refused)

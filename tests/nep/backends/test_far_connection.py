@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 import zmq
 
-from nep.backends.zeromq.sockets import FarConnection, keep_alive
+from nep.backends.zeromq.sockets import RemoteConnection, keep_alive
 from nep.backends.zeromq.subscriptions import Subscriptions
 from nep.protocol.wire import hello_part
 
@@ -35,10 +35,10 @@ def test_connection_is_shut_down_only_if_its_peer_is_unchanged(
 ) -> None:
     near, far = ends
     peer = near.getpeername()
-    FarConnection(near.fileno(), (peer[0], peer[1] + 1)).end()
+    RemoteConnection(near.fileno(), (peer[0], peer[1] + 1)).close()
     near.sendall(b"!")
     assert far.recv(1) == b"!", "its number belongs to another one by now"
-    FarConnection(near.fileno(), peer).end()
+    RemoteConnection(near.fileno(), peer).close()
     assert far.recv(1) == b""
 
 
@@ -49,7 +49,7 @@ def test_descriptor_that_is_no_longer_a_connection_is_ignored(kind: str) -> None
         fd = {"closed": ours, "file": file.fileno(), "pipe": theirs}[kind]
         if kind == "closed":
             os.close(ours)
-        FarConnection(fd, ("10.0.0.1", 5)).end()
+        RemoteConnection(fd, ("10.0.0.1", 5)).close()
     for each in {ours, theirs} - ({ours} if kind == "closed" else set()):
         os.close(each)
 
@@ -57,8 +57,8 @@ def test_descriptor_that_is_no_longer_a_connection_is_ignored(kind: str) -> None
 ENDED: list[int] = []
 
 
-class Connection(FarConnection):
-    def end(self) -> None:
+class Connection(RemoteConnection):
+    def close(self) -> None:
         ENDED.append(self.fd)
 
 
@@ -68,13 +68,15 @@ def test_hello_over_another_connection_closes_the_previous_one() -> None:
     one, two = (Connection(number, ("10.0.0.1", number)) for number in (1, 2))
     hello = hello_part(5, "t", batches=True)
     for connection in (one, one, two):
-        assert subscriptions.note(WANTED + hello, 0, lambda connection=connection: connection) == hello
+        assert (
+            subscriptions.handle_event(WANTED + hello, 0, lambda connection=connection: connection) == hello
+        )
     assert ENDED == [1]
-    subscriptions.note(GONE + hello, 0)
-    subscriptions.note(WANTED + hello, 0, lambda: one)
-    subscriptions.note(WANTED + hello_part(6, "t", batches=True), 0, lambda: two)
+    subscriptions.handle_event(GONE + hello, 0)
+    subscriptions.handle_event(WANTED + hello, 0, lambda: one)
+    subscriptions.handle_event(WANTED + hello_part(6, "t", batches=True), 0, lambda: two)
     assert ENDED == [1], "one that left, and another subscriber's"
-    subscriptions.note(WANTED + hello_part(5, "other", batches=True), 0, lambda: two)
+    subscriptions.handle_event(WANTED + hello_part(5, "other", batches=True), 0, lambda: two)
     assert ENDED == [1], "no hello to this publisher"
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 
 import nep
-from nep.backends.nanomsg.library import library
+from nep.backends.nanomsg.library import load_pynng
 from nep.masters.master import Master
 from tests.nep.programs import eventually
 
@@ -95,7 +95,7 @@ def test_missing_pynng_is_reported_with_the_install_command() -> None:
         raise ImportError
 
     with pytest.raises(nep.NepError, match="'nanomsg' is not installed; install it with 'pip install"):
-        library(missing)  # type: ignore[arg-type]
+        load_pynng(missing)  # type: ignore[arg-type]
 
 
 def test_pynng_is_not_imported_unless_requested() -> None:

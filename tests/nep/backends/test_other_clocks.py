@@ -176,7 +176,7 @@ def test_invalid_clock_data_of_a_master_is_counted_and_ignored(
     clocks: object, times: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(Clocks, "differences", lambda *_args: clocks)
-    monkeypatch.setattr(Clocks, "times", lambda *_args: times)
+    monkeypatch.setattr(Clocks, "renewal_timestamps", lambda *_args: times)
     monkeypatch.setattr(master_session, "RENEW_S", 0.02)
     with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("here", master=master.address) as node:
         sub, pub = node.new_sub("t"), node.new_pub("t")
@@ -225,9 +225,11 @@ def test_publisher_without_computer_id_is_located_by_its_address(
 
 def test_computer_id_does_not_reveal_the_machine_identifier(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(computer_id()) == 16
-    assert computer.clock_name() not in computer_id()
-    monkeypatch.setattr(computer, "_NAME_QUERIES", {})
-    assert computer.clock_name() == ""
+    assert computer.system_identifier() not in computer_id()
+    monkeypatch.setattr(computer, "_IDENTIFIER_QUERIES", {})
+    assert computer.system_identifier() == ""
     assert computer.computer_id.__wrapped__() == ""
-    monkeypatch.setattr(computer, "_NAME_QUERIES", {sys.platform: lambda: (_ for _ in ()).throw(OSError)})
-    assert computer.clock_name() == ""
+    monkeypatch.setattr(
+        computer, "_IDENTIFIER_QUERIES", {sys.platform: lambda: (_ for _ in ()).throw(OSError)}
+    )
+    assert computer.system_identifier() == ""

@@ -18,15 +18,16 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.backends.base import backend_named
-from nep.backends.ros2.environment import configuration, domain, is_loopback_only
-from nep.backends.ros2.library import dds, typesys
+from nep.backends.base import find_backend
+from nep.backends.ros2.environment import cyclonedds_config, is_loopback_only, resolve_domain
+from nep.backends.ros2.library import load_dds, load_typesys
 from nep.backends.ros2.message_types import MessageTypes
-from nep.backends.ros2.mismatches import Party, mismatches
+from nep.backends.ros2.mismatches import NodeEndpoint, mismatches
 from nep.backends.ros2.names import (
     dds_service,
     dds_topic,
     dds_type,
+    decode_user_data,
     is_type_name,
     ros_service,
     ros_topic,
@@ -34,7 +35,6 @@ from nep.backends.ros2.names import (
     service_type_name,
     service_type_of,
     split_node_name,
-    user_data_of,
 )
 from nep.backends.ros2.participant import DdsEndpoint
 from nep.backends.ros2.type_mapping import mapping_for
@@ -137,23 +137,26 @@ def test_topic_and_service_names_round_trip_to_dds_names() -> None:
     assert split_node_name("face tracker") == ("/", "face_tracker")
     assert split_node_name("/a/1b") == ("/a", "_1b")
     assert split_node_name("/") == ("/", "_")
-    assert user_data_of(b"typehash=RIHS01_a;x=;=y;\xff;nepid=1f;") == {"typehash": "RIHS01_a", "nepid": "1f"}
+    assert decode_user_data(b"typehash=RIHS01_a;x=;=y;\xff;nepid=1f;") == {
+        "typehash": "RIHS01_a",
+        "nepid": "1f",
+    }
 
 
 @pytest.mark.parametrize("said", ["-1", "233", "1.0", "9" * 5000, "\u0661", "x"])
 def test_invalid_domains_are_rejected(said: str) -> None:
     with pytest.raises(nep.NepError, match="set it to a number from 0 to 232"):
-        domain(None, {"ROS_DOMAIN_ID": said})
+        resolve_domain(None, {"ROS_DOMAIN_ID": said})
     with pytest.raises(nep.NepError, match=r"ROS 2 domain.* 0 to 232"):
-        domain(said, {})
+        resolve_domain(said, {})
 
 
 def test_domain_of_the_node_overrides_the_environment() -> None:
-    assert domain("7", {"ROS_DOMAIN_ID": "5"}) == domain(" 007 ", {}) == "7"
-    assert domain(None, {"ROS_DOMAIN_ID": "232"}) == "232"
-    assert domain("", {}) == domain(None, {"ROS_DOMAIN_ID": ""}) == "0"
+    assert resolve_domain("7", {"ROS_DOMAIN_ID": "5"}) == resolve_domain(" 007 ", {}) == "7"
+    assert resolve_domain(None, {"ROS_DOMAIN_ID": "232"}) == "232"
+    assert resolve_domain("", {}) == resolve_domain(None, {"ROS_DOMAIN_ID": ""}) == "0"
     with pytest.raises(WrongTypeError, match="a ROS 2 domain must be a 'str' such as '5', not a 'int'"):
-        domain(5, {})  # type: ignore[arg-type]
+        resolve_domain(5, {})  # type: ignore[arg-type]
 
 
 def test_discovery_is_loopback_only_unless_configured() -> None:
@@ -162,20 +165,20 @@ def test_discovery_is_loopback_only_unless_configured() -> None:
     assert is_loopback_only({"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"})
     assert not is_loopback_only({"ROS_AUTOMATIC_DISCOVERY_RANGE": "subnet"})
     assert not is_loopback_only({"ROS_LOCALHOST_ONLY": "0"})
-    assert '"127.0.0.1" multicast' in str(configuration({}))
-    assert "127.0.0.1" not in str(configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}))
-    assert "Peer" not in str(configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}))
+    assert '"127.0.0.1" multicast' in str(cyclonedds_config({}))
+    assert "127.0.0.1" not in str(cyclonedds_config({"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}))
+    assert "Peer" not in str(cyclonedds_config({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}))
     named = {"ROS_STATIC_PEERS": '192.0.2.1; "<;'}
-    peers = str(configuration(named))
+    peers = str(cyclonedds_config(named))
     assert not is_loopback_only(named)
     assert '<Peer Address="192.0.2.1"/>' in peers
     assert "<AllowMulticast>false" in peers
-    assert "Peer" not in str(configuration(named | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}))
-    assert "192.0.2.1" not in str(configuration(named | {"ROS_LOCALHOST_ONLY": "1"}))
+    assert "Peer" not in str(cyclonedds_config(named | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}))
+    assert "192.0.2.1" not in str(cyclonedds_config(named | {"ROS_LOCALHOST_ONLY": "1"}))
     assert '<Peer Address="&quot;&lt;"/>' in peers
-    assert configuration({"CYCLONEDDS_URI": "file:///mine.xml"}) is None
+    assert cyclonedds_config({"CYCLONEDDS_URI": "file:///mine.xml"}) is None
     with pytest.raises(nep.NepError, match=r"DISCOVERY_RANGE .*'EVERYWHERE'.* SUBNET, LOCALHOST or OFF"):
-        configuration({"ROS_AUTOMATIC_DISCOVERY_RANGE": "everywhere"})
+        cyclonedds_config({"ROS_AUTOMATIC_DISCOVERY_RANGE": "everywhere"})
 
 
 # ---- what is missing, and other back ends
@@ -186,7 +189,7 @@ def test_missing_packages_are_reported_with_the_install_command(monkeypatch: pyt
         raise ImportError
 
     monkeypatch.setattr("platform.machine", lambda: "x86_64")
-    for library in (dds, typesys):
+    for library in (load_dds, load_typesys):
         with pytest.raises(nep.NepError, match=r"'ros2' is not installed; install it with 'pip install"):
             library(missing)  # type: ignore[operator]
 
@@ -198,7 +201,7 @@ def test_platform_without_wheels_is_told_what_to_build(monkeypatch: pytest.Monke
     monkeypatch.setattr("platform.machine", lambda: "aarch64")
     monkeypatch.setattr("sys.platform", "linux")
     with pytest.raises(nep.NepError, match=r"Cyclone DDS .*'aarch64'.*'cyclonedds' 11"):
-        dds(missing)  # type: ignore[arg-type]
+        load_dds(missing)  # type: ignore[arg-type]
 
 
 def test_ros2_packages_are_not_imported_unless_requested() -> None:
@@ -208,7 +211,7 @@ def test_ros2_packages_are_not_imported_unless_requested() -> None:
 
 
 def test_back_end_name_is_case_insensitive() -> None:
-    assert backend_named("ROS2") is backend_named("ros2")
+    assert find_backend("ROS2") is find_backend("ros2")
 
 
 # ---- who does not hear whom
@@ -221,12 +224,12 @@ def party(
     is_latched: bool = False,
     is_reliable: bool = True,
     **told: str,
-) -> Party:
+) -> NodeEndpoint:
     gid = f"{node}{kind}{is_latched}{is_reliable}".encode()
-    return Party(node, DdsEndpoint(gid, b"", "rt/t", dds_type(kind), is_latched, is_reliable, told))
+    return NodeEndpoint(node, DdsEndpoint(gid, b"", "rt/t", dds_type(kind), is_latched, is_reliable, told))
 
 
-def alerts(writers: list[Party], readers: list[Party]) -> dict[str, str]:
+def alerts(writers: list[NodeEndpoint], readers: list[NodeEndpoint]) -> dict[str, str]:
     return {each.id: each.sentence for each in mismatches("t", writers, readers)}
 
 

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import nep
-from nep.backends.ros.carried import codec_of, is_ros_type, ros_type_of, to_ros, unpacker
+from nep.backends.ros.carried import codec_of, is_ros_type, ros_type_of, to_ros, unpacker_for
 from nep.backends.ros.definition import parse
 from nep.backends.ros.library import message_text
 from nep.errors import WireError
@@ -198,12 +198,12 @@ def test_message_types_map_to_ros_types(msg_type: str, ros_type: str) -> None:
 
 
 def test_bodies_of_other_messages_are_rejected() -> None:
-    read = unpacker("json", "std_msgs/String", "").unpack
+    read = unpacker_for("json", "std_msgs/String", "").unpack
     assert read(memoryview(to_ros("std_msgs/String", "json", Encoded(b"{}"))))[0] == b"{}"
     for wrong in (b"", b"\1\0\0", b"\5\0\0\0ab", b"\1\0\0\0ab"):
         with pytest.raises((WireError, struct.error)):
             read(memoryview(wrong))
-    read = unpacker("bytes", "std_msgs/UInt8MultiArray", "").unpack
+    read = unpacker_for("bytes", "std_msgs/UInt8MultiArray", "").unpack
     for wrong in (b"\xff\xff\xff\xff", bytes(7), b"\1\0\0\0" + bytes(11)):
         with pytest.raises((WireError, struct.error)):
             read(memoryview(wrong))
@@ -242,9 +242,9 @@ def test_only_message_packages_are_imported(tmp_path: Path, monkeypatch: pytest.
 
 def test_encoded_bytes_match_genpy() -> None:
     skip_without_ros()
-    from nep.backends.ros.library import library
+    from nep.backends.ros.library import get_rospy
 
-    library()
+    get_rospy()
     from geometry_msgs.msg import PoseWithCovarianceStamped
     from sensor_msgs.msg import JointState
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.backends.ros.address import address_of
-from nep.backends.ros.carried import unpacker
-from nep.backends.ros.queue_room import QueueRoom
+from nep.backends.ros.address import ros_master_address
+from nep.backends.ros.carried import unpacker_for
+from nep.backends.ros.queue_room import QueueLimit
 from tests.nep.backends.ros_programs import FIND_ROS, free_port, ros_master, skip_without_ros, told
 from tests.nep.programs import running
 
@@ -279,9 +279,9 @@ def test_own_address_follows_the_ros_environment(ros: str, own: str, said: str) 
 def test_master_address_is_parsed_from_argument_and_environment(
     given: str, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert address_of(given) == address
+    assert ros_master_address(given) == address
     monkeypatch.setenv("ROS_MASTER_URI", given)
-    assert address_of(None) == address
+    assert ros_master_address(None) == address
 
 
 @pytest.mark.parametrize(
@@ -295,9 +295,9 @@ def test_invalid_master_address_is_rejected(given: str, monkeypatch: pytest.Monk
 
 def test_default_master_address_is_this_computer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
-    assert address_of(None) == "127.0.0.1:11311"
+    assert ros_master_address(None) == "127.0.0.1:11311"
     monkeypatch.setenv("ROS_MASTER_URI", "")
-    assert address_of("") == "127.0.0.1:11311"
+    assert ros_master_address("") == "127.0.0.1:11311"
 
 
 class Connection:
@@ -313,22 +313,22 @@ class Connection:
 
 def test_queues_are_trimmed_by_count_and_bytes_per_connection() -> None:
     few, many = Connection(3, [b"a", b"b", b"c"]), Connection(100, [bytes(10)] * 5)
-    assert QueueRoom().make([few, many], 1) == 1
+    assert QueueLimit().make_room([few, many], 1) == 1
     assert (few._queue, len(many._queue)) == ([b"b", b"c"], 5)
-    assert QueueRoom(40).make([many], 39) == 0, "measured after 40 bytes only"
-    room = QueueRoom(40)
-    assert room.make([many], 40) == 5
+    assert QueueLimit(40).make_room([many], 39) == 0, "measured after 40 bytes only"
+    room = QueueLimit(40)
+    assert room.make_room([many], 40) == 5
     many._queue = [bytes(10)] * 5
-    assert [room.make([many], 10) for _ in range(4)] == [0, 0, 0, 2]
-    assert room.make([], 50) == 0
-    assert room.make([object()], 50) == 0
-    assert room.make([Connection(100, [])], 2**40) == 0
+    assert [room.make_room([many], 10) for _ in range(4)] == [0, 0, 0, 2]
+    assert room.make_room([], 50) == 0
+    assert room.make_room([object()], 50) == 0
+    assert room.make_room([Connection(100, [])], 2**40) == 0
 
 
 def test_definition_with_another_checksum_is_rejected() -> None:
-    assert unpacker("json", "std_msgs/String", "", "992ce8a1687cec8c8bd883ec73ca41d1").msg_type == "json"
+    assert unpacker_for("json", "std_msgs/String", "", "992ce8a1687cec8c8bd883ec73ca41d1").msg_type == "json"
     with pytest.raises(nep.NepError, match="its 'sensor_msgs/Image' has other fields"):
-        unpacker("image", "sensor_msgs/Image", "uint8 data", "0" * 32)
+        unpacker_for("image", "sensor_msgs/Image", "uint8 data", "0" * 32)
 
 
 def test_compressed_depth_of_ros_is_decoded() -> None:
@@ -344,7 +344,7 @@ def test_compressed_depth_of_ros_is_decoded() -> None:
         + bytes(12)
         + png
     )
-    found = unpacker("image", "sensor_msgs/CompressedImage", "")
+    found = unpacker_for("image", "sensor_msgs/CompressedImage", "")
     data, extension = found.unpack(memoryview(body))
     assert (found.codec.decode(data, extension or {}) == depth).all()  # type: ignore[attr-defined]
     data, extension = found.unpack(memoryview(body.replace(b"16UC1", b"32FC1")))

@@ -19,7 +19,7 @@ import zmq
 import nep
 from nep.backends.zeromq.publisher import NativePublisher
 from nep.backends.zeromq.shared import memory as shared_memory
-from nep.backends.zeromq.shared.memory import SHARED_BYTES, SharedReader, SharedWriter
+from nep.backends.zeromq.shared.memory import MIN_SHARED_BYTES, SharedReader, SharedWriter
 from nep.masters.master import Master
 from nep.protocol import wire
 from tests.nep.programs import eventually, running
@@ -31,7 +31,7 @@ _ids = itertools.count(1 << 40)
 _MEMORY = "/dev/shm"
 
 pytestmark = pytest.mark.skipif(
-    shared_memory.room_bytes() < 2**29, reason="shared memory needs 512 MB of room in /dev/shm"
+    shared_memory.free_bytes() < 2**29, reason="shared memory needs 512 MB of room in /dev/shm"
 )
 
 LISTENER = """
@@ -101,12 +101,12 @@ def test_large_payload_is_read_from_shared_memory_without_a_copy(node: nep.Node)
     assert sub.lost == 0
 
 
-@pytest.mark.parametrize("size", [0, 1, SHARED_BYTES - 1, SHARED_BYTES, 2**20, 2**20 + 1, 9_000_000])
+@pytest.mark.parametrize("size", [0, 1, MIN_SHARED_BYTES - 1, MIN_SHARED_BYTES, 2**20, 2**20 + 1, 9_000_000])
 def test_every_size_arrives_complete_and_in_order(node: nep.Node, size: int) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(begin(pub)):
         sub.receive(LONG_S)
-    sent = [os.urandom(size), b"small", os.urandom(size), os.urandom(SHARED_BYTES)]
+    sent = [os.urandom(size), b"small", os.urandom(size), os.urandom(MIN_SHARED_BYTES)]
     for each in sent:
         pub.publish(each)
     assert [sub.listen(timeout_s=LONG_S)[1] for _ in sent] == sent
@@ -256,9 +256,9 @@ def test_unpublished_loans_are_released(node: nep.Node) -> None:
     transport = pub._transport
     assert isinstance(transport, NativePublisher)
     kept = [pub.loan((480, 640, 3)) for _ in range(10)]
-    assert transport.lend(480 * 640 * 3) is None  # so many at once are an ordinary array
+    assert transport.borrow_memory(480 * 640 * 3) is None  # so many at once are an ordinary array
     kept.clear()
-    assert transport.lend(480 * 640 * 3) is not None
+    assert transport.borrow_memory(480 * 640 * 3) is not None
 
 
 def test_loan_of_a_closed_publisher_stays_readable_but_cannot_be_published(node: nep.Node) -> None:
@@ -307,7 +307,7 @@ def test_reader_that_keeps_all_messages_gets_copies_and_does_not_exhaust_slots(n
     messages = [each for each in kept if each is not None]
     assert len(messages) == 200
     assert [each.data[-1] for each in messages] == list(range(200))
-    assert sum(map(in_memory, messages)) == shared_memory._HELD_MOST
+    assert sum(map(in_memory, messages)) == shared_memory._MAX_HELD_SLOTS
     kept.clear()
     messages.clear()
     pub.publish(b"\5" * LARGE)
@@ -318,7 +318,7 @@ def test_reader_that_keeps_all_messages_gets_copies_and_does_not_exhaust_slots(n
 
 def test_small_payloads_are_copied_and_hold_no_slots(node: nep.Node) -> None:
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
-    size = shared_memory._COPIED_BYTES
+    size = shared_memory._MAX_COPIED_BYTES
     for _ in range(begin(pub, size=size)):
         sub.receive(LONG_S)
     messages = []
@@ -412,7 +412,7 @@ def test_slots_of_a_killed_reader_are_released() -> None:
         assert count == 20
         program.kill()
     assert writer.loan(9_000_000) is None
-    eventually(lambda: writer.tidy() is None and writer.loan(9_000_000) is not None)
+    eventually(lambda: writer.reclaim_slots() is None and writer.loan(9_000_000) is not None)
     writer.close()
 
 
@@ -455,8 +455,8 @@ def test_exiting_forked_child_does_not_release_memory_of_its_parent(master: Mast
 
 
 def test_missing_library_falls_back_to_the_socket(node: nep.Node, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shared_memory, "_MODULE", "no_such_library")
-    monkeypatch.setattr(shared_memory, "_process", shared_memory._Process())
+    monkeypatch.setattr(shared_memory, "_MODULE_NAME", "no_such_library")
+    monkeypatch.setattr(shared_memory, "_process", shared_memory._ProcessState())
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(3):
         pub.publish(b"\3" * LARGE)
@@ -471,14 +471,14 @@ def test_full_memory_falls_back_to_the_socket(node: nep.Node, monkeypatch: pytes
     sub, pub = node.new_sub("t", "bytes"), node.new_pub("t", "bytes")
     for _ in range(begin(pub)):
         sub.receive(LONG_S)
-    monkeypatch.setattr(shared_memory, "_SPARE_BYTES", 2**62)
+    monkeypatch.setattr(shared_memory, "_RESERVED_BYTES", 2**62)
     monkeypatch.setattr(shared_memory, "_QUERY_INTERVAL_S", 0.0)
     pub.publish(b"\3" * LARGE)
     message = sub.receive(LONG_S)
     assert message is not None
     assert message.payload == b"\3" * LARGE
     assert not in_memory(message)
-    monkeypatch.setattr(shared_memory, "_SPARE_BYTES", 0)
+    monkeypatch.setattr(shared_memory, "_RESERVED_BYTES", 0)
     pub.publish(b"\4" * LARGE)
     message = sub.receive(LONG_S)
     assert message is not None
@@ -489,7 +489,7 @@ def test_invalid_runtime_folder_is_rejected(monkeypatch: pytest.MonkeyPatch, tmp
     (tmp_path / "nep-shared").write_text("a file")
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     with pytest.raises(OSError, match="nep-shared"):
-        shared_memory._own_folder()
+        shared_memory._create_private_folder()
 
 
 @pytest.mark.parametrize("part", [b"", b"\0" * 7, struct.pack("<Q", 2**64 - 1), struct.pack("<Q", 1)])

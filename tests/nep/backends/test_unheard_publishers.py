@@ -37,7 +37,7 @@ KEY = "a publisher behind a closed port"
 def new_publisher(history: int = 0) -> PublisherTracker:
     """Losses of a subscriber that was registered when publisher 5 was created."""
     sources = PublisherTracker()
-    sources.expect_all_of(5)
+    sources.expect_all_messages(5)
     sources.add_listed(RemotePublisher(PublisherRecord(5, "t", "json", "json", history=history), "n", "name"))
     return sources
 
@@ -120,9 +120,9 @@ def test_unregistered_pattern_expects_no_messages_of_a_new_publisher() -> None:
         pattern = PatternSubscriber(new_readable, io, spec, lambda _id: None)
         member = pattern.member("t")
         assert member is not None
-        member.expect_all_of(5)
-        pattern.begin(())
-        member.expect_all_of(6)
+        member.expect_all_messages(5)
+        pattern.connect_listed(())
+        member.expect_all_messages(6)
         assert [each for each, _source in sockets[0].sources.items()] == [6]
         pattern.close()
     io.close()
@@ -133,7 +133,7 @@ def test_existing_publisher_is_counted_from_its_first_received_message() -> None
     sources.expect_up_to(5, 100)
     sources.expect_up_to(5, 100)
     assert sources.count_message(5, 101, is_alone=False)
-    sources.expect_all_of(5)
+    sources.expect_all_messages(5)
     assert (sources.received, sources.lost) == (1, 0)
 
 

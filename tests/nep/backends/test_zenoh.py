@@ -16,9 +16,9 @@ import pytest
 
 import nep
 from nep.backends.zenoh import keys
-from nep.backends.zenoh.library import callback, library
-from nep.backends.zenoh.places import CONFIG_VARIABLE, place_name
-from nep.backends.zenoh.rendezvous import Rendezvous, SessionPort
+from nep.backends.zenoh.library import create_handler, load_zenoh
+from nep.backends.zenoh.places import CONFIG_VARIABLE, validate_address
+from nep.backends.zenoh.rendezvous import Rendezvous, SessionEntry
 from nep.protocol.requests import NodeRecord, PublisherRecord, SubscriberRecord
 from tests.nep.programs import Program, eventually, running
 
@@ -221,9 +221,9 @@ def test_liveliness_tokens_round_trip(word: str) -> None:
     node = NodeRecord("0123456789abcdef", word, word, 4711, word, word, since_ns=5)
     pub = PublisherRecord(2**64 - 1, word, word, word, (keys.data_key(word),), latched=True)
     sub = SubscriberRecord(1, word, word)
-    assert keys.parse_live(keys.node_key(node)) == (node.id, node)
-    assert keys.parse_live(keys.publisher_key("n", pub)) == ("n", pub)
-    assert keys.parse_live(keys.subscriber_key("n", sub)) == ("n", sub)
+    assert keys.parse_token(keys.node_key(node)) == (node.id, node)
+    assert keys.parse_token(keys.publisher_key("n", pub)) == ("n", pub)
+    assert keys.parse_token(keys.subscriber_key("n", sub)) == ("n", sub)
 
 
 @pytest.mark.parametrize(
@@ -243,7 +243,7 @@ def test_liveliness_tokens_round_trip(word: str) -> None:
     ],
 )
 def test_invalid_liveliness_tokens_are_ignored(key: str) -> None:
-    assert keys.parse_live(key) is None
+    assert keys.parse_token(key) is None
 
 
 def test_invalid_puts_and_replies_are_rejected_and_counted(
@@ -253,14 +253,14 @@ def test_invalid_puts_and_replies_are_rejected_and_counted(
     sub = node.new_sub("t")
     with Rendezvous(place.removeprefix("local/")).exclusive():
         others = [each.port for each in Rendezvous(place.removeprefix("local/")).entries()]
-    zenoh = library()
+    zenoh = load_zenoh()
     config = zenoh.Config.from_json5(
         f'{{mode: "peer", listen: {{endpoints: []}}, scouting: {{multicast: {{enabled: false}}}}, '
         f'connect: {{endpoints: ["tcp/127.0.0.1:{others[0]}"]}}}}'
     )
     with zenoh.open(config) as stranger:
         calls = stranger.declare_queryable(
-            "nep/v1/call/evil", callback(lambda query: query.reply("nep/v1/call/evil", b"\xc1nonsense"))
+            "nep/v1/call/evil", create_handler(lambda query: query.reply("nep/v1/call/evil", b"\xc1nonsense"))
         )
         token = stranger.liveliness().declare_token("nep/v1/live/evil/nonsense")
         stranger.put("nep/v1/data/t", b"plain")
@@ -285,11 +285,11 @@ def test_invalid_puts_and_replies_are_rejected_and_counted(
 
 def test_place_is_taken_from_argument_or_configuration_variable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(CONFIG_VARIABLE, raising=False)
-    assert place_name() == place_name("") == "local"
+    assert validate_address() == validate_address("") == "local"
     for given in ("local/lab", "tcp/192.0.2.1:7447", "tls/a.b:1,tcp/c:2", "/etc/zenoh.json5"):
-        assert place_name(given) == given
+        assert validate_address(given) == given
     monkeypatch.setenv(CONFIG_VARIABLE, "tcp/192.0.2.1:7447")
-    assert place_name() == "tcp/192.0.2.1:7447"
+    assert validate_address() == "tcp/192.0.2.1:7447"
     for wrong in (
         "127.0.0.1:7780",
         "192.0.2.1",
@@ -346,12 +346,18 @@ def test_rendezvous_files_of_ended_programs_are_deleted(place: str, tmp_path: Pa
     own = meeting.add(1234)
     with subprocess.Popen([sys.executable, "-c", ""]) as ended:
         pass
-    for name in (f"5-{ended.pid}-0", f"7-{own.pid}-{own.began + 100}", "nonsense", "1-2", f"{2**70}-1-1"):
+    for name in (
+        f"5-{ended.pid}-0",
+        f"7-{own.pid}-{own.start_time + 100}",
+        "nonsense",
+        "1-2",
+        f"{2**70}-1-1",
+    ):
         (meeting._folder / name).touch()
-    assert meeting.entries() == [SessionPort(1234, os.getpid(), own.began)]
+    assert meeting.entries() == [SessionEntry(1234, os.getpid(), own.start_time)]
     left = {path.name for path in meeting._folder.iterdir()}
     assert {"nonsense", own.name} <= left
-    assert not {f"5-{ended.pid}-0", f"7-{own.pid}-{own.began + 100}"} & left
+    assert not {f"5-{ended.pid}-0", f"7-{own.pid}-{own.start_time + 100}"} & left
     meeting.remove(own)
     assert meeting.entries() == []
 
@@ -437,7 +443,7 @@ def test_missing_zenoh_is_reported_with_the_install_command() -> None:
         raise ImportError
 
     with pytest.raises(nep.NepError, match="'zenoh' is not installed; install it with 'pip install"):
-        library(missing)  # type: ignore[arg-type]
+        load_zenoh(missing)  # type: ignore[arg-type]
 
 
 def test_zenoh_is_not_imported_unless_requested() -> None:

@@ -7,18 +7,18 @@ import math
 import pytest
 
 import nep
-from nep.messages.message import Message, kind_of
-from nep.programs.blackboard.ages import beginning_of
+from nep.messages.message import Message, message_kind
+from nep.programs.blackboard.ages import age_start
 from nep.programs.blackboard.keys import key_text
-from nep.programs.blackboard.perception import perception_in
-from nep.programs.blackboard.watch import MessageReading
+from nep.programs.blackboard.perception import parse_perception
+from nep.programs.blackboard.watch import MessageMapping
 
 
-def read(reading: MessageReading, payload: object, topic: str = "/perception/humans") -> dict[str, object]:
+def read(reading: MessageMapping, payload: object, topic: str = "/perception/humans") -> dict[str, object]:
     return {
         key_text(found.key): found.value
         for item in reading.items(payload)
-        for found in reading.findings(topic, item)
+        for found in reading.perceived_values(topic, item)
     }
 
 
@@ -44,7 +44,7 @@ def read(reading: MessageReading, payload: object, topic: str = "/perception/hum
     ],
 )
 def test_rize_perceptions_are_parsed(payload: object, values: object, robot: str) -> None:
-    found = perception_in(payload)
+    found = parse_perception(payload)
     assert found is not None
     assert (found.values, found.robot) == (values, robot)
 
@@ -67,63 +67,63 @@ def test_rize_perceptions_are_parsed(payload: object, values: object, robot: str
     ],
 )
 def test_other_payloads_are_not_perceptions(payload: object) -> None:
-    assert perception_in(payload) is None
+    assert parse_perception(payload) is None
 
 
 def test_perception_is_stored_at_the_root_or_below_a_key() -> None:
     seen = {"primitive": "touched", "input": {"head": 1}, "robot": "Pepper"}
-    assert read(MessageReading(), seen) == {"touched.head": 1}
-    assert read(MessageReading("{robot}"), seen) == {"Pepper.touched.head": 1}
-    assert read(MessageReading(fields=["robot"]), seen) == {"perception.humans.robot": "Pepper"}
-    assert read(MessageReading(), {**seen, "primitive": "a.b"}) == {"a.b.head": 1}
+    assert read(MessageMapping(), seen) == {"touched.head": 1}
+    assert read(MessageMapping("{robot}"), seen) == {"Pepper.touched.head": 1}
+    assert read(MessageMapping(fields=["robot"]), seen) == {"perception.humans.robot": "Pepper"}
+    assert read(MessageMapping(), {**seen, "primitive": "a.b"}) == {"a.b.head": 1}
 
 
 def test_maps_are_stored_below_the_topic_or_the_key() -> None:
     payload = {"1": {"position": [1, 2], "face": {}}, "count": 1}
-    assert read(MessageReading(), payload) == {
+    assert read(MessageMapping(), payload) == {
         "perception.humans.1.position": [1, 2],
         "perception.humans.1.face": {},
         "perception.humans.count": 1,
     }
-    assert read(MessageReading("human"), payload)["human.1.position"] == [1, 2]
-    assert read(MessageReading("human"), [1, 2]) == {"human": [1, 2]}
-    assert read(MessageReading(), 5, "/") == {"topic": 5}
+    assert read(MessageMapping("human"), payload)["human.1.position"] == [1, 2]
+    assert read(MessageMapping("human"), [1, 2]) == {"human": [1, 2]}
+    assert read(MessageMapping(), 5, "/") == {"topic": 5}
 
 
 def test_fields_are_selected_and_renamed() -> None:
     payload = {"pose": {"x": 1, "y": 2}, "name": "Ada", "rest": [0]}
-    assert read(MessageReading("h", ["pose.x", "name", "none"]), payload) == {"h.pose.x": 1, "h.name": "Ada"}
-    assert read(MessageReading("h", {"pose": "at", "name": "is.called"}), payload) == {
+    assert read(MessageMapping("h", ["pose.x", "name", "none"]), payload) == {"h.pose.x": 1, "h.name": "Ada"}
+    assert read(MessageMapping("h", {"pose": "at", "name": "is.called"}), payload) == {
         "h.at.x": 1,
         "h.at.y": 2,
         "h.is.called": "Ada",
     }
-    assert read(MessageReading("h", []), payload) == {}
-    assert read(MessageReading("h", ["x"]), [1]) == {}
+    assert read(MessageMapping("h", []), payload) == {}
+    assert read(MessageMapping("h", ["x"]), [1]) == {}
     with pytest.raises(ValueError, match=r"fields is .*a list"):
-        MessageReading("h", "name")
+        MessageMapping("h", "name")
     with pytest.raises(nep.BadKeyError):
-        MessageReading("h", [""])
+        MessageMapping("h", [""])
     with pytest.raises(nep.BadKeyError):
-        MessageReading("")
+        MessageMapping("")
 
 
 def test_key_placeholders_are_filled_from_message_fields() -> None:
-    reading = MessageReading("human.{id}", ["position"])
+    reading = MessageMapping("human.{id}", ["position"])
     assert read(reading, {"id": 7, "position": 1}) == {"human.7.position": 1}
     assert read(reading, [{"id": "a.b", "position": 1}, {"id": 2, "position": 2}]) == {
         r"human.a\.b.position": 1,
         "human.2.position": 2,
     }
-    assert read(MessageReading("x-{a}-{b}"), {"a": 1, "b": "c"}) == {"x-1-c.a": 1, "x-1-c.b": "c"}
+    assert read(MessageMapping("x-{a}-{b}"), {"a": 1, "b": "c"}) == {"x-1-c.a": 1, "x-1-c.b": "c"}
     listed = {"humans": [{"id": 1, "position": 1}], "stamp": 5}
-    assert read(MessageReading("human.{id}", ["position"], "humans"), listed) == {"human.1.position": 1}
+    assert read(MessageMapping("human.{id}", ["position"], "humans"), listed) == {"human.1.position": 1}
     for wrong in ({"id": None}, {"id": True}, {"id": ""}, {"id": 1.5}, {"id": []}, {}, 5, [5]):
         with pytest.raises(nep.NepError, match="no name or number in the field 'id'"):
             read(reading, wrong)
     for wrong in ({"humans": 5}, {}, None, []):
         with pytest.raises(nep.NepError, match="no list in the field 'humans'"):
-            read(MessageReading("human.{id}", None, "humans"), wrong)
+            read(MessageMapping("human.{id}", None, "humans"), wrong)
 
 
 NOW, WALL_NS = 50.0, 1_800_000_000_000_000_000
@@ -148,8 +148,8 @@ def test_age_counts_from_the_time_stamp_or_the_arrival(
 ) -> None:
     stamp_ns = None if on_the_way_s is None else WALL_NS - int(on_the_way_s * 1e9)
     message = Message("/x", b"1", "json", "json", stamp_ns=stamp_ns)
-    message.kind = kind_of("/x", "json", "json", is_latched=is_latched)
-    since, said = beginning_of(message, NOW, WALL_NS)
+    message.kind = message_kind("/x", "json", "json", is_latched=is_latched)
+    since, said = age_start(message, NOW, WALL_NS)
     assert NOW - since == pytest.approx(age_s)
     assert said == by
 
@@ -164,13 +164,13 @@ class Walls:
         made = Message(
             "/x", payload, "json", "json", stamp_ns=self.wall_ns - int(age_s * 1e9), publisher=publisher
         )
-        made.kind = kind_of("/x", "json", "json", is_latched=True)
+        made.kind = message_kind("/x", "json", "json", is_latched=True)
         return made
 
 
 def kept(board: nep.Blackboard, message: Message, lives_s: float = math.inf) -> None:
-    reading = MessageReading("v")
-    found = tuple(reading.findings(message.topic, message.payload))
+    reading = MessageMapping("v")
+    found = tuple(reading.perceived_values(message.topic, message.payload))
     board._store_message(message, found, lives_s)
 
 

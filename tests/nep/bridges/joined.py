@@ -17,7 +17,7 @@ from nep.programs.bridges import (
     Route,
     RouteCounts,
     TopicEnd,
-    side_of,
+    side_configuration,
 )
 from tests.nep.programs import eventually
 
@@ -58,7 +58,9 @@ def nets(*backends: str) -> Iterator[list[Net]]:
 
 
 def configured(a: Net, b: Net, *topics: BridgeTopic, name: str = "test") -> BridgeConfiguration:
-    return BridgeConfiguration(name, side_of(a.backend, a.master), side_of(b.backend, b.master), topics)
+    return BridgeConfiguration(
+        name, side_configuration(a.backend, a.master), side_configuration(b.backend, b.master), topics
+    )
 
 
 def topic(a: str, b: str = "", direction: str = "both", **more: object) -> BridgeTopic:

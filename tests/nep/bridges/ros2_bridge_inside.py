@@ -7,7 +7,7 @@ import os
 import pytest
 
 import nep
-from nep.programs.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_of
+from nep.programs.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_configuration
 from tests.nep.bridges.joined import nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually, running
 
@@ -48,7 +48,9 @@ def test_bridge_joins_a_ros_2_robot():
             BridgeTopic(TopicEnd("/scan"), TopicEnd("/scan", qos="sensor"), "b->a"),
         )
         with Bridge(
-            BridgeConfiguration("lab", side_of("zeromq", a.master), side_of("ros2"), topics)
+            BridgeConfiguration(
+                "lab", side_configuration("zeromq", a.master), side_configuration("ros2"), topics
+            )
         ) as bridge:
             assert bridge.wait_until_ready(60.0)
             eventually(
@@ -75,7 +77,10 @@ def test_bridge_joins_a_ros_2_robot():
 def test_bidirectional_topic_does_not_echo_and_json_is_sent_as_text():
     with nets("zeromq") as (a,), nep.node("other", "ros2") as other:
         told = BridgeConfiguration(
-            "lab", side_of("zeromq", a.master), side_of("ros2"), (topic("/chat", b_type="json"),)
+            "lab",
+            side_configuration("zeromq", a.master),
+            side_configuration("ros2"),
+            (topic("/chat", b_type="json"),),
         )
         with Bridge(told) as bridge:
             assert bridge.wait_until_ready(60.0)

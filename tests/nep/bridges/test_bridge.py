@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from nep.backends import memory
-from nep.backends.base import backend_named
+from nep.backends.base import find_backend
 from nep.errors import EncodeError, NepError
 from nep.masters.master import Master
 from nep.messages.codecs import Codec, codec_for
 from nep.messages.encoded import Encoded
 from nep.messages.message import MessageKind
-from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
-from nep.programs.bridges.configuration import check_apart
+from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_configuration
+from nep.programs.bridges.configuration import check_different_networks
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import (
     Net,
@@ -138,7 +138,9 @@ def test_type_known_only_to_the_other_back_end_is_taken_from_its_subscribers(twi
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
         waits = robot.new_sub("/cmd_vel", "test_msgs/Twist")
-        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/cmd_vel"),))
+        told = BridgeConfiguration(
+            "t", side_configuration(a.backend, a.master), twist_side, (topic("/cmd_vel"),)
+        )
         with Bridge(told) as bridge:
             assert bridge.wait_until_ready(30.0)
             on_a = a.node("a")
@@ -161,7 +163,9 @@ def test_typed_back_end_is_subscribed_with_the_published_type(twist_side):
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
-        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/speed"),))
+        told = BridgeConfiguration(
+            "t", side_configuration(a.backend, a.master), twist_side, (topic("/speed"),)
+        )
         with Bridge(told) as bridge:
             assert bridge.wait_until_ready(30.0)
             found = route(bridge, "b", "/speed")
@@ -181,7 +185,9 @@ def test_picture_of_a_back_end_specific_type_is_forwarded_as_a_picture(twist_sid
     import nep
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
-        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/camera"),))
+        told = BridgeConfiguration(
+            "t", side_configuration(a.backend, a.master), twist_side, (topic("/camera"),)
+        )
         with Bridge(told) as bridge:
             pub, hears = (
                 robot.new_pub("/camera", "test_msgs/Picture"),
@@ -198,7 +204,9 @@ def test_string_is_not_converted_to_a_map_type(twist_side):
 
     with nets("zeromq") as (a,), nep.node("robot", "ros-like", master="lab") as robot:
         waits = robot.new_sub("/said", "test_msgs/Twist")
-        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (topic("/said"),))
+        told = BridgeConfiguration(
+            "t", side_configuration(a.backend, a.master), twist_side, (topic("/said"),)
+        )
         with Bridge(told) as bridge:
             assert bridge.wait_until_ready(30.0)
             a.node("a").new_pub("/said", "string").publish("hello")
@@ -209,7 +217,9 @@ def test_string_is_not_converted_to_a_map_type(twist_side):
 def test_unknown_target_type_is_reported_once_and_its_messages_wait(twist_side, caplog):
     with nets("zeromq") as (a,):
         wanted = topic("/t", direction="a->b")
-        told = BridgeConfiguration("t", side_of(a.backend, a.master), twist_side, (wanted, topic("/good")))
+        told = BridgeConfiguration(
+            "t", side_configuration(a.backend, a.master), twist_side, (wanted, topic("/good"))
+        )
         with Bridge(told) as bridge:
             assert bridge.wait_until_ready(30.0)
             pub = a.node("a").new_pub("/t", "no_msgs/Type")
@@ -217,18 +227,18 @@ def test_unknown_target_type_is_reported_once_and_its_messages_wait(twist_side, 
             for number in range(5):
                 pub.publish(number)
                 eventually(lambda number=number: found.counts().waiting == number + 1)
-                eventually(lambda: found.trouble == "there is no type 'no_msgs/Type'; install it")
+                eventually(lambda: found.connection_problem == "there is no type 'no_msgs/Type'; install it")
             polls = bridge.sides["b"].poll_count
             eventually(lambda: bridge.sides["b"].poll_count >= polls + 2)
             assert caplog.text.count("install it") == 1
-            assert bridge.status()["routes"][0]["trouble"] == found.trouble
+            assert bridge.status()["routes"][0]["trouble"] == found.connection_problem
 
 
 class Typed(memory.MemoryTransport):
     """Its messages are read by their publisher's codec, whoever else knows it."""
 
-    def publisher(self, spec):
-        made = super().publisher(spec)
+    def create_publisher(self, spec):
+        made = super().create_publisher(spec)
         made._kind = MessageKind(
             spec.topic, spec.codec.name, spec.msg_type, spec.is_latched, spec.codec.decode
         )
@@ -259,8 +269,8 @@ def twist_side(monkeypatch):
         open=Typed,
         codec_for=chosen,
     )
-    named = {"ros-like": backend, "zeromq": backend_named("zeromq")}
-    monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: named[name])
+    named = {"ros-like": backend, "zeromq": find_backend("zeromq")}
+    monkeypatch.setattr("nep.nodes.node.find_backend", lambda name: named[name])
     return SideConfiguration(backend, "lab", "ros-like:lab")
 
 
@@ -430,7 +440,7 @@ def test_explicitly_named_topic_is_not_matched_by_a_pattern():
 
 
 def test_pattern_route_closes_when_idle_and_reopens(monkeypatch):
-    monkeypatch.setattr("nep.programs.bridges.bridge.IDLE_S", 0.0)
+    monkeypatch.setattr("nep.programs.bridges.bridge.IDLE_TIMEOUT_S", 0.0)
     with nets("memory", "zeromq") as (a, b), bridged(a, b, topic("/r/*", "/s/*"), topic("/named")) as bridge:
         on_a, on_b = a.node("a"), b.node("b")
         hears = on_b.new_sub("/s/x")
@@ -524,10 +534,10 @@ def test_failed_route_does_not_stop_the_others(caplog):
         bridge = Bridge(configured(a, b, topic("/good")))
         try:
             bridge.sides["a"].node = Bad(bridge.sides["a"].node)
-            bridge._add(topic("/bad"), "a", "/bad", "/bad")
-            bridge._add(topic("/late"), "a", "/late", "/late")
+            bridge._add_route(topic("/bad"), "a", "/bad", "/bad")
+            bridge._add_route(topic("/late"), "a", "/late", "/late")
             eventually(lambda: route(bridge, "a", "/late").is_subscribed)
-            eventually(lambda: route(bridge, "a", "/bad").trouble == "RuntimeError: no such type")
+            eventually(lambda: route(bridge, "a", "/bad").connection_problem == "RuntimeError: no such type")
             assert "'/bad' on side a is not forwarded to '/bad' yet: RuntimeError" in caplog.text
             sub = b.node("b").new_sub("/good")
             a.node("a").new_pub("/good").publish(1)
@@ -594,6 +604,8 @@ def test_close_while_waiting_for_a_network_returns_soon():
 
 def test_unknown_back_end_or_identical_sides_are_rejected():
     with pytest.raises(NepError, match="unknown back end 'zeromk'; did you mean 'zeromq'"):
-        side_of("zeromk")
+        side_configuration("zeromk")
     with nets("memory") as (a,), pytest.raises(NepError, match="both sides are the network"):
-        check_apart(side_of(a.backend, a.master), side_of(a.backend, a.master))
+        check_different_networks(
+            side_configuration(a.backend, a.master), side_configuration(a.backend, a.master)
+        )

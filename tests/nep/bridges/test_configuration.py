@@ -12,15 +12,21 @@ from hypothesis import strategies as st
 
 from nep.backends import memory
 from nep.errors import NepError
-from nep.programs.bridges import BridgeConfiguration, TopicEnd, join_line, read_configuration, side_of
-from nep.programs.bridges.toml_file import EXAMPLE, read_text
+from nep.programs.bridges import (
+    BridgeConfiguration,
+    TopicEnd,
+    configuration_from_arguments,
+    read_configuration,
+    side_configuration,
+)
+from nep.programs.bridges.toml_file import EXAMPLE, parse_configuration
 
 SIDES = '[a]\nbackend = "zeromq"\n[b]\nbackend = "zenoh"\n'
 ONE = '[[topics]]\na = "/t"\n'
 
 
 def read(text):
-    return read_text(text, "lab.toml", "lab")
+    return parse_configuration(text, "lab.toml", "lab")
 
 
 def error(text):
@@ -132,7 +138,7 @@ def test_qos_values_of_the_back_end_are_accepted(monkeypatch):
     from dataclasses import replace
 
     told = replace(memory.BACKEND, qos=("reliable", "sensor"))
-    monkeypatch.setattr("nep.programs.bridges.configuration.backend_named", lambda _name: told)
+    monkeypatch.setattr("nep.programs.bridges.configuration.find_backend", lambda _name: told)
     sides = SIDES.replace('"zenoh"\n', '"zenoh"\nmaster = "other"\n')
     assert read(sides + ONE + 'b_qos = "sensor"\n').topics[0].b.qos == "sensor"
     assert "unknown quality of service 'sensors'; did you mean 'sensor'?" in error(
@@ -204,7 +210,7 @@ def toml(value):
 
 def reads_or_says(text):
     try:
-        found = read_text(text, "lab.toml", "lab")
+        found = parse_configuration(text, "lab.toml", "lab")
     except NepError as caught:
         said = str(caught)
         assert "lab.toml" in said
@@ -242,7 +248,7 @@ def test_any_text_is_parsed_or_rejected_with_a_message(text):
 def test_any_two_endpoints_are_parsed_or_rejected_with_a_message(a, b):
     for pair in ((a, b), (f"zeromq:{a}", f"zenoh:{b}"), (f"zeromq@{a}:/t", f"zenoh@{b}:/t")):
         with suppress(NepError):
-            assert isinstance(join_line(*pair, name="1"), BridgeConfiguration)
+            assert isinstance(configuration_from_arguments(*pair, name="1"), BridgeConfiguration)
 
 
 # ---- names
@@ -259,7 +265,7 @@ def test_any_two_endpoints_are_parsed_or_rejected_with_a_message(a, b):
 )  # fmt: skip
 def test_wildcard_captures_part_of_a_topic(pattern, topic, part):
     end = TopicEnd(pattern)
-    assert end.part_in(topic) == part
+    assert end.matched_part(topic) == part
     if part:
         assert end.with_part(part) == topic
 
@@ -268,7 +274,7 @@ def test_wildcard_captures_part_of_a_topic(pattern, topic, part):
 @given(st.sampled_from(["/a/*", "/*/b", "x**", "**/y", "*"]), st.text("ab/xy*", min_size=1, max_size=8))
 def test_wildcard_substitution_round_trips(pattern, part):
     end = TopicEnd(pattern)
-    found = end.part_in(end.with_part(part))
+    found = end.matched_part(end.with_part(part))
     assert found == ("" if end.wildcard == "*" and "/" in part else part)
 
 
@@ -283,7 +289,7 @@ def test_wildcard_substitution_round_trips(pattern, part):
 )  # fmt: skip
 def test_endpoint_argument_is_parsed_into_master_and_topic(monkeypatch, a, b, found):
     monkeypatch.delenv("NEP_MASTER", raising=False)
-    told = join_line(a, b, name="1")
+    told = configuration_from_arguments(a, b, name="1")
     assert (told.a.master, told.topics[0].a.name, told.b.master, told.topics[0].b.name) == found
 
 
@@ -291,12 +297,20 @@ def test_local_network_name_includes_the_computer_or_process():
     import os
     import platform
 
-    assert side_of("zeromq", "127.0.0.1:7780").network == f"zeromq:127.0.0.1:7780@{platform.node()}"
-    assert side_of("zeromq", "10.0.0.1:7780").network == "zeromq:10.0.0.1:7780"
-    assert side_of("zenoh", "local/x").network == f"zenoh:local/x@{platform.node()}"
-    assert side_of("zenoh", "zenoh.json5").network == f"zenoh:zenoh.json5@{platform.node()}"
-    assert side_of("zenoh", "tcp/10.0.0.1:7447,tcp/b:7447").network == "zenoh:tcp/10.0.0.1:7447,tcp/b:7447"
-    assert side_of("zenoh", "tcp/127.0.0.1:7447").network == f"zenoh:tcp/127.0.0.1:7447@{platform.node()}"
-    assert side_of("zeromq", "localhost").network == f"zeromq:localhost:7780@{platform.node()}"
-    assert side_of("zeromq", "robot.local").network == "zeromq:robot.local:7780"
-    assert side_of("memory", "x").network == f"memory:x@{platform.node()}/{os.getpid()}"
+    assert (
+        side_configuration("zeromq", "127.0.0.1:7780").network == f"zeromq:127.0.0.1:7780@{platform.node()}"
+    )
+    assert side_configuration("zeromq", "10.0.0.1:7780").network == "zeromq:10.0.0.1:7780"
+    assert side_configuration("zenoh", "local/x").network == f"zenoh:local/x@{platform.node()}"
+    assert side_configuration("zenoh", "zenoh.json5").network == f"zenoh:zenoh.json5@{platform.node()}"
+    assert (
+        side_configuration("zenoh", "tcp/10.0.0.1:7447,tcp/b:7447").network
+        == "zenoh:tcp/10.0.0.1:7447,tcp/b:7447"
+    )
+    assert (
+        side_configuration("zenoh", "tcp/127.0.0.1:7447").network
+        == f"zenoh:tcp/127.0.0.1:7447@{platform.node()}"
+    )
+    assert side_configuration("zeromq", "localhost").network == f"zeromq:localhost:7780@{platform.node()}"
+    assert side_configuration("zeromq", "robot.local").network == "zeromq:robot.local:7780"
+    assert side_configuration("memory", "x").network == f"memory:x@{platform.node()}/{os.getpid()}"

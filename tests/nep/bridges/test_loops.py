@@ -10,10 +10,10 @@ import pytest
 
 from nep.backends import memory
 from nep.errors import WireError
-from nep.messages.message import arrived
-from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_of
+from nep.messages.message import received_message
+from nep.programs.bridges import Bridge, BridgeConfiguration, SideConfiguration, side_configuration
 from nep.programs.bridges.other_bridges import OtherBridge, OtherBridges
-from nep.programs.bridges.trail import ECHO_S, MAX_HOPS, TRAIL_KEY, LoopGuard, Trail, read_trail
+from nep.programs.bridges.trail import ECHO_WINDOW_S, MAX_HOPS, TRAIL_KEY, LoopGuard, Trail, read_trail
 from nep.protocol.graph_view import BRIDGES_TOPIC
 from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
@@ -127,7 +127,8 @@ def test_loop_is_stopped_by_bridge_id_if_network_names_differ():
 
         def named(name):
             sides = [
-                replace(side_of(net.backend, net.master), network=f"{name}-{net.backend}") for net in (a, b)
+                replace(side_configuration(net.backend, net.master), network=f"{name}-{net.backend}")
+                for net in (a, b)
             ]
             return BridgeConfiguration(name, *sides, (topic("/t"),))
 
@@ -150,8 +151,8 @@ def test_loop_is_stopped_by_bridge_id_if_network_names_differ():
 class Nameless(memory.MemoryTransport):
     """As ROS 1: who hears its own messages, without a publisher, and no room for an extension."""
 
-    def publisher(self, spec):
-        made = super().publisher(spec)
+    def create_publisher(self, spec):
+        made = super().create_publisher(spec)
         send = made.send
 
         def bare(encoded):
@@ -162,15 +163,15 @@ class Nameless(memory.MemoryTransport):
         made.send = bare
         return made
 
-    def subscriber(self, spec):
+    def create_subscriber(self, spec):
         sink = spec.sink
         if sink is not None:
             spec = replace(spec, sink=lambda messages: sink([nameless(each) for each in messages]))
-        return super().subscriber(spec)
+        return super().create_subscriber(spec)
 
 
 def nameless(message):
-    made = arrived(message.kind, message.raw, message.stamp_ns, 0, 0)
+    made = received_message(message.kind, message.raw, message.stamp_ns, 0, 0)
     made.publisher = made.seq = None
     return made
 
@@ -180,7 +181,7 @@ def nameless_side(request, monkeypatch):
     backend = replace(
         memory.BACKEND, name="nameless", open=Nameless, has_extensions=request.param, is_in_process=True
     )
-    monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: NAMED[name])
+    monkeypatch.setattr("nep.nodes.node.find_backend", lambda name: NAMED[name])
     NAMED["nameless"] = backend
     return SideConfiguration(backend, "somewhere", "nameless:somewhere")
 
@@ -192,7 +193,9 @@ def test_echo_is_recognised_by_its_bytes_if_the_network_carries_no_trail(nameles
     import nep
 
     with nets("memory") as (a,):
-        told = BridgeConfiguration("test", side_of(a.backend, a.master), nameless_side, (topic("/t"),))
+        told = BridgeConfiguration(
+            "test", side_configuration(a.backend, a.master), nameless_side, (topic("/t"),)
+        )
         with Bridge(told) as bridge, nep.node("ros", "nameless", master="somewhere") as ros:
             assert bridge.wait_until_ready(30.0)
             hears_a, hears_ros = a.node("hears").new_sub("/t"), ros.new_sub("/t")
@@ -218,7 +221,9 @@ def test_two_bridges_over_a_network_without_trails_do_not_loop(nameless_side):
     with nets("memory") as (a,), ExitStack() as opened:
         pair = []
         for name in ("one", "two"):
-            told = BridgeConfiguration(name, side_of(a.backend, a.master), nameless_side, (topic("/t"),))
+            told = BridgeConfiguration(
+                name, side_configuration(a.backend, a.master), nameless_side, (topic("/t"),)
+            )
             pair.append(opened.enter_context(Bridge(told)))
             assert pair[-1].wait_until_ready(30.0)
         ros = opened.enter_context(nep.node("ros", "nameless", master="somewhere"))
@@ -245,7 +250,7 @@ def test_one_of_two_bridges_without_trails_yields_until_the_other_has_ended(monk
     monkeypatch.setattr("nep.programs.bridges.other_bridges._EXPIRY_S", 3.0)
     monkeypatch.setattr("nep.programs.bridges.side.HEARTBEAT_S", 0.5)
     backend = replace(memory.BACKEND, name="nameless", open=Nameless, has_extensions=False)
-    monkeypatch.setattr("nep.nodes.node.backend_named", lambda name: NAMED[name])
+    monkeypatch.setattr("nep.nodes.node.find_backend", lambda name: NAMED[name])
     NAMED["nameless"] = backend
     sides = [SideConfiguration(backend, place, f"nameless:{place}") for place in ("here", "there")]
 
@@ -297,7 +302,7 @@ def test_bridges_of_other_topics_or_networks_do_not_conflict(caplog):
         told = b.node("watches").new_sub(BRIDGES_TOPIC)
         for _time in range(6):
             told.receive(30.0)
-        assert {each.name for each in one._others.between(time.monotonic())} == {"two"}
+        assert {each.name for each in one._others.parallel_bridges(time.monotonic())} == {"two"}
         assert "too: messages arrive twice" not in caplog.text
 
 
@@ -312,12 +317,12 @@ STATUS = {
 def test_other_bridge_counts_only_if_seen_recently_on_both_sides():
     known = OtherBridges("own")
     known.add_status("b", STATUS, 0.0)
-    assert known.between(0.0) == []
+    assert known.parallel_bridges(0.0) == []
     known.add_status("a", STATUS, 1.0)
-    assert known.between(1.0) == [], "twice the same side of it: one network has two names"
+    assert known.parallel_bridges(1.0) == [], "twice the same side of it: one network has two names"
     known.add_status("a", {**STATUS, "side": "b"}, 1.0)
-    assert known.between(2.0) == [OtherBridge("other", "lab", frozenset({("b", "/t", "/u")}))]
-    assert known.between(30.0) == []
+    assert known.parallel_bridges(2.0) == [OtherBridge("other", "lab", frozenset({("b", "/t", "/u")}))]
+    assert known.parallel_bridges(30.0) == []
 
 
 @pytest.mark.parametrize(
@@ -334,7 +339,7 @@ def test_invalid_bridge_status_is_ignored(status):
         known.add_status(
             side, {**status, "side": "b"} if isinstance(status, dict) and side == "b" else status, 0.0
         )
-    assert known.between(0.0) == []
+    assert known.parallel_bridges(0.0) == []
 
 
 @pytest.mark.parametrize(
@@ -348,7 +353,7 @@ def test_invalid_routes_in_a_bridge_status_are_ignored(routes):
     known = OtherBridges("own")
     known.add_status("a", {**STATUS, "routes": routes}, 0.0)
     known.add_status("b", {**STATUS, "side": "b"}, 0.0)
-    assert known.between(0.0)[0].ways == frozenset()
+    assert known.parallel_bridges(0.0)[0].routes == frozenset()
 
 
 def test_known_bridges_are_bounded():
@@ -356,28 +361,28 @@ def test_known_bridges_are_bounded():
     for number in range(1000):
         for side in ("a", "b"):
             known.add_status(side, {**STATUS, "id": str(number), "side": side}, 0.0)
-    assert len(known.between(0.0)) == 64
+    assert len(known.parallel_bridges(0.0)) == 64
 
 
 # ---- trails and echoes alone
 
 
 def test_trail_determines_where_a_message_may_be_forwarded():
-    trail = Trail().carried("a", "b", "one")
+    trail = Trail().with_hop("a", "b", "one")
     assert trail == Trail(("a", "b"), ("one",))
-    assert not trail.may_go("a", "two")
-    assert not trail.may_go("c", "one")
-    assert trail.may_go("c", "two")
-    assert trail.carried("b", "c", "two") == Trail(("a", "b", "c"), ("one", "two"))
+    assert not trail.may_forward("a", "two")
+    assert not trail.may_forward("c", "one")
+    assert trail.may_forward("c", "two")
+    assert trail.with_hop("b", "c", "two") == Trail(("a", "b", "c"), ("one", "two"))
     assert read_trail({TRAIL_KEY: trail.to_plain()}) == trail
 
 
 def test_trail_length_is_limited():
     trail = Trail()
     for number in range(MAX_HOPS):
-        assert trail.may_go(f"n{number + 1}", f"b{number}")
-        trail = trail.carried(f"n{number}", f"n{number + 1}", f"b{number}")
-    assert not read_trail({TRAIL_KEY: trail.to_plain()}).may_go("new", "new")
+        assert trail.may_forward(f"n{number + 1}", f"b{number}")
+        trail = trail.with_hop(f"n{number}", f"n{number + 1}", f"b{number}")
+    assert not read_trail({TRAIL_KEY: trail.to_plain()}).may_forward("new", "new")
 
 
 @pytest.mark.parametrize(
@@ -404,23 +409,23 @@ def test_message_with_an_invalid_trail_is_forwarded():
 
 def test_echo_is_recognised_once_per_sent_message_until_it_expires():
     echoes = LoopGuard()
-    echoes.sent(b"x", 0.0)
-    echoes.sent(b"x", 1.0)
-    echoes.sent(memoryview(b"y"), 1.0)
+    echoes.record_sent(b"x", 0.0)
+    echoes.record_sent(b"x", 1.0)
+    echoes.record_sent(memoryview(b"y"), 1.0)
     assert [echoes.is_echo(b"x", 2.0) for _time in range(3)] == [True, True, False]
     assert not echoes.is_echo(b"z", 2.0)
-    assert not echoes.is_echo(b"y", 1.0 + ECHO_S + 0.1)
-    echoes.sent(b"x", 10.0)
-    echoes.not_needed()
+    assert not echoes.is_echo(b"y", 1.0 + ECHO_WINDOW_S + 0.1)
+    echoes.record_sent(b"x", 10.0)
+    echoes.disable()
     assert not echoes.is_echo(b"x", 10.0)
-    echoes.sent(b"x", 10.0)
+    echoes.record_sent(b"x", 10.0)
     assert not echoes.is_echo(b"x", 10.0), "nothing is remembered any more"
 
 
 def test_echo_memory_is_bounded():
     echoes = LoopGuard()
     for number in range(10_000):
-        echoes.sent(str(number).encode(), 0.0)
+        echoes.record_sent(str(number).encode(), 0.0)
     assert not echoes.is_echo(b"0", 0.0)
     assert echoes.is_echo(b"9999", 0.0)
     assert len(echoes._sent) < 5_000

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from nep.programs.bridges.pacer import Limit, Pacer
+from nep.programs.bridges.pacer import Pacer, RateLimit
 from tests.nep.bridges.joined import bridged, nets, route, settled, silent, taken, topic
 from tests.nep.programs import eventually
 
@@ -84,16 +84,16 @@ def test_latched_message_stays_latched_under_a_rate_limit():
 
 
 def test_rate_limit_passes_the_configured_rate():
-    limit = Limit(10.0)
-    passed = [now / 1000 for now in range(10_000) if limit.has_room(now / 1000)]
+    limit = RateLimit(10.0)
+    passed = [now / 1000 for now in range(10_000) if limit.try_acquire(now / 1000)]
     assert 100 <= len(passed) <= 101
     assert min(later - earlier for earlier, later in itertools.pairwise(passed)) > 0.089
 
 
 def test_rate_limit_does_not_accumulate_unused_capacity():
-    limit = Limit(10.0)
-    assert limit.has_room(0.0)
-    assert [limit.has_room(100.0 + n / 1000) for n in range(5)] == [True, False, False, False, False]
+    limit = RateLimit(10.0)
+    assert limit.try_acquire(0.0)
+    assert [limit.try_acquire(100.0 + n / 1000) for n in range(5)] == [True, False, False, False, False]
     assert limit.next_at == pytest.approx(100.09)
 
 

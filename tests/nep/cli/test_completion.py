@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 import nep
-from nep.cli.complete import _master
+from nep.cli.complete import _reachable_master
 from tests.nep.programs import eventually
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -82,7 +82,7 @@ def test_completion_without_a_master_is_empty_and_returns_at_once(monkeypatch):
     assert complete("bash", "nep topic echo /o") == []
     line = SimpleNamespace(params={}, find_root=lambda: SimpleNamespace(params={}))
     with pytest.raises(OSError, match=r"refused|timed out"):  # at once: nobody is asked, and waited for
-        _master(line)
+        _reachable_master(line)
     for wrong in ("no address at all", "a..b:7780", f"{'x' * 70}.invalid"):
         monkeypatch.setenv("NEP_MASTER", wrong)
         assert complete("bash", "nep topic echo /o") == []

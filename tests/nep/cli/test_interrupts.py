@@ -200,7 +200,7 @@ def test_interrupt_during_a_finalizer_is_raised_again(monkeypatch: pytest.Monkey
     monkeypatch.setattr(interrupts, "_exit_after_grace", lambda: None)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        interrupts.ask_first()
+        interrupts.raise_on_interrupt()
         with pytest.raises(KeyboardInterrupt):
             work()
     finally:

@@ -9,7 +9,7 @@ import shlex
 import pytest
 
 from nep.cli.json_input import parse_json
-from nep.cli.publish import value_of
+from nep.cli.publish import parse_payload
 from nep.errors import NepError
 
 
@@ -29,7 +29,7 @@ def test_incomplete_json_error_names_its_end_without_advice_about_quotes():
 def test_nan_error_suggests_msgpack_which_accepts_it():
     assert error_of('{"lat": NaN}', other_types=True).endswith("use null, or use --type msgpack")
     assert "--type" not in error_of('{"lat": NaN}')
-    value = value_of('{"lat": NaN}', "msgpack")
+    value = parse_payload('{"lat": NaN}', "msgpack")
     assert isinstance(value, dict)
     assert math.isnan(value["lat"])
 
@@ -42,7 +42,7 @@ def test_json_error_in_a_file_names_the_file_and_line(tmp_path):
     file = tmp_path / "pose.json"
     file.write_text('\ufeff{\n"a": 1,\n}', "utf-8")
     with pytest.raises(NepError, match=r"pose\.json' .* line 2, column 7"):
-        value_of(f"@{file}", "json")
+        parse_payload(f"@{file}", "json")
     assert "--type string" not in error_of("hello", file="x")
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from tests.nep.cli.conftest import TypeIn
 from tests.nep.cli.test_command import LONG_S, Running
 
@@ -85,7 +85,7 @@ def test_watch_shows_current_values_and_each_change_once(node: nep.Node) -> None
         lines = iter(watching.process.stdout.readline, "")
         assert [next(lines) for _each in range(3)] == ["speed: 0.5\n", 'mode: "walk"\n', 'serial: "7"\n']
         node.parameters["speed"] = 0.5  # no change
-        with nep.node("stranger") as stranger, stranger.new_pub(place_of(node.id)) as loud:
+        with nep.node("stranger") as stranger, stranger.new_pub(parameters_topic(node.id)) as loud:
             loud.publish("no state")
             loud.publish({"parameters": 1})
             node.parameters["mode"] = "run"

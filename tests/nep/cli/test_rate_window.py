@@ -10,14 +10,14 @@ import time
 import pytest
 
 import nep
-from nep.cli.hz_bw import _DelayReport, age, bw, gap, hz
+from nep.cli.hz_bw import _DelayReport, bw, format_duration, format_latency, hz
 from nep.cli.publish import repeat
-from nep.cli.rate_window import MAX_MESSAGES, AgeWindow, Delay, RateWindow, ReplayFilter
+from nep.cli.rate_window import MAX_MESSAGES, Delay, LatchedFilter, LatencyWindow, RateWindow
 from nep.cli.screen import print_status
 from nep.errors import BadTopicError, WaitTimeoutError
-from nep.messages.clocks import NOT_COMPARED, OWN_CLOCK
-from nep.messages.message import arrived as new_arrived
-from nep.messages.message import kind_of
+from nep.messages.clocks import OWN_CLOCK, UNKNOWN_CLOCK
+from nep.messages.message import message_kind
+from nep.messages.message import received_message as new_arrived
 
 
 def test_intervals_are_measured_with_the_publisher_clock():
@@ -49,14 +49,14 @@ def test_messages_older_than_the_window_are_not_counted():
     assert window.frequency(9.0).messages == 3
     assert window.total == 10
     assert window.frequency(100.0) is None
-    assert window.traffic(100.0) is None
+    assert window.bandwidth(100.0) is None
 
 
 def test_bandwidth_and_message_sizes_are_measured():
     window = RateWindow(10.0)
     for arrived, size in ((0.0, 900), (1.0, 100), (2.0, 300)):
         window.add(arrived, None, size)
-    found = window.traffic(2.0)
+    found = window.bandwidth(2.0)
     assert (found.bandwidth_Bps, found.mean_bytes) == pytest.approx((200.0, 1300 / 3))
     assert (found.min_bytes, found.max_bytes, found.messages) == (100, 900, 3)
 
@@ -64,14 +64,14 @@ def test_bandwidth_and_message_sizes_are_measured():
 def test_single_message_has_no_rate_and_the_window_is_bounded():
     window = RateWindow(10.0)
     window.add(0.0, None, 1)
-    assert (window.frequency(0.0), window.traffic(0.0)) == (None, None)
+    assert (window.frequency(0.0), window.bandwidth(0.0)) == (None, None)
     for number in range(MAX_MESSAGES + 10):
         window.add(number * 1e-6, None, 1)
     assert window.frequency(0.2).messages == MAX_MESSAGES
 
 
 def test_interval_is_formatted_with_a_suitable_unit():
-    assert [gap(each) for each in (2.5, 0.0204, 0.000_31)] == ["2.5 s", "20.4 ms", "310 us"]
+    assert [format_duration(each) for each in (2.5, 0.0204, 0.000_31)] == ["2.5 s", "20.4 ms", "310 us"]
 
 
 @pytest.fixture
@@ -146,23 +146,23 @@ def test_topic_that_appears_later_is_measured(master, capsys, monkeypatch):
 
 
 def test_delay_covers_recent_messages():
-    window = AgeWindow(10.0)
+    window = LatencyWindow(10.0)
     assert window.delay(0.0) is None
-    window.add_age(0.0, 99.0, 1)
+    window.add_latency(0.0, 99.0, 1)
     for arrived, age_s in ((20.0, 0.25), (21.0, -0.25), (22.0, None)):
-        window.add_age(arrived, age_s, 1)
+        window.add_latency(arrived, age_s, 1)
     assert window.delay(25.0) == Delay(0.0, -0.25, 0.25, 0.25, 2)
     assert window.total == 4
 
 
 def test_ages_from_before_the_clock_comparison_are_excluded():
-    window = AgeWindow(10.0)
-    window.add_age(1.0, 3600.0, 1)
-    window.add_age(2.0, 0.25, 1, 0.001)
-    window.add_age(3.0, 0.75, 1, 0.002)
+    window = LatencyWindow(10.0)
+    window.add_latency(1.0, 3600.0, 1)
+    window.add_latency(2.0, 0.25, 1, 0.001)
+    window.add_latency(3.0, 0.75, 1, 0.002)
     assert window.delay(3.0) == Delay(0.5, 0.25, 0.75, 0.25, 2, 0.002)
-    window.add_age(4.0, None, 1)
-    window.add_age(5.0, -3600.0, 1)
+    window.add_latency(4.0, None, 1)
+    window.add_latency(5.0, -3600.0, 1)
     assert window.delay(5.0) == Delay(-3600.0, -3600.0, -3600.0, 0.0, 1)
     assert window.total == 5
 
@@ -180,7 +180,7 @@ def test_ages_from_before_the_clock_comparison_are_excluded():
     ],
 )
 def test_negative_age_within_the_uncertainty_is_shown_as_below_it(age_s, uncertainty_s, words):
-    assert age(age_s, uncertainty_s) == words
+    assert format_latency(age_s, uncertainty_s) == words
 
 
 class _Told:
@@ -190,7 +190,7 @@ class _Told:
         self.report = _DelayReport(["t"], 10.0)
         self.report._subscribers["t"] = self
         for each in ages:
-            self.report._ages["t"].add_age(time.monotonic(), each[0], 1, each[1])
+            self.report._ages["t"].add_latency(time.monotonic(), each[0], 1, each[1])
 
     lost = 0
 
@@ -215,25 +215,27 @@ def test_missing_clock_comparison_is_reported_once(capsys):
 
 def _latched(stamp_ns, clock=OWN_CLOCK, publisher=1):
     return new_arrived(
-        kind_of("t", "json", "json", is_latched=True, clock=clock), b"1", stamp_ns, 1, publisher
+        message_kind("t", "json", "json", is_latched=True, clock=clock), b"1", stamp_ns, 1, publisher
     )
 
 
 def test_messages_kept_for_new_subscribers_are_replays():
     opened, now = time.monotonic(), time.time_ns()
-    replays = ReplayFilter(opened)
-    assert replays.is_replay(_latched(now - 10_000_000), opened)
-    assert replays.is_replay(_latched(now - 5_000_000), opened)
-    assert not replays.is_replay(_latched(now), opened + 1.0)
-    assert not replays.is_replay(new_arrived(kind_of("t", "json", "json"), b"1", 0, 1, 1), opened)
+    replays = LatchedFilter(opened)
+    assert replays.predates_subscription(_latched(now - 10_000_000), opened)
+    assert replays.predates_subscription(_latched(now - 5_000_000), opened)
+    assert not replays.predates_subscription(_latched(now), opened + 1.0)
+    assert not replays.predates_subscription(
+        new_arrived(message_kind("t", "json", "json"), b"1", 0, 1, 1), opened
+    )
 
 
 def test_with_uncompared_clocks_the_first_message_of_a_latched_publisher_is_a_replay():
-    replays = ReplayFilter(0.0)
+    replays = LatchedFilter(0.0)
     for publisher in (1, 2):
-        first, second = (_latched(0, NOT_COMPARED, publisher) for _ in range(2))
-        assert replays.is_replay(first, 5.0)
-        assert not replays.is_replay(second, 5.0)
+        first, second = (_latched(0, UNKNOWN_CLOCK, publisher) for _ in range(2))
+        assert replays.predates_subscription(first, 5.0)
+        assert not replays.predates_subscription(second, 5.0)
 
 
 class _FakeClock:

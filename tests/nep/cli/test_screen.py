@@ -11,8 +11,8 @@ from nep.cli.screen import (
     TextColumn,
     bandwidth,
     duration,
+    print_error_message,
     rate,
-    say_error,
     show_alerts,
     show_json,
     show_table,
@@ -80,7 +80,7 @@ def test_topics_are_never_wrapped_on_a_narrow_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "72")
     monkeypatch.setenv("FORCE_COLOR", "1")
     columns = [
-        TextColumn("topic", is_whole=True),
+        TextColumn("topic", is_folded_last=True),
         TextColumn("type"),
         TextColumn("subscribers"),
         TextColumn("rate", "right"),
@@ -108,7 +108,7 @@ def test_alerts_are_printed_to_stderr_with_advice(capsys):
 
 
 def test_error_is_one_sentence_on_stderr(capsys):
-    say_error("no master answers")
+    print_error_message("no master answers")
     captured = capsys.readouterr()
     assert (captured.out, captured.err) == ("", "nep: no master answers\n")
 
@@ -130,7 +130,7 @@ def test_terminal_too_narrow_for_a_table_shows_rows_as_blocks(monkeypatch):
     monkeypatch.setenv("COLUMNS", "20")
     monkeypatch.setattr("sys.stdout", screen := Terminal())
     columns = [
-        TextColumn("topic", is_whole=True),
+        TextColumn("topic", is_folded_last=True),
         TextColumn("type"),
         TextColumn("publishers"),
         TextColumn("rate", "right"),
@@ -163,7 +163,7 @@ def test_wide_characters_are_not_truncated_if_they_fit(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdout.isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "30")
     show_table(
-        [TextColumn("topic", is_whole=True), TextColumn("type")],
+        [TextColumn("topic", is_folded_last=True), TextColumn("type")],
         [("/" + "日本" * 5, "a/type/that/is/folded")],
     )
     assert "/" + "日本" * 5 in capsys.readouterr().out

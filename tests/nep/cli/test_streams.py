@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 import nep
-from nep.cli.screen import print_status, say_error, show_alerts
+from nep.cli.screen import print_error_message, print_status, show_alerts
 from nep.protocol.graph_view import Alert
-from nep.system.streams import words_given
+from nep.system.streams import command_line_arguments
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 LONG_S = 60
@@ -98,7 +98,7 @@ def test_every_command_prints_everything_in_every_code_page(talkers, page):
 @pytest.mark.skipif(os.name != "posix", reason="Windows gives words as letters, not as bytes")
 def test_arguments_in_another_encoding_are_read_as_utf_8(monkeypatch):
     monkeypatch.setattr("sys.argv", ["nep", "Gr\udcc3\udcb6\udcc3\udc9fe", "plain", "Größe"])
-    assert words_given() == ["Größe", "plain", "Größe"]
+    assert command_line_arguments() == ["Größe", "plain", "Größe"]
 
 
 def command(*words, env=None, **more):
@@ -207,7 +207,7 @@ def test_failure_to_print_a_notice_does_not_end_a_command(monkeypatch):
 
     monkeypatch.setattr("sys.stderr", Gone())
     print_status("one")
-    say_error("two")
+    print_error_message("two")
     show_alerts([Alert("a", "three", "four")])
 
 

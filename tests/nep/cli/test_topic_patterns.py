@@ -48,10 +48,10 @@ def test_each_new_topic_is_reported_once_and_a_pattern_without_matches_once(capf
         node.new_sub("/b/odom")
         patterns = TopicPatterns(node, ["/*/odom", "/none/*"], ["/known/odom"])
         node.new_pub("/known/odom")
-        assert patterns.new_in(node.graph()) == [("/a/odom", "json")]
-        assert patterns.new_in(node.graph()) == []
+        assert patterns.new_topics(node.graph()) == [("/a/odom", "json")]
+        assert patterns.new_topics(node.graph()) == []
         node.new_pub("/b/odom", "msgpack")
-        assert patterns.new_in(node.graph()) == [("/b/odom", "msgpack")]
+        assert patterns.new_topics(node.graph()) == [("/b/odom", "msgpack")]
     assert capfd.readouterr().err.count("no topic matches '/none/*' yet") == 1
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from nep.cli.echo import Lines, show_record
-from nep.cli.publish import value_of, wait_for_subscribers
+from nep.cli.echo import MessagePrinter, show_record
+from nep.cli.publish import parse_payload, wait_for_subscribers
 from nep.errors import EncodeError, NepError
 from nep.messages.message import Message
 
@@ -61,7 +61,7 @@ def test_undecodable_payload_is_shown_as_bytes_with_the_reason(capfdbinary):
     ],
 )
 def test_message_is_printed_on_one_line(given, shown, capsys):
-    Lines()(given)
+    MessagePrinter()(given)
     out = capsys.readouterr().out
     assert out.count("\n") == 1
     assert "#7" in out
@@ -69,7 +69,7 @@ def test_message_is_printed_on_one_line(given, shown, capsys):
 
 
 def test_message_longer_than_the_screen_is_indented(capsys):
-    Lines()(message(json.dumps({"words": ["message"] * 40}).encode()))
+    MessagePrinter()(message(json.dumps({"words": ["message"] * 40}).encode()))
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) > 40
     assert "  {" in lines[1]
@@ -86,30 +86,30 @@ def test_message_longer_than_the_screen_is_indented(capsys):
     ],
 )
 def test_argument_is_parsed_according_to_the_message_type(text, msg_type, value):
-    assert value_of(text, msg_type) == value
+    assert parse_payload(text, msg_type) == value
 
 
 def test_invalid_json_error_suggests_the_string_type():
     with pytest.raises(NepError, match=r"'hello' is not JSON; .* --type string"):
-        value_of("hello", "json")
+        parse_payload("hello", "json")
 
 
 def test_payload_is_read_from_a_file(tmp_path):
     file = tmp_path / "data"
     file.write_bytes(b'{"a": 1}')
-    assert value_of(f"@{file}", "json") == {"a": 1}
-    assert value_of(f"@{file}", "bytes") == b'{"a": 1}'
+    assert parse_payload(f"@{file}", "json") == {"a": 1}
+    assert parse_payload(f"@{file}", "bytes") == b'{"a": 1}'
     with pytest.raises(EncodeError, match="can't read"):
-        value_of("@/nowhere/at/all", "bytes")
+        parse_payload("@/nowhere/at/all", "bytes")
     with pytest.raises(EncodeError, match=r"@picture\.jpg"):
-        value_of("hello", "image")
+        parse_payload("hello", "image")
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="/dev/zero is a device of Unix")
 def test_endless_device_is_rejected_as_payload_file(monkeypatch):
     monkeypatch.setattr("nep.cli.publish._MAX_FILE_BYTES", 1000)
     with pytest.raises(EncodeError, match=r"larger than 1\.0 kB"):
-        value_of("@/dev/zero", "bytes")
+        parse_payload("@/dev/zero", "bytes")
 
 
 def test_publish_waits_for_the_requested_number_of_subscribers(capsys):

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nep
-from nep.cli.echo import Lines, echo, show_record, topics_and_fields
-from nep.cli.values import ids_as_text, json_of, presented
+from nep.cli.echo import MessagePrinter, echo, show_record, topics_and_fields
+from nep.cli.values import format_payload, ids_as_text, json_of
 from nep.errors import WaitTimeoutError
 from nep.messages.message import Message
 from nep.messages.packing import pack
@@ -35,8 +35,8 @@ ANYTHING = st.recursive(
 def test_every_decoded_value_becomes_valid_json(value):
     json.loads(json_of(value))
     assert "\n" not in json_of(value).decode()
-    assert presented(value, whole=True) is not None
-    assert presented(value, whole=False, indent=True) is not None
+    assert format_payload(value, whole=True) is not None
+    assert format_payload(value, whole=False, indent=True) is not None
 
 
 @pytest.mark.parametrize(
@@ -51,14 +51,14 @@ def test_every_decoded_value_becomes_valid_json(value):
     ],
 )
 def test_value_is_presented_for_the_terminal(value, shown):
-    assert presented(value, whole=False) == shown
+    assert format_payload(value, whole=False) == shown
 
 
 def test_many_fields_are_abbreviated_and_all_shown_on_request():
     many = {f"field{number}": number for number in range(10_000)}
-    shown = presented(many, whole=False)
+    shown = format_payload(many, whole=False)
     assert shown.endswith('"field99":99,"…":"9900 more"}')
-    assert json.loads(presented(many, whole=True)) == many
+    assert json.loads(format_payload(many, whole=True)) == many
 
 
 def test_control_characters_are_escaped_in_json():
@@ -90,14 +90,14 @@ def test_ids_are_converted_to_strings_at_every_level():
 )
 def test_hostile_message_does_not_end_a_command(message, capsys):
     show_record(message)
-    Lines()(message)
+    MessagePrinter()(message)
     out = capsys.readouterr().out
     assert json.loads(out.splitlines()[0])["topic"] == "t"
     assert "\x1b" not in out
 
 
 def test_multiline_text_cannot_forge_another_message(capsys):
-    Lines()(Message("t", b"one\n12:00:00.000  #9  forged\x1b[2J", "string", "string"))
+    MessagePrinter()(Message("t", b"one\n12:00:00.000  #9  forged\x1b[2J", "string", "string"))
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "    12:00:00.000  #9  forged\\x1b[2J"
 
@@ -117,13 +117,13 @@ def test_terminal_output_is_truncated_unless_full_is_requested(monkeypatch, more
         monkeypatch.setenv(name, value)
     monkeypatch.setattr("sys.stdout", screen := Terminal())
     long = Message("t", orjson.dumps({"joints": list(range(5000)), "note": "\x1b[2J"}), "json", "json", seq=1)
-    Lines()(long)
+    MessagePrinter()(long)
     short = screen.getvalue()
     assert "\x1b[2J" not in short
     assert "… 4980 more" in re.sub(r"\x1b\[[0-9;]*m", "", short)
     assert bool(re.search(r"\x1b\[(\d;)?3\dm", short)) == (not more.keys() & {"NO_COLOR", "TERM"})
     assert more.get("TERM") != "dumb" or "\x1b" not in short
-    Lines(whole=True)(long)
+    MessagePrinter(whole=True)(long)
     assert "4999" in screen.getvalue()
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.cli import screen
-from nep.cli.ring import KEEP_SERVICE, has_ring
+from nep.cli.ring import KEEP_SERVICE, has_flight_recorder
 from nep.masters.master import Master
 from nep.programs.alarms.rule_file import EXAMPLE
 from tests.nep.programs import eventually, running
@@ -95,7 +95,7 @@ def test_alarm_saves_the_last_seconds_through_any_available_flight_recorder(mast
     with Talker(master.address, "/distance", {"range": 0.3}) as node:
         with node.new_server(KEEP_SERVICE, keep, threads=1):
             done = type_in("watch", name, "-n", "1", "--master", master.address)
-        eventually(lambda: not has_ring(node.graph()))
+        eventually(lambda: not has_flight_recorder(node.graph()))
         refused = type_in("watch", name, "-n", "1", "--master", master.address, "--json")
     assert done.stdout.splitlines()[1].split("  ", 1)[1].strip() == "saved there/kept-1.mcap"
     assert asked == [{"seconds": 30, "note": "range of /distance is 0.3, below 0.4"}]

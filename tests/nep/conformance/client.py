@@ -20,7 +20,7 @@ import msgpack  # type: ignore[import-untyped]
 import zmq
 
 from nep.errors import WireError
-from nep.messages.codecs import codec_for, codec_numbered
+from nep.messages.codecs import codec_by_number, codec_for
 from nep.protocol import wire
 from nep.protocol.batch import read_parts
 from tests.nep.conformance.client_connections import Connections, Handshakes
@@ -36,7 +36,7 @@ class Client(Connections, Services):
     """See the module."""
 
     def __init__(self, master: str) -> None:
-        self.reads, self.writes = Stream(), Stream()
+        self.output, self.input = Stream(), Stream()
         """Streams of the tester."""
         self._context: zmq.Context[Any] = zmq.Context()
         self._context.linger = 0
@@ -66,14 +66,14 @@ class Client(Connections, Services):
         self._thread.join(timeout_s)
         return None if self._thread.is_alive() else self.code
 
-    def end(self) -> None:
-        self.writes.close()
+    def stop(self) -> None:
+        self.input.close()
         self._thread.join()
 
     def _run(self) -> None:
         try:
             while not self.is_done:
-                line = self.writes.read_now()
+                line = self.input.read_now()
                 if line == b"":
                     break
                 if line is not None:
@@ -83,14 +83,14 @@ class Client(Connections, Services):
         except BaseException:  # noqa: BLE001 - reported as the exit code
             self.code = 1
         finally:
-            self.reads.close()
+            self.output.close()
             self.master_handshakes.close()
             for sub in self.subs.values():
                 sub.handshakes.close()
             self._context.destroy()
 
     def say(self, line: Mapping[str, Any]) -> None:
-        self.reads.write(json.dumps(line).encode() + b"\n")
+        self.output.write(json.dumps(line).encode() + b"\n")
 
     def _do(self, request: dict[str, Any]) -> None:
         number = request.pop("id")
@@ -457,7 +457,7 @@ class Client(Connections, Services):
 
     def deliver(self, sub: Sub, read: wire.Parts) -> None:
         header, payload = read.header, bytes(read.payload)
-        codec = codec_numbered(header.codec)
+        codec = codec_by_number(header.codec)
         assert codec is not None
         event = {
             "event": "message",
@@ -503,7 +503,7 @@ class Client(Connections, Services):
         return source.has_echoed
 
     def tell_read(self, sub: Sub, header: wire.Header) -> None:
-        answer = wire.read_part(wire.Read(sub.id, header.publisher, header.seq, 2**30))
+        answer = wire.acknowledgement_part(wire.Acknowledgement(sub.id, header.publisher, header.seq, 2**30))
         sub.socket.subscribe(answer)
         sub.socket.unsubscribe(answer)
 

@@ -53,8 +53,8 @@ class Services:
             json.loads(bytes(call.data))
             reply = self.answer(call)
         except ValueError:
-            reply = service_wire.failure(service_wire.CallKind.REFUSED, "", "not JSON")
-        socket.send_multipart([sender, *service_wire.NATIVE.answer(call.number, reply)])
+            reply = service_wire.error_reply(service_wire.CallKind.REFUSED, "", "not JSON")
+        socket.send_multipart([sender, *service_wire.NATIVE.reply(call.number, reply)])
 
     def refuse_call(self, error: WireError) -> None:
         pass
@@ -81,7 +81,7 @@ class Services:
             handshakes.close()
             if not socket.poll(0):
                 return {"error": "not responding"}
-            reply = service_wire.NATIVE.read_answer(socket.recv_multipart()).reply
+            reply = service_wire.NATIVE.read_reply(socket.recv_multipart()).reply
         return self.result(reply)
 
     def call_at(self, socket: zmq.Socket[bytes], endpoint: str, call: Sequence[bytes]) -> None:

@@ -11,20 +11,20 @@ import pytest
 import typer
 
 from nep.cli import wire
-from nep.programs.conformance import AdapterProcess, check, chosen_rules
+from nep.programs.conformance import AdapterProcess, check, select_rules
 
 ADAPTER = (sys.executable, str(Path(__file__).parents[3] / "examples" / "conformance_adapter.py"))
 
 
 def test_nep_passes_every_rule() -> None:
-    rules = chosen_rules(())
+    rules = select_rules(())
     with ThreadPoolExecutor(4) as pool:  # they mostly wait
         found = pool.map(
             lambda first: list(check(lambda master: AdapterProcess(ADAPTER, master), rules[first::4])),
             range(4),
         )
         outcomes = [each for some in found for each in some]
-    assert [(each.rule.id, each.status, each.seen) for each in outcomes if each.status != "passed"] == []
+    assert [(each.rule.id, each.status, each.observed) for each in outcomes if each.status != "passed"] == []
     assert len(outcomes) == len(rules)
 
 
@@ -71,7 +71,7 @@ def test_unknown_rule_and_missing_command_are_usage_errors() -> None:
 def test_list_has_all_rules(capsys: pytest.CaptureFixture[str]) -> None:
     wire.check([], [], list_rules=True)
     output = capsys.readouterr().out
-    assert all(each.id in output for each in chosen_rules(()))
+    assert all(each.id in output for each in select_rules(()))
 
 
 def test_sections_of_rules_are_in_the_documentation() -> None:
@@ -84,6 +84,6 @@ def test_sections_of_rules_are_in_the_documentation() -> None:
         for line in (page + services).splitlines()
         if line.startswith("#")
     }
-    for each in chosen_rules(()):
-        assert each.place.partition("#")[2] in headings
+    for each in select_rules(()):
+        assert each.location.partition("#")[2] in headings
         assert f"| `{each.id}` | {each.requirement}" in rules

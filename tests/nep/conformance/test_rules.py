@@ -7,14 +7,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from nep.programs.conformance import RULES, Outcome, check, chosen_rules
+from nep.programs.conformance import RULES, Outcome, check, select_rules
 from tests.nep.conformance.broken_clients import BROKEN
 from tests.nep.conformance.client import SCALE, Client
 
 
 def judged(rule: str) -> Outcome:
     """Return the outcome of a rule for the client that breaks it."""
-    (outcome,) = check(BROKEN[rule], chosen_rules([rule]), SCALE)
+    (outcome,) = check(BROKEN[rule], select_rules([rule]), SCALE)
     return outcome
 
 
@@ -26,18 +26,18 @@ def outcomes() -> Mapping[str, Outcome]:
 
 
 def test_correct_client_passes_every_rule() -> None:
-    rules = chosen_rules(())
+    rules = select_rules(())
     with ThreadPoolExecutor() as pool:  # they mostly wait
         found = pool.map(lambda first: list(check(Client, rules[first::8], SCALE)), range(8))
         outcomes = [each for some in found for each in some]
-    assert [(each.rule.id, each.seen) for each in outcomes if each.status != "passed"] == []
+    assert [(each.rule.id, each.observed) for each in outcomes if each.status != "passed"] == []
     assert {each.rule.id for each in outcomes} == set(RULES)
 
 
 @pytest.mark.parametrize("rule", list(RULES))
 def test_client_with_one_error_fails_by_its_rule(rule: str, outcomes: Mapping[str, Outcome]) -> None:
     assert outcomes[rule].status == "failed"
-    assert outcomes[rule].seen
+    assert outcomes[rule].observed
 
 
 def test_rule_whose_feature_is_not_announced_is_skipped() -> None:
@@ -45,6 +45,6 @@ def test_rule_whose_feature_is_not_announced_is_skipped() -> None:
         def do_features(self) -> dict[str, object]:
             return {**super().do_features(), "features": []}
 
-    (outcome,) = check(Plain, chosen_rules(["latched"]), SCALE)
+    (outcome,) = check(Plain, select_rules(["latched"]), SCALE)
     assert outcome.status == "skipped"
-    assert "latched" in outcome.seen
+    assert "latched" in outcome.observed

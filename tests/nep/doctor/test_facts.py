@@ -17,7 +17,7 @@ import typer
 
 import nep
 from nep.cli.doctor import doctor
-from nep.programs.doctor import collect_facts, installs, processes, start_obstacle
+from nep.programs.doctor import collect_facts, installs, processes, start_blocker
 from nep.programs.doctor.collect import loopback_problem
 from tests.nep.programs import running
 
@@ -40,12 +40,12 @@ def test_local_master_is_found_with_its_process(master):
         facts = collect_facts(master.address)
         took_s = time.monotonic() - began
     assert {each.name for each in facts.view.nodes.values()} == {"Pepper"}
-    assert 0.0 < facts.answered_s < took_s  # it is a part of the look
+    assert 0.0 < facts.reply_time_s < took_s  # it is a part of the look
     assert facts.master_port.is_taken
     assert facts.master_port.holder.pid == os.getpid()
-    assert facts.loopback == ""
+    assert facts.loopback_problem == ""
     assert facts.versions["Python"].startswith("3.")
-    assert Path(facts.nep_file) == Path(nep.__file__).parent
+    assert Path(facts.nep_folder) == Path(nep.__file__).parent
 
 
 def test_process_that_holds_the_port_is_found(foreign):
@@ -191,7 +191,7 @@ def test_text_output_has_a_sentence_and_the_next_step(foreign):
 
 
 def test_obstacle_to_starting_a_master_is_one_finding(foreign, master):
-    one = start_obstacle(f"127.0.0.1:{foreign}")
+    one = start_blocker(f"127.0.0.1:{foreign}")
     assert one is not None
     assert one.id == "master:foreign"
     assert f"(process {os.getpid()}) uses port {foreign} " in one.as_error
@@ -200,7 +200,7 @@ def test_obstacle_to_starting_a_master_is_one_finding(foreign, master):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = probe.getsockname()[1]
-    assert start_obstacle(f"127.0.0.1:{free}") is None
+    assert start_blocker(f"127.0.0.1:{free}") is None
 
 
 def test_lingering_connections_of_a_killed_program_do_not_hold_its_port():
@@ -227,7 +227,7 @@ def test_programs_with_nodes_are_checked_for_their_open_files(master):
         program.line()
         (found,) = collect_facts(master.address).programs
         assert (found.pid, found.name) == (program.process.pid, "Pepper")
-        assert 5 < found.opened < 100
+        assert 5 < found.open_count < 100
         assert found.limit == 256 or sys.platform == "darwin"
 
 
@@ -238,7 +238,7 @@ def test_listener_on_another_address_of_a_port_does_not_hold_it_on_loopback():
             SimpleNamespace(status=listens, laddr=SimpleNamespace(ip=ip, port=7000), pid=pid)
             for ip, pid in (("127.0.0.1", 41), ("192.168.1.5", 77))
         ]
-        assert processes.holders(sockets[::order]) == {7000: 41}
+        assert processes.port_holders(sockets[::order]) == {7000: 41}
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="its python.exe may be a launcher of another process")
@@ -248,5 +248,5 @@ def test_program_passed_on_the_command_line_is_not_named_by_its_source():
         [sys.executable, "-c", text], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as child:
         child.stdout.readline()
-        assert "import" not in processes.describe(child.pid).name
+        assert "import" not in processes.process_fact(child.pid).name
         child.stdin.close()

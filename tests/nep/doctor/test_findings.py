@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from nep.programs.doctor import Facts, findings, report, to_plain, worst
+from nep.programs.doctor import Facts, exit_code, findings, report_text, to_plain
 from nep.programs.doctor.facts import (
     ClockFact,
     FileFact,
@@ -22,8 +22,8 @@ from nep.programs.doctor.installs import Install
 from nep.protocol.graph_view import Alert, GraphView, NodeInfo
 
 NOW = 1_800_000_000.0
-MASTER = ProcessFact(41, "nep", is_master=True, since_s=NOW - 7200)
-OTHER = ProcessFact(77, "python3 server.py", since_s=NOW - 5)
+MASTER = ProcessFact(41, "nep", is_master=True, started_s=NOW - 7200)
+OTHER = ProcessFact(77, "python3 server.py", started_s=NOW - 5)
 
 
 def node(name, generation="native"):
@@ -63,7 +63,7 @@ def found(severity=None, **changes):
 
 def test_healthy_computer_has_no_warning():
     made = findings(HEALTHY)
-    assert worst(made) == 0
+    assert exit_code(made) == 0
     assert found()["master"].sentence == (
         "A master has been running at 127.0.0.1:7780 (process 41) for 2.0 h: 2 nodes, 0 topics."
     )
@@ -133,7 +133,7 @@ def test_no_start_command_is_suggested_for_a_network_address():
     ],
 )
 def test_unreachable_remote_master_is_reported_with_the_kind_of_failure(reach, sentence, fix):
-    made = found(view=None, address="10.0.0.5:7780", master_port=None, reach=reach)
+    made = found(view=None, address="10.0.0.5:7780", master_port=None, reach_failure=reach)
     one = made["master:unreached"]
     assert (one.severity, one.command) == ("error", "")  # it can't be started from here
     assert one.sentence.startswith(sentence)
@@ -142,7 +142,7 @@ def test_unreachable_remote_master_is_reported_with_the_kind_of_failure(reach, s
 
 
 def test_no_start_command_is_suggested_for_an_unknown_host():
-    made = found(view=None, address="lap.top:7780", master_port=None, is_known=False)
+    made = found(view=None, address="lap.top:7780", master_port=None, is_host_known=False)
     assert (
         made["master:unknown"].sentence
         == "Can't find a computer named “lap.top”, so the master can't be reached."
@@ -165,7 +165,7 @@ def test_hung_or_slow_master_is_reported():
     assert hung.command == "kill 41"
     windows = found(view=None, master_port=PortFact(7780, "", True, MASTER), platform="win32")["master:hung"]
     assert windows.command == "taskkill /F /PID 41"
-    assert found(answered_s=0.8)["master:slow"].severity == "warning"
+    assert found(reply_time_s=0.8)["master:slow"].severity == "warning"
 
 
 def test_two_masters_are_reported_with_their_ports():
@@ -232,7 +232,7 @@ def test_other_program_on_port_7000_of_a_mac_is_not_called_airplay():
 def test_disabled_gateway_is_not_a_warning():
     one = found(ports=(PortFact(7000, "where old programs ask", False),))["ports:free"]
     assert (one.severity, one.fix) == ("info", "The master was started without its gateway.")
-    assert list(about_ports(joins_originals=False)) == ["ports"]
+    assert list(about_ports(is_gateway_enabled=False)) == ["ports"]
 
 
 def test_kill_channel_is_reported_as_information_only():
@@ -245,9 +245,9 @@ def test_installed_original_package_is_an_error_with_a_command():
     assert "nep 0.5.4.8" in one.sentence
     assert one.command.startswith("pip uninstall -y nep")
     assert "package" not in found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),))
-    both = found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),), strange_files=("publisher.py",))
+    both = found(packages=(PackageFact("nep", "0.5.4.8", "/somewhere"),), original_files=("publisher.py",))
     assert "package:files" not in both, "the first fix cures both"
-    left = found(strange_files=("publisher.py", "master.py"))["package:files"]
+    left = found(original_files=("publisher.py", "master.py"))["package:files"]
     assert "publisher.py, master.py" in left.sentence
     assert found(shadow="/home/me/nep.py")["package:shadow"].severity == "warning"
 
@@ -267,7 +267,7 @@ OTHER_JS = PackageFact("nep-js", "0.1.1", "/home/me/robot/node_modules/nep-js", 
 def test_foreign_nep_js_that_shadows_ours_is_a_warning(packages, severity, command):
     one = found(node_packages=packages)["package:nep-js"]
     assert (one.severity, one.command) == (severity, command)
-    assert packages[0].place in one.sentence
+    assert packages[0].location in one.sentence
     assert "package:nep-js" not in found()
 
 
@@ -324,19 +324,19 @@ def test_folders_clocks_and_loopback_problems_are_reported():
     ].sentence == ("Settings can't be saved in /state: permission denied.")
     assert "3.2 s ahead" in found(clocks=(ClockFact("lab", 3.21),))["clock:lab"].sentence
     assert found(now_s=1000.0)["clock"].severity == "warning"
-    one = found(loopback="network is unreachable")["loopback"]
+    one = found(loopback_problem="network is unreachable")["loopback"]
     assert (one.severity, one.command) == ("error", "ip link set lo up")
 
 
 def test_findings_are_sorted_by_severity_and_the_worst_sets_the_exit_code():
     made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False), shadow="x"))
     assert [each.severity for each in made][:2] == ["error", "warning"]
-    assert worst(made) == 2
+    assert exit_code(made) == 2
 
 
 def test_report_is_plain_text_with_fixes():
     made = findings(replace(HEALTHY, view=None, master_port=PortFact(7780, "", False)))
-    lines = report(made).splitlines()
+    lines = report_text(made).splitlines()
     assert lines[:3] == [
         "x No master is running at 127.0.0.1:7780, so new programs can't find each other.",
         "    Start a master.",

@@ -13,16 +13,16 @@ import typer
 
 import nep
 from nep.cli.doctor import doctor
-from nep.programs.doctor import TopicFacts, collect_topic, diagnose, meant_topic, topic_findings
+from nep.programs.doctor import TopicFacts, closest_topic, collect_topic, diagnose, topic_findings
 from nep.programs.doctor.facts import PublisherFact
-from nep.programs.doctor.listen import reach_of
+from nep.programs.doctor.listen import probe_endpoint
 from nep.protocol.graph_view import Alert
 
 NOW = 1_800_000_000.0
-CAMERA = PublisherFact("camera_driver", "lab", sent=18_204, last_s=NOW - 4)
+CAMERA = PublisherFact("camera_driver", "lab", sent=18_204, last_message_s=NOW - 4)
 MISSED = TopicFacts(
     "/robot/camera", NOW, "192.168.1.20:7780", is_shared=True, publishers=(CAMERA,),
-    others={"/robot/camera": 30.0, "/robot/depth": 60.0, "/once": None}, listened_s=1.5,
+    other_topics={"/robot/camera": 30.0, "/robot/depth": 60.0, "/once": None}, listen_duration_s=1.5,
 )  # fmt: skip
 
 
@@ -44,7 +44,7 @@ def test_silent_publisher_is_reported_with_its_duration_and_alternatives():
     (one,) = found(**publisher(remedies=("restart_camera",))).values()
     assert one.instead == "restart_camera"
     assert one.fix.endswith("Call its service “restart_camera” to restart it.")
-    (one,) = found(**publisher(sent=0, last_s=None)).values()
+    (one,) = found(**publisher(sent=0, last_message_s=None)).values()
     assert one.sentence == "“camera_driver” is connected but has sent nothing on /robot/camera yet."
     (one,) = found(**publisher(sent=None, generation="B")).values()  # nobody numbers what it sends
     assert "number" not in one.fix
@@ -71,13 +71,13 @@ def test_unpublished_topic_is_reported_with_the_intended_name():
     ],
 )
 def test_intended_topic_name_is_found(missed, meant):
-    assert meant_topic(missed, ["/camera", "/robot/depth"]) == meant
+    assert closest_topic(missed, ["/camera", "/robot/depth"]) == meant
 
 
 def test_topic_with_the_same_ending_is_suggested_only_if_unique():
-    assert meant_topic("/pose", ["/left/pose", "/right/pose"]) in {"/left/pose", "/right/pose", None}
-    assert meant_topic("/pose", []) is None
-    assert meant_topic("/pose", ["/pose"]) is None
+    assert closest_topic("/pose", ["/left/pose", "/right/pose"]) in {"/left/pose", "/right/pose", None}
+    assert closest_topic("/pose", []) is None
+    assert closest_topic("/pose", ["/pose"]) is None
 
 
 def test_missing_publisher_is_reported_with_the_published_topics():
@@ -85,8 +85,10 @@ def test_missing_publisher_is_reported_with_the_published_topics():
     assert nobody["topic:nobody"].fix.endswith("Topics published now: /once, /robot/camera and /robot/depth.")
     assert nobody["topic:closed"].severity == "info"
     many = {f"/t{number}": None for number in range(40)} | {"/nep/log": None}
-    assert found(topic="/x", publishers=(), others=many)["topic:nobody"].fix.endswith("/t12 and 35 more.")
-    alone = found(topic="/speech", publishers=(), others={})
+    assert found(topic="/x", publishers=(), other_topics=many)["topic:nobody"].fix.endswith(
+        "/t12 and 35 more."
+    )
+    alone = found(topic="/speech", publishers=(), other_topics={})
     assert (
         alone["topic:nobody"].fix
         == "Start the program that publishes it. No other topics are published either."
@@ -124,7 +126,7 @@ def test_missing_publisher_is_reported_with_the_published_topics():
     ],
 )
 def test_unreachable_publisher_address_is_reported(reach, sentence, fix):
-    (one,) = found(**publisher(endpoint="tcp://10.0.0.7:41000", reach=reach)).values()
+    (one,) = found(**publisher(endpoint="tcp://10.0.0.7:41000", reach_failure=reach)).values()
     assert (one.id, one.severity, one.sentence) == ("topic:address:camera_driver", "error", sentence)
     assert fix in one.fix
 
@@ -132,7 +134,7 @@ def test_unreachable_publisher_address_is_reported(reach, sentence, fix):
 def test_incompatible_versions_are_reported():
     (one,) = found(**publisher(generation="0.5.4.6")).values()
     assert (one.id, one.command) == ("topic:version:camera_driver", "pip install nep==0.5.4.8")
-    (wire,) = found(refused=12, **publisher(last_s=NOW)).values()
+    (wire,) = found(rejected=12, **publisher(last_message_s=NOW)).values()
     assert (
         wire.sentence == "Messages on /robot/camera come from a version of NEP that this version can't read."
     )
@@ -140,10 +142,12 @@ def test_incompatible_versions_are_reported():
 
 
 def test_received_messages_are_reported_as_readable_or_unreadable():
-    assert [each.severity for each in found(received=1, **publisher(last_s=NOW)).values()] == ["ok"]
-    bad = found(received=1, unreadable="it is not valid JSON", **publisher(last_s=NOW))["topic:unreadable"]
+    assert [each.severity for each in found(received=1, **publisher(last_message_s=NOW)).values()] == ["ok"]
+    bad = found(received=1, decode_problem="it is not valid JSON", **publisher(last_message_s=NOW))[
+        "topic:unreadable"
+    ]
     assert bad.sentence == "Messages on /robot/camera arrive but can't be read: it is not valid JSON."
-    blocked = found(**publisher(last_s=NOW))["topic:blocked"]
+    blocked = found(**publisher(last_message_s=NOW))["topic:blocked"]
     assert blocked.sentence.startswith(
         "camera_driver (lab) sends /robot/camera, but no messages were received"
     )
@@ -165,14 +169,14 @@ def test_endpoint_reachability_is_checked(monkeypatch):
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         place = f"tcp://127.0.0.1:{server.getsockname()[1]}"
-        assert reach_of(place) == "refused"  # it is bound, and nobody listens
+        assert probe_endpoint(place) == "refused"  # it is bound, and nobody listens
         server.listen(1)
-        assert reach_of(place) == ""
-    assert reach_of("ipc://@nep-7780") == ""  # not by the network
+        assert probe_endpoint(place) == ""
+    assert probe_endpoint("ipc://@nep-7780") == ""  # not by the network
 
     for error, reach in ((TimeoutError(), "timeout"), (OSError("no route to host"), "unknown")):
         monkeypatch.setattr(socket, "create_connection", Mock(side_effect=error))
-        assert reach_of("tcp://10.255.255.1:80") == reach
+        assert probe_endpoint("tcp://10.255.255.1:80") == reach
 
 
 def test_published_topics_of_a_running_master_are_diagnosed(master):
@@ -186,7 +190,7 @@ def test_published_topics_of_a_running_master_are_diagnosed(master):
         facts = collect_topic("/arm/pose", master.address)
         assert facts is not None
         (one,) = facts.publishers
-        assert (one.node, one.reach) == ("arm", "")
+        assert (one.node, one.reach_failure) == ("arm", "")
         assert one.endpoint.startswith("tcp://127.0.0.1:")
         (silent,) = [each for each in topic_findings(facts) if each.severity == "error"]
         assert silent.id in {"topic:silent:arm", "topic:blocked"}  # by how new the master's figures are

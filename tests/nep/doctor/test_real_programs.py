@@ -11,9 +11,9 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from nep.programs.doctor import collect_topic, diagnose, start_obstacle, topic_findings
-from nep.programs.doctor.diagnosis import PARTS
-from nep.programs.doctor.listen import reach_of
+from nep.programs.doctor import collect_topic, diagnose, start_blocker, topic_findings
+from nep.programs.doctor.diagnosis import CHECKS
+from nep.programs.doctor.listen import probe_endpoint
 from tests.nep.programs import running
 
 SENDER = """
@@ -54,7 +54,7 @@ def test_publisher_reachable_only_from_its_own_computer_is_reported(own: str) ->
             facts = collect_topic("/arm/pose", f"{own}:{port}")
             assert facts is not None
             (found,) = [each for each in topic_findings(facts) if each.severity == "error"]
-    assert (found.id, facts.publishers[0].reach) == ("topic:address:arm", "elsewhere")
+    assert (found.id, facts.publishers[0].reach_failure) == ("topic:address:arm", "elsewhere")
     assert "“arm” can be reached only from its own computer" in found.sentence
 
 
@@ -67,9 +67,9 @@ def test_killed_publisher_is_unreachable(master: Master) -> None:
                 for each in node.graph(30.0).topics["/arm/pose"].publishers[0].endpoints
                 if each.startswith("tcp://127.")
             ]
-        assert reach_of(place) == ""
+        assert probe_endpoint(place) == ""
         program.kill()
-        assert reach_of(place) == "refused"
+        assert probe_endpoint(place) == "refused"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a full queue refuses")
@@ -83,7 +83,7 @@ def test_unanswered_endpoint_is_a_timeout() -> None:
             for each in waiting:
                 each.setblocking(False)
                 each.connect_ex(place)
-            assert reach_of(f"tcp://{place[0]}:{place[1]}") == "timeout"
+            assert probe_endpoint(f"tcp://{place[0]}:{place[1]}") == "timeout"
         finally:
             for each in waiting:
                 each.close()
@@ -98,13 +98,13 @@ def test_master_without_listen_option_is_not_reported_as_hung(master: Master, ow
 
 
 def test_no_master_can_be_started_at_a_network_address(master: Master, own: str) -> None:
-    closed = start_obstacle(f"{own}:{port_of(master.address)}")
+    closed = start_blocker(f"{own}:{port_of(master.address)}")
     assert closed is not None
     assert closed.id == "master:closed"
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         free = probe.getsockname()[1]
-    nobody = start_obstacle(f"{own}:{free}")
+    nobody = start_blocker(f"{own}:{free}")
     assert nobody is not None
     assert (nobody.id, nobody.command) == ("master:network", "")
     assert f"start at 127.0.0.1:{free}" in nobody.sentence
@@ -116,7 +116,7 @@ def test_progress_reports_lead_to_the_same_final_result(master: Master) -> None:
     found = diagnose(master.address, "/arm/pose", tell=lambda *each: told.append(each))
     done = [done for _found, done, _count in told]
     assert done == sorted(done)
-    assert {count for _found, _done, count in told} == {done[-1]} == {len(PARTS) + 1}
+    assert {count for _found, _done, count in told} == {done[-1]} == {len(CHECKS) + 1}
     ids = [{each.id for each in some} for some, _done, _count in told]
     assert all(fewer <= more for fewer, more in pairwise(ids))
     assert {each.id for each in found} == ids[-1] >= {"topic:nobody"}

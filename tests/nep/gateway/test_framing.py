@@ -12,7 +12,7 @@ from nep.programs.gateway.framing import (
     Shape,
     codec_of,
     framing_of,
-    lost_numbers,
+    has_replaced_nan,
     shield_csharp,
     shield_javascript,
 )
@@ -118,7 +118,7 @@ def test_numbers_replaced_by_null_are_detected():
         (b"[null]", False),
     ):
         frame = b"t " + said
-        assert lost_numbers(frame, shape.read(frame)) is is_lost
+        assert has_replaced_nan(frame, shape.read(frame)) is is_lost
 
 
 def test_word_nan_in_a_string_is_unchanged():
@@ -145,11 +145,11 @@ def test_nep_0546_is_recognised_by_its_filter():
 
 def test_filter_matches_a_line_if_it_can_match_a_frame():
     prefixed, bare = Shape("test", "prefixed", "json"), Shape("test", "bare", "json")
-    assert prefixed.wants(b"test")
-    assert prefixed.wants(b"")
-    assert not prefixed.wants(b"test2")
-    assert bare.wants(b"")
-    assert not bare.wants(b"test")
+    assert prefixed.matches_filter(b"test")
+    assert prefixed.matches_filter(b"")
+    assert not prefixed.matches_filter(b"test2")
+    assert bare.matches_filter(b"")
+    assert not bare.matches_filter(b"test")
 
 
 @given(JSON_VALUES, st.text(alphabet="abe1n ü日", min_size=1, max_size=3))

@@ -9,7 +9,7 @@ from nep.masters.graph import Graph
 from nep.programs.gateway.graph_registrar import GraphRegistrar
 from nep.programs.gateway.processes import load_of
 from nep.programs.gateway.programs import OriginalProgram, TopicLink
-from nep.protocol.requests import Look
+from nep.protocol.requests import QueryGraph
 from nep.system.cpu import CpuLoad
 
 EPOCH = 77
@@ -26,11 +26,11 @@ class RequestServer:
 
     def submit(self, request):
         out = self.graph.apply(request, next(self._calls), self.now, "")
-        self.replies.append(out[-1].answer)
+        self.replies.append(out[-1].body)
         return self.replies[-1]
 
     def view(self):
-        return self.submit(Look()).view
+        return self.submit(QueryGraph()).view
 
 
 @pytest.fixture

@@ -6,7 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nep.programs.gateway.requests import Member, RequestError, broadcast, grant, read_request, refuse
+from nep.programs.gateway.requests import (
+    Member,
+    RequestError,
+    encode_broadcast,
+    encode_grant,
+    encode_rejection,
+    parse_request,
+)
 from tests import hostile
 
 ASKED = {
@@ -21,7 +28,7 @@ ASKED = {
 
 def ask(port=7000, **changes):
     fields = {key: value for key, value in {**ASKED, **changes}.items() if value is not ...}
-    return read_request(json.dumps(fields).encode(), port)
+    return parse_request(json.dumps(fields).encode(), port)
 
 
 def test_request_of_the_python_library_is_parsed():
@@ -50,10 +57,10 @@ def test_missing_type_and_mode_use_the_original_defaults():
 
 
 def test_reply_has_the_shape_and_order_that_the_originals_expect():
-    assert grant(ask(), 9000) == (
+    assert encode_grant(ask(), 9000) == (
         b'{"topic":"t1","port":9000,"mode":"many2many","ip":"127.0.0.1","socket":"publisher","state":"success"}'
     )
-    assert b"mode" not in grant(ask(socket="server"), 9000)
+    assert b"mode" not in encode_grant(ask(socket="server"), 9000)
 
 
 @pytest.mark.parametrize(
@@ -75,8 +82,8 @@ def test_reply_has_the_shape_and_order_that_the_originals_expect():
 )
 def test_invalid_request_is_answered_with_a_message(data, sentence):
     with pytest.raises(RequestError, match=sentence) as caught:
-        read_request(data, 7000)
-    answer = json.loads(refuse(caught.value))
+        parse_request(data, 7000)
+    answer = json.loads(encode_rejection(caught.value))
     assert answer["state"] == "failure"
     assert sentence in answer["error"]
 
@@ -84,18 +91,18 @@ def test_invalid_request_is_answered_with_a_message(data, sentence):
 def test_rejection_names_the_topic_which_the_originals_compare():
     with pytest.raises(RequestError) as caught:
         ask(node=...)
-    assert json.loads(refuse(caught.value))["topic"] == "t1"
+    assert json.loads(encode_rejection(caught.value))["topic"] == "t1"
 
 
 @given(st.binary(max_size=300))
 def test_random_bytes_are_rejected_without_a_crash(data):
     with pytest.raises(RequestError) as caught:
-        read_request(data, 50000)
-    assert json.loads(refuse(caught.value))["state"] == "failure"
+        parse_request(data, 50000)
+    assert json.loads(encode_rejection(caught.value))["state"] == "failure"
 
 
 def test_broadcast_has_the_prefix_and_shape_of_the_originals():
-    frame = broadcast(
+    frame = encode_broadcast(
         [
             Member("t1", "n1", 9000, "publisher", "many2many", "json", 3346),
             Member("t1", "n2", 9000, "subscriber", "many2many", "json", None),
@@ -116,7 +123,7 @@ def test_broadcast_has_the_prefix_and_shape_of_the_originals():
         },
     }
     assert "mode" not in topics["s"]
-    assert broadcast([]) == b"master {}"
+    assert encode_broadcast([]) == b"master {}"
 
 
 def test_hostile_requests_are_granted_or_rejected_with_a_message():
@@ -131,8 +138,8 @@ def test_hostile_requests_are_granted_or_rejected_with_a_message():
     answers = []
     for data in hostile.payloads(told):
         try:
-            answers.append(grant(read_request(data, 7000), 9000))
+            answers.append(encode_grant(parse_request(data, 7000), 9000))
         except RequestError as error:
-            answers.append(refuse(error))
+            answers.append(encode_rejection(error))
     assert {json.loads(answer)["state"] for answer in answers} == {"success", "failure"}
     assert max(map(len, answers)) < 30_000

@@ -24,13 +24,14 @@ from nep.protocol.requests import (
     AddSubscriber,
     Done,
     Found,
+    GraphReply,
     Join,
     Leave,
-    Look,
     NodeRecord,
     PublisherCount,
-    PublisherGone,
     PublisherRecord,
+    PublisherRemoved,
+    QueryGraph,
     Refused,
     RemovePublisher,
     RemoveSubscriber,
@@ -39,7 +40,6 @@ from nep.protocol.requests import (
     Reply,
     ReportMissing,
     Request,
-    Seen,
     SubscriberCount,
     SubscriberRecord,
     id_from,
@@ -74,7 +74,7 @@ class Attacker:
         call = self.send(request)
         while True:
             assert self.socket.poll(5000), "the master does not answer"
-            number, answer = encoding.decode_answer(self.socket.recv())
+            number, answer = encoding.decode_reply(self.socket.recv())
             if number == call and isinstance(answer, Reply):
                 return answer
 
@@ -393,10 +393,10 @@ def test_number_of_publishers_per_node_is_limited(master: Master) -> None:
 def test_key_of_a_node_is_never_disclosed(master: Master, victims: Victims) -> None:
     with attacker_at(master) as attacker:
         answers = [
-            attacker.ask(Look()),
+            attacker.ask(QueryGraph()),
             attacker.ask(AddSubscriber(node(), SubscriberRecord(5, "/arm/state", "json"))),
         ]
-        assert isinstance(answers[0], Seen)
+        assert isinstance(answers[0], GraphReply)
     keys = [victims.arm._key, victims.eye._key]
     for told in (repr(answers), repr(master.view()), repr(NodeRecord("a", "b", "c", 1, key=keys[0]))):
         assert not any(key in told for key in keys)
@@ -411,8 +411,8 @@ def test_eviction_of_a_squatter_is_announced_to_subscribers_before_the_owner(mas
         assert isinstance(squatter.ask(AddPublisher(node(), replace(real, number=0))), Added)
         owned = NodeRecord(node_id_from("k"), "Owner", "host", 1, key="k")
         assert isinstance(owner.ask(AddPublisher(owned, real)), Added)
-        came, gone, again = (encoding.decode_answer(ear.socket.recv())[1] for _ in range(3))
-        assert isinstance(gone, PublisherGone)
+        came, gone, again = (encoding.decode_reply(ear.socket.recv())[1] for _ in range(3))
+        assert isinstance(gone, PublisherRemoved)
         assert not gone.is_closed
         assert [each.publisher.node_name for each in (came, again)] == ["Mallory", "Owner"]
 

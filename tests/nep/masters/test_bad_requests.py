@@ -77,7 +77,7 @@ def test_master_logs_the_first_bad_request_then_rarely_and_raises_an_alert(
                 socket.connect(f"tcp://{master.address}")
                 socket.send(b"\xc1" if n % 2 else pack({"do": "fly", "call": 3}))
                 assert socket.poll(2000)
-                assert isinstance(encoding.decode_answer(socket.recv())[1], Refused)
+                assert isinstance(encoding.decode_reply(socket.recv())[1], Refused)
         eventually(lambda: any(" 25 requests " in each.sentence for each in node.graph().alerts))
         (alert,) = node.graph().alerts
     context.term()
@@ -97,6 +97,6 @@ def test_malformed_renewal_counts_as_a_bad_request(master: Master) -> None:
         socket.connect(f"tcp://{master.address}")
         socket.send(pack({"do": "renew", "call": 3, "what": [1]}))
         assert socket.poll(2000)
-        assert isinstance(encoding.decode_answer(socket.recv())[1], Refused)
+        assert isinstance(encoding.decode_reply(socket.recv())[1], Refused)
     context.term()
     eventually(lambda: bool(master.view().alerts))

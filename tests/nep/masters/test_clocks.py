@@ -64,8 +64,8 @@ def renewal(graph: Graph, number: int, clock: tuple[int, ...] | None) -> Renew:
 
 def renewed(graph: Graph, number: int, clock: tuple[int, ...] | None, now: float = 1.0) -> Renewed:
     (answer,) = graph.apply(renewal(graph, number, clock), 7, now, f"n{number}")
-    assert isinstance(answer.answer, Renewed)
-    return answer.answer
+    assert isinstance(answer.body, Renewed)
+    return answer.body
 
 
 def test_node_receives_the_summed_clock_offset_of_both_paths() -> None:
@@ -78,8 +78,8 @@ def test_node_receives_the_summed_clock_offset_of_both_paths() -> None:
 
 def test_nodes_on_the_master_computer_need_no_clock_exchange() -> None:
     graph = graph_of(MASTERS, "c2")
-    assert not graph.clocks.times(graph.members["n0"], 5)
-    assert graph.clocks.times(graph.members["n1"], 5, lambda: 6) == (5, 6)
+    assert not graph.clocks.renewal_timestamps(graph.members["n0"], 5)
+    assert graph.clocks.renewal_timestamps(graph.members["n1"], 5, lambda: 6) == (5, 6)
     renewed(graph, 1, (-S, 400))
     assert renewed(graph, 0, ()).clocks == {"n1": (-S, 400)}
     assert graph.view().nodes["n0"].clock_uncertainty_ns == 0
@@ -154,7 +154,7 @@ def test_fast_path_gives_the_same_clock_reply(clock: tuple[int, ...] | None) -> 
     assert said is not None
     assert said.clock == clock
     body = quick_answer(quick, said, times=(1, 2))
-    assert encoding.decode_answer(body) == (7, replace(renewed(long, 0, clock), times=(1, 2)))
+    assert encoding.decode_reply(body) == (7, replace(renewed(long, 0, clock), times=(1, 2)))
 
 
 def quick_answer(graph: Graph, said: RawRenewal, **more: Any) -> bytes:
@@ -178,8 +178,8 @@ def test_messages_of_older_nodes_and_masters_are_unchanged() -> None:
 def test_subscriber_receives_the_computer_id_of_a_publisher() -> None:
     graph = graph_of("c1", "c2")
     (answer,) = graph.apply(replace(joining(0, "c1", 2), epoch=EPOCH), 1, 0.0, "n0")
-    assert isinstance(answer.answer, Found)
-    assert [each.computer for each in answer.answer.publishers] == ["c2"]
+    assert isinstance(answer.body, Found)
+    assert [each.computer for each in answer.body.publishers] == ["c2"]
 
 
 @pytest.mark.parametrize("computer", ["x" * 65, "a\nb"])
@@ -187,5 +187,5 @@ def test_invalid_computer_id_is_rejected(computer: str) -> None:
     graph = Graph(EPOCH, 0.0, 0.0)
     join = Join(NodeRecord("0123456789abcdef", "n", "h", 1, computer=computer))
     (answer,) = graph.apply(join, 1, 0.0, "0123456789abcdef", is_foreign=True)
-    assert isinstance(answer.answer, Refused)
-    assert "computer" in answer.answer.reason
+    assert isinstance(answer.body, Refused)
+    assert "computer" in answer.body.reason

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from nep.masters.departed import Departed
+from nep.masters.departed import DepartedPublishers
 from nep.masters.graph import Graph
 from nep.protocol.requests import (
     AddPublisher,
@@ -19,29 +19,29 @@ from nep.protocol.requests import (
 
 
 def test_newest_departed_publishers_are_kept_for_a_minute_and_bounded() -> None:
-    departed: Departed[str] = Departed()
+    departed: DepartedPublishers[str] = DepartedPublishers()
     for number in range(100):
         departed.add(("t", "**"), number, f"{number}")
-    assert list(departed.of("t")) == list(departed.of("**")) == list(range(36, 100))
+    assert list(departed.for_topic("t")) == list(departed.for_topic("**")) == list(range(36, 100))
     departed.tick(10.0)
     departed.add(("t",), 99, "again")  # it came back, and ended again
     departed.tick(69.0)
-    assert departed.of("t")[99] == "again"
-    assert 99 not in departed.of("**")
+    assert departed.for_topic("t")[99] == "again"
+    assert 99 not in departed.for_topic("**")
     before = departed.changes
     departed.tick(70.0)
-    assert list(departed.of("t")) == [99]
+    assert list(departed.for_topic("t")) == [99]
     assert departed.changes > before
     departed.tick(129.0)
-    assert not departed.of("t")
+    assert not departed.for_topic("t")
 
 
 def test_total_number_of_departed_publishers_is_bounded() -> None:
-    departed: Departed[int] = Departed()
+    departed: DepartedPublishers[int] = DepartedPublishers()
     for number in range(5000):
         departed.add((f"topic {number}",), number, number)
-    assert sum(len(departed.of(f"topic {number}")) for number in range(5000)) == 1000
-    assert departed.of("topic 4999")
+    assert sum(len(departed.for_topic(f"topic {number}")) for number in range(5000)) == 1000
+    assert departed.for_topic("topic 4999")
 
 
 def node(name: str) -> NodeRecord:
@@ -52,7 +52,7 @@ def renewed(graph: Graph, who: NodeRecord, now: float, *counts: PublisherCount) 
     """What a node is told with its renewal."""
     heard = () if counts else (SubscriberCount(2, 0, 0), SubscriberCount(3, 0, 0))
     out = graph.apply(Renew(who.id, graph.epoch, 0, counts, heard), 1, now, who.id)
-    (answer,) = (each.answer for each in out if each.call == 1)
+    (answer,) = (each.body for each in out if each.call == 1)
     assert isinstance(answer, Renewed)
     assert not answer.again
     return dict(answer.last_seqs)

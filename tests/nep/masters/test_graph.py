@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nep.errors import WireError
-from nep.masters.graph import Graph, Outgoing, without
+from nep.masters.graph import Graph, Outgoing, without_nodes
 from nep.masters.rates import Meter
 from nep.messages.packing import pack
 from nep.protocol import encoding
@@ -17,18 +17,19 @@ from nep.protocol.requests import (
     AddPublisher,
     AddSubscriber,
     Done,
-    Expected,
+    ExpectedSubscriber,
     Found,
+    GraphReply,
     Join,
     Leave,
-    Look,
     NodeRecord,
     Ping,
     Probe,
-    PublisherCame,
+    PublisherAdded,
     PublisherCount,
-    PublisherGone,
     PublisherRecord,
+    PublisherRemoved,
+    QueryGraph,
     Refused,
     RemovePublisher,
     RemoveSubscriber,
@@ -36,7 +37,6 @@ from nep.protocol.requests import (
     Renewed,
     ReportMissing,
     Request,
-    Seen,
     SubscriberCount,
     SubscriberRecord,
 )
@@ -69,11 +69,11 @@ def test_publisher_is_told_its_subscribers_after_they_are_notified(graph: Graph)
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     push, reply = ask(graph, AddPublisher(node("p"), publisher(2)))
     assert (push.to, push.call) == ("s", None)
-    assert isinstance(push.answer, PublisherCame)
-    assert (push.answer.publisher.publisher, push.answer.publisher.node_name) == (publisher(2), "P")
+    assert isinstance(push.body, PublisherAdded)
+    assert (push.body.publisher.publisher, push.body.publisher.node_name) == (publisher(2), "P")
     assert (reply.to, reply.call) == ("asker", 1)
-    assert isinstance(reply.answer, Added)
-    assert (reply.answer.epoch, reply.answer.expected) == (7, (Expected(1, "s", "S"),))
+    assert isinstance(reply.body, Added)
+    assert (reply.body.epoch, reply.body.expected) == (7, (ExpectedSubscriber(1, "s", "S"),))
 
 
 def test_only_the_first_notice_of_a_publisher_marks_it_as_new(graph: Graph) -> None:
@@ -81,17 +81,17 @@ def test_only_the_first_notice_of_a_publisher_marks_it_as_new(graph: Graph) -> N
     moved = publisher(2, at="tcp://127.0.0.1:6")
     rejoined = Join(node("p"), 3, (moved, publisher(3)), ())
     requests = [AddPublisher(node("p"), publisher(2)), AddPublisher(node("p"), moved), rejoined]
-    notices = [each.answer for request in requests for each in ask(graph, request)]
-    assert [each.is_new for each in notices if isinstance(each, PublisherCame)] == [True, False, False]
+    notices = [each.body for request in requests for each in ask(graph, request)]
+    assert [each.is_new for each in notices if isinstance(each, PublisherAdded)] == [True, False, False]
 
 
 def test_unlisted_publisher_that_returns_with_another_endpoint_is_not_new(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
-    graph.drop(["p"])
+    graph.unregister_nodes(["p"])
     push, _reply = ask(graph, AddPublisher(node("p"), publisher(2, at="tcp://127.0.0.1:6")))
-    assert isinstance(push.answer, PublisherCame)
-    assert not push.answer.is_new
+    assert isinstance(push.body, PublisherAdded)
+    assert not push.body.is_new
 
 
 def test_node_with_two_subscribers_is_notified_once(graph: Graph) -> None:
@@ -105,23 +105,28 @@ def test_subscriber_receives_the_publishers_which_are_probed(graph: Graph) -> No
     ask(graph, AddPublisher(node("p"), publisher(1)))
     ask(graph, AddPublisher(node("original", "A"), publisher(2, at="")))
     probe, reply = ask(graph, AddSubscriber(node("s"), subscriber(3)))
-    assert (probe.to, type(probe.answer)) == ("p", Probe)
-    assert isinstance(reply.answer, Found)
-    assert [each.publisher.id for each in reply.answer.publishers] == [1]
-    assert without(reply.answer, frozenset({"p"})) == Found(7, graph.revision)
+    assert (probe.to, type(probe.body)) == ("p", Probe)
+    assert isinstance(reply.body, Found)
+    assert [each.publisher.id for each in reply.body.publishers] == [1]
+    assert without_nodes(reply.body, frozenset({"p"})) == Found(7, graph.revision)
 
 
 def test_dead_subscribers_are_not_expected() -> None:
-    answer = Added(1, 1, (Expected(1, "a", "A"), Expected(2, "b", "B")), (Expected(3, "a", "A"),))
-    assert without(answer, frozenset({"a"})) == Added(1, 1, (Expected(2, "b", "B"),), ())
-    assert without(answer, frozenset()) is answer
+    answer = Added(
+        1,
+        1,
+        (ExpectedSubscriber(1, "a", "A"), ExpectedSubscriber(2, "b", "B")),
+        (ExpectedSubscriber(3, "a", "A"),),
+    )
+    assert without_nodes(answer, frozenset({"a"})) == Added(1, 1, (ExpectedSubscriber(2, "b", "B"),), ())
+    assert without_nodes(answer, frozenset()) is answer
 
 
 def test_invalid_topic_is_rejected(graph: Graph) -> None:
     (reply,) = ask(graph, AddPublisher(node("p"), publisher(1, "two words")))
-    assert isinstance(reply.answer, Refused)
-    assert reply.answer.code == "topic"
-    assert "'two words'" in reply.answer.reason
+    assert isinstance(reply.body, Refused)
+    assert reply.body.code == "topic"
+    assert "'two words'" in reply.body.reason
     assert graph.nodes == ()
 
 
@@ -129,12 +134,12 @@ def test_orderly_leave_carries_the_last_message_number(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     push, reply = ask(graph, RemovePublisher("p", 2, last_seq=5))
-    assert push.answer == PublisherGone(7, graph.revision, 2, "t", is_closed=True, last_seq=5)
-    assert isinstance(reply.answer, Done)
+    assert push.body == PublisherRemoved(7, graph.revision, 2, "t", is_closed=True, last_seq=5)
+    assert isinstance(reply.body, Done)
     ask(graph, AddPublisher(node("p"), publisher(3)))
     push, _reply = ask(graph, Leave("p"))
-    assert isinstance(push.answer, PublisherGone)
-    assert push.answer.is_closed
+    assert isinstance(push.body, PublisherRemoved)
+    assert push.body.is_closed
     ask(graph, RemoveSubscriber("s", 1))
     assert graph.view().topics == {}
     assert [each.id for each in graph.nodes] == ["s"]
@@ -144,24 +149,24 @@ def test_expired_lease_unlists_a_publisher_without_closing_it(graph: Graph) -> N
     ask(graph, AddSubscriber(node("s"), subscriber(1)), 0.0)
     ask(graph, AddPublisher(node("p"), publisher(2)), 0.0)
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 0, 0),)), 2.0)
-    assert [each.to for each in graph.silent(2.0)] == ["p"]
+    assert [each.to for each in graph.probes_for_overdue(2.0)] == ["p"]
     assert graph.tick(2.9) == ()
     (push,) = graph.tick(3.0)
-    assert isinstance(push.answer, PublisherGone)
-    assert (push.to, push.answer.is_closed) == ("s", False)
+    assert isinstance(push.body, PublisherRemoved)
+    assert (push.to, push.body.is_closed) == ("s", False)
     (reply,) = ask(graph, Renew("p", 7, 0, (PublisherCount(2, 1, 1, 1),)), 4.0)
-    assert isinstance(reply.answer, Renewed)
-    assert reply.answer.again
+    assert isinstance(reply.body, Renewed)
+    assert reply.body.again
 
 
 def test_managed_nodes_have_no_lease_and_receive_no_pushes(graph: Graph) -> None:
     ask(graph, Join(node("o", "A"), 0, (publisher(1, at=""),), (subscriber(2),), managed=True))
-    assert graph.silent(100.0) == ()
+    assert graph.probes_for_overdue(100.0) == ()
     assert graph.tick(100.0) == ()
     outgoing = ask(graph, AddPublisher(node("p"), publisher(3)))
     assert [each.to for each in outgoing] == ["asker"]
-    assert isinstance(outgoing[0].answer, Added)
-    assert outgoing[0].answer.expected == ()
+    assert isinstance(outgoing[0].body, Added)
+    assert outgoing[0].body.expected == ()
     assert graph.view().nodes["o"].generation == "A"
 
 
@@ -173,12 +178,12 @@ def test_renewals_update_statistics_and_return_changes(graph: Graph) -> None:
         count = PublisherCount(2, 20 * second, 2000 * second, 20 * second, second)
         ask(graph, Renew("p", 7, 0, (count,)), float(second))
     (reply,) = ask(graph, Renew("s", 7, before, (), (SubscriberCount(1, 30, 10),)), 2.0)
-    assert isinstance(reply.answer, Renewed)
-    assert [each.topic for each in reply.answer.topics] == ["t"]
-    assert reply.answer.last_seqs == {2: 40}
+    assert isinstance(reply.body, Renewed)
+    assert [each.topic for each in reply.body.topics] == ["t"]
+    assert reply.body.last_seqs == {2: 40}
     (reply,) = ask(graph, Renew("s", 7, graph.revision, (), (SubscriberCount(1, 30, 10),)), 2.0)
-    assert isinstance(reply.answer, Renewed)
-    assert reply.answer.topics == ()
+    assert isinstance(reply.body, Renewed)
+    assert reply.body.topics == ()
     topic = graph.view().topics["t"]
     assert (topic.rate_hz, topic.bandwidth_Bps, topic.last_stamp_ns) == (20.0, 2000.0, 2)
     assert (topic.lost, topic.loss_ratio) == (10, 0.25)
@@ -198,15 +203,15 @@ def test_mismatching_renewal_requests_a_full_join(graph: Graph, epoch: int) -> N
     ask(graph, AddPublisher(node("p"), publisher(2)))
     counts = () if epoch == 7 else (PublisherCount(2, 0, 0, 0),)
     (reply,) = ask(graph, Renew("p", epoch, 0, counts))
-    assert isinstance(reply.answer, Renewed)
-    assert reply.answer.again
+    assert isinstance(reply.body, Renewed)
+    assert reply.body.again
 
 
 def test_join_replaces_the_previous_registration(graph: Graph) -> None:
     ask(graph, AddSubscriber(node("s"), subscriber(1)))
     ask(graph, AddPublisher(node("p"), publisher(2)))
     outgoing = ask(graph, Join(node("p"), 3, (publisher(4),), (subscriber(5),)))
-    assert [type(each.answer) for each in outgoing] == [PublisherCame, PublisherCame, Found]
+    assert [type(each.body) for each in outgoing] == [PublisherAdded, PublisherAdded, Found]
     topic = graph.view().topics["t"]
     assert [each.id for each in topic.publishers] == [4]
     assert sorted(each.id for each in topic.subscribers) == [1, 5]
@@ -220,8 +225,8 @@ def test_restarted_master_accepts_known_nodes_before_new_ones() -> None:
     assert graph.tick(0.9) == ()
     push, reply = graph.tick(1.0)
     assert (push.to, reply.to, reply.call) == ("old", "asker", 1)
-    assert isinstance(reply.answer, Added)
-    assert [each.id for each in reply.answer.expected] == [2]
+    assert isinstance(reply.body, Added)
+    assert [each.id for each in reply.body.expected] == [2]
     assert graph.learning_end is None
 
 
@@ -232,8 +237,8 @@ def test_unresponsive_node_is_an_alert_until_it_renews(graph: Graph) -> None:
     (alert,) = graph.view().alerts
     assert (alert.id, alert.sentence) == ("missing:s", "“S” does not respond to “P”")
     _push, reply = ask(graph, AddPublisher(node("p"), publisher(3)))
-    assert isinstance(reply.answer, Added)
-    assert (reply.answer.expected, reply.answer.hung) == ((), (Expected(1, "s", "S"),))
+    assert isinstance(reply.body, Added)
+    assert (reply.body.expected, reply.body.hung) == ((), (ExpectedSubscriber(1, "s", "S"),))
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 0, 0),)))
     assert graph.view().alerts == ()
 
@@ -269,7 +274,7 @@ REQUESTS: list[Request] = [
     Renew("a", 1, 2, (PublisherCount(1, 2, 3, 4, 5),), (SubscriberCount(1, None, None, "p"),)),
     Renew("a", 1, 2, cpu_ratio=0.25),
     ReportMissing("a", 1, (2, 3)),
-    Look(),
+    QueryGraph(),
     Ping(),
 ]
 
@@ -285,17 +290,17 @@ def test_answers_round_trip(graph: Graph) -> None:
     ask(graph, Renew("s", 7, 0, (), (SubscriberCount(1, 5, 5),)))
     for request in REQUESTS:
         for each in ask(graph, request):
-            assert encoding.decode_answer(encoding.encode_answer(each.answer, 3)) == (3, each.answer)
-    (seen,) = ask(graph, Look())
-    assert isinstance(seen.answer, Seen)
-    assert isinstance(seen.answer.view, GraphView)
+            assert encoding.decode_reply(encoding.encode_reply(each.body, 3)) == (3, each.body)
+    (seen,) = ask(graph, QueryGraph())
+    assert isinstance(seen.body, GraphReply)
+    assert isinstance(seen.body.view, GraphView)
 
 
 @given(st.binary(max_size=50))
 def test_any_bytes_decode_to_a_request_or_a_wire_error(body: bytes) -> None:
-    assert isinstance(encoding.decode_request(body).request, WireError | Ping | Look)
+    assert isinstance(encoding.decode_request(body).request, WireError | Ping | QueryGraph)
     with pytest.raises(WireError):
-        encoding.decode_answer(body)
+        encoding.decode_reply(body)
 
 
 @given(
@@ -336,8 +341,8 @@ def test_wildcard_subscribers_are_listed_as_patterns_and_round_trip(graph: Graph
     assert list(seen.topics) == ["/robot/a/camera"]
     pattern = seen.patterns["/robot/*/camera"]
     assert (pattern.msg_type, [each.node_id for each in pattern.subscribers]) == ("image", ["s"])
-    body = encoding.encode_answer(Seen(7, graph.revision, seen), 3)
-    assert encoding.decode_answer(body) == (3, Seen(7, graph.revision, seen))
+    body = encoding.encode_reply(GraphReply(7, graph.revision, seen), 3)
+    assert encoding.decode_reply(body) == (3, GraphReply(7, graph.revision, seen))
     assert seen.to_plain()["patterns"][0]["name"] == "/robot/*/camera"  # type: ignore[index]
     ask(graph, AddPublisher(node("p"), publisher(3, "/robot/*/camera")))  # a name as any other
     assert set(graph.view().topics) == {"/robot/a/camera", "/robot/*/camera"}

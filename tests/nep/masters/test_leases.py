@@ -97,10 +97,10 @@ def test_master_sends_the_renewal_interval() -> None:
         graph.apply(Join(NodeRecord(f"n{n}", f"N{n}", "host", 1)), 1, 0.0, f"n{n}")
     graph.tick(0.0)
     (reply,) = graph.apply(Renew("n0", 7, graph.revision), 1, 1.0, "n0")
-    assert isinstance(reply.answer, Renewed)
-    assert reply.answer.next_s == pytest.approx(4.0)
+    assert isinstance(reply.body, Renewed)
+    assert reply.body.next_s == pytest.approx(4.0)
     (reply,) = graph.apply(Renew("unknown", 7, graph.revision), 1, 1.0, "unknown")
-    assert reply.answer == Renewed(7, graph.revision, again=True)
+    assert reply.body == Renewed(7, graph.revision, again=True)
 
 
 def test_node_follows_the_renewal_interval_and_continues_without_replies() -> None:
@@ -186,17 +186,17 @@ def test_router_reports_each_closed_connection_once_after_a_delay() -> None:
         assert port.peer() == "127.0.0.1"
     sockets.pop(b"b").close()
     now = 100.0
-    eventually(lambda: port.ended(now) == [] and b"b" in port._ended)
-    assert port.ended(now + 0.4) == []
-    assert port.ended(now + 0.6) == [b"b"]
-    assert port.ended(now + 9.0) == []
+    eventually(lambda: port.take_ended_senders(now) == [] and b"b" in port._ended)
+    assert port.take_ended_senders(now + 0.4) == []
+    assert port.take_ended_senders(now + 0.6) == [b"b"]
+    assert port.take_ended_senders(now + 9.0) == []
     again = dealer(context, port.address, b"d")  # most likely on a connection of the same number
     assert port.socket.poll(2000)
     assert port.receive()[0] == b"d"
     for socket in (*sockets.values(), again):
         socket.close()
-    eventually(lambda: port.ended(now) == [] and set(port._ended) == {b"a", b"c", b"d"})
-    assert sorted(port.ended(now + 1.0)) == [b"a", b"c", b"d"]
+    eventually(lambda: port.take_ended_senders(now) == [] and set(port._ended) == {b"a", b"c", b"d"})
+    assert sorted(port.take_ended_senders(now + 1.0)) == [b"a", b"c", b"d"]
     assert port._senders == {}
     context.term()
     port.close()

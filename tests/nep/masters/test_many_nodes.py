@@ -15,21 +15,21 @@ from nep.masters.master import Master
 from nep.masters.snapshot import GraphViewer
 from nep.messages.packing import pack
 from nep.protocol import encoding
-from nep.protocol.encoding import AnswerEncoder, write
+from nep.protocol.encoding import ReplyEncoder, write
 from nep.protocol.graph_view import Alert, GraphView
 from nep.protocol.requests import (
+    GraphReply,
     Join,
     Leave,
-    Look,
     NodeRecord,
     Ping,
     PublisherCount,
     PublisherRecord,
+    QueryGraph,
     RemovePublisher,
     Renew,
     Renewed,
     ReportAlerts,
-    Seen,
     SubscriberCount,
     SubscriberRecord,
 )
@@ -89,9 +89,9 @@ def test_fast_renewal_matches_the_normal_path() -> None:
             body = renew(quick, request, now)
             assert body is not None
             (answer,) = long.apply(request, 7, now, f"n{n}")
-            assert encoding.decode_answer(body) == (7, answer.answer)
-            assert isinstance(answer.answer, Renewed)
-            assert set(answer.answer.last_seqs) == {100 + (n + 1) % 5}
+            assert encoding.decode_reply(body) == (7, answer.body)
+            assert isinstance(answer.body, Renewed)
+            assert set(answer.body.last_seqs) == {100 + (n + 1) % 5}
     assert view(quick) == view(long)
     assert view(quick).topics["t0"].rate_hz is not None
 
@@ -152,7 +152,7 @@ CHANGES = st.lists(st.tuples(KINDS, st.integers(0, 4)))
 @settings(deadline=None, max_examples=60)
 @given(CHANGES)
 def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) -> None:
-    graph, packer = graph_of(3), AnswerEncoder()
+    graph, packer = graph_of(3), ReplyEncoder()
     for now, (what, n) in enumerate(changes):
         if what == "join":
             graph.apply(joining(n, 5), 1, float(now), f"n{n}")
@@ -166,10 +166,10 @@ def test_incremental_view_matches_a_full_view(changes: list[tuple[str, int]]) ->
             graph.apply(RemovePublisher(f"n{n}", 100 + n, 3), 1, float(now), f"n{n}")
         else:
             graph.apply(ReportAlerts("test", (Alert(f"a{n}", "It hurts"),)), 1, float(now), "")
-        (answer,) = graph.apply(Look(), 3, float(now), "somebody")
-        assert isinstance(answer.answer, Seen)
-        assert answer.answer.view == view(graph)
-        assert encoding.decode_answer(packer.encode(answer.answer, 3)) == (3, answer.answer)
+        (answer,) = graph.apply(QueryGraph(), 3, float(now), "somebody")
+        assert isinstance(answer.body, GraphReply)
+        assert answer.body.view == view(graph)
+        assert encoding.decode_reply(packer.encode(answer.body, 3)) == (3, answer.body)
 
 
 def test_unchanged_topics_are_the_same_object() -> None:

@@ -75,7 +75,7 @@ def test_malformed_requests_get_an_error_and_the_master_survives(master: Master)
         for parts in bad:
             socket.send_multipart(parts)
             assert socket.poll(2000)
-            _call, answer = encoding.decode_answer(socket.recv())
+            _call, answer = encoding.decode_reply(socket.recv())
             assert isinstance(answer, Refused)
             assert answer.reason
     finally:

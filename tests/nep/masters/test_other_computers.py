@@ -16,9 +16,9 @@ from nep.errors import AddressInUseError, NepError, RequestRefusedError
 from nep.masters.listen_addresses import check_hosts
 from nep.masters.master import Master
 from nep.masters.process import listen
-from nep.protocol.encoding import decode_answer, encode_request
+from nep.protocol.encoding import decode_reply, encode_request
 from nep.protocol.requests import Listen, Refused
-from nep.system.addresses import ANY, OwnAddress, has_address, nearest, own_addresses
+from nep.system.addresses import ANY_HOST, OwnAddress, has_address, own_addresses, reachable_endpoint
 from tests.nep.programs import eventually
 
 pytestmark = pytest.mark.skipif(sys.platform == "darwin", reason="macOS answers at one loopback address only")
@@ -59,11 +59,11 @@ def wait_for(node, wanted):
     ],
 )
 def test_nearest_reachable_endpoint_is_chosen(endpoints, master, chosen):
-    assert nearest(endpoints, master) == chosen
+    assert reachable_endpoint(endpoints, master) == chosen
 
 
 def test_only_addresses_of_this_computer_can_be_served():
-    assert check_hosts(["10.8.0.2", ANY, "10.8.0.2"], HERE) == ("10.8.0.2", ANY)
+    assert check_hosts(["10.8.0.2", ANY_HOST, "10.8.0.2"], HERE) == ("10.8.0.2", ANY_HOST)
     with pytest.raises(NepError, match="'robot' is not an IPv4 address"):
         check_hosts(["robot"], HERE)
     with pytest.raises(NepError, match=r"'192\.168\.1\.21' .*: 10\.8\.0\.2, 192\.168\.1\.20"):
@@ -105,7 +105,7 @@ def test_listen_request_from_another_computer_is_rejected(far, master):
             asking.connect(f"tcp://127.0.0.9:0;{far}")  # comes from the first address, goes to the second
             asking.send(encode_request(Listen(()), 1))
             assert asking.poll(WAIT_S * 1000)
-            _call, answer = decode_answer(asking.recv())
+            _call, answer = decode_reply(asking.recv())
     finally:
         context.destroy(linger=0)
     assert isinstance(answer, Refused)
@@ -191,7 +191,7 @@ def test_lost_served_address_raises_an_alert_until_it_returns():
     here[0] = HERE
     assert listening.refresh() == ()
     assert bound == ["tcp://192.168.1.20:7780"]
-    listening.serve([ANY])
+    listening.serve([ANY_HOST])
     assert sorted(bound) == ["tcp://10.8.0.2:7780", "tcp://192.168.1.20:7780"]
     here[0] = HERE[:1]
     assert listening.refresh() == ()

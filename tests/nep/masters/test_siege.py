@@ -18,10 +18,10 @@ from nep.protocol.requests import (
     AddPublisher,
     Join,
     Leave,
-    Look,
     NodeRecord,
     PublisherCount,
     PublisherRecord,
+    QueryGraph,
     RemovePublisher,
     Renew,
     Request,
@@ -205,7 +205,7 @@ def looks_that_are_never_read(siege: Siege) -> None:
     for _ in range(3000):
         if not socket.poll(1000, zmq.POLLOUT):
             break
-        say(socket, Look())
+        say(socket, QueryGraph())
 
 
 @pytest.mark.parametrize(

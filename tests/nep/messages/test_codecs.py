@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from nep.errors import DecodeError, EncodeError
 from nep.messages import image_codec
-from nep.messages.codecs import CODECS, codec, codec_for, codec_numbered
+from nep.messages.codecs import CODECS, codec, codec_by_number, codec_for
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 SMALL = st.integers(-(2**63), 2**63 - 1)
@@ -64,8 +64,8 @@ def test_arbitrary_bytes_decode_or_raise_decode_error(name: str, data: bytes) ->
 
 
 def test_codecs_are_found_by_name_and_number() -> None:
-    assert [codec_numbered(number) for number in range(1, 6)] == list(CODECS.values())
-    assert codec_numbered(99) is None
+    assert [codec_by_number(number) for number in range(1, 6)] == list(CODECS.values())
+    assert codec_by_number(99) is None
     assert codec_for("robot/description").name == codec_for("dictionary").name == "json"
     assert codec_for("images").name == "image"
     with pytest.raises(DecodeError, match="did you mean 'json'"):

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 import nep
 from nep.cli.echo import echo
-from nep.cli.table_file import Fields, Table
+from nep.cli.table_file import CsvWriter, FieldExtractor
 from nep.errors import NepError
-from nep.messages.fields import MISSING, leaves, parse_path, path_text, pick
+from nep.messages.fields import MISSING, leaf_paths, parse_path, path_text, value_at
 from nep.messages.message import Message
 
 ODOM = {"pose": {"x": 1.5, "y": None}, "joints": [0.1, 0.2, {"name": 'knee "left", bent'}], "a key": True}
@@ -44,7 +44,7 @@ def message(payload, stamp_ns=1_700_000_000_000_000_001, codec="json", **more):
     ],
 )
 def test_field_path_selects_a_value(text, value):
-    assert pick(ODOM, parse_path(text)) == value
+    assert value_at(ODOM, parse_path(text)) == value
 
 
 @given(st.lists(st.integers(-(10**6), 10**6) | st.text(), max_size=5))
@@ -59,10 +59,10 @@ def test_invalid_field_path_is_rejected(text):
 
 
 def test_leaves_yield_the_path_of_every_leaf_value():
-    paths = list(leaves(ODOM))
+    paths = list(leaf_paths(ODOM))
     assert paths == ["pose.x", "pose.y", "joints[0]", "joints[1]", "joints[2].name", '["a key"]']
-    assert list(leaves(7)) == ["."]
-    assert len(list(leaves(list(range(5)) * 100, most=3))) == 3
+    assert list(leaf_paths(7)) == ["."]
+    assert len(list(leaf_paths(list(range(5)) * 100, most=3))) == 3
 
 
 @given(
@@ -73,8 +73,8 @@ def test_leaves_yield_the_path_of_every_leaf_value():
     )
 )
 def test_leaf_paths_of_any_payload_resolve_to_a_value(payload):
-    for path in leaves(payload):
-        assert pick(payload, parse_path(path)) is not MISSING
+    for path in leaf_paths(payload):
+        assert value_at(payload, parse_path(path)) is not MISSING
 
 
 def rows(out):
@@ -83,7 +83,7 @@ def rows(out):
 
 def test_csv_table_has_header_timestamps_and_quoted_cells():
     out = io.StringIO(newline="")
-    table = Table(Fields(["pose.x", "joints[2].name", "a", "."]), out)
+    table = CsvWriter(FieldExtractor(["pose.x", "joints[2].name", "a", "."]), out)
     table(message({"pose": {"x": 1.5}, "joints": [0, 0, {"name": 'say "hi",\nbye'}], "a": False}))
     table(message({"a": None}, stamp_ns=None))
     text = out.getvalue()
@@ -97,8 +97,8 @@ def test_csv_table_has_header_timestamps_and_quoted_cells():
 
 
 def test_missing_fields_and_undecodable_messages_are_counted(capsys):
-    fields = Fields(["x", "y"])
-    table = Table(fields, io.StringIO())
+    fields = FieldExtractor(["x", "y"])
+    table = CsvWriter(fields, io.StringIO())
     for each in (message({"x": 1}), message({"x": 1, "y": 2}), message(b"{oops"), message({})):
         table(each)
     fields.report_missing()
@@ -109,9 +109,9 @@ def test_missing_fields_and_undecodable_messages_are_counted(capsys):
 
 
 def test_shape_is_a_field_of_image_messages():
-    fields = Fields(["shape[0]"])
+    fields = FieldExtractor(["shape[0]"])
     picture = message(b"\xff", codec="image", extension={"shape": [240, 320, 3]})
-    assert fields.of(picture) == [240]
+    assert fields.extract(picture) == [240]
 
 
 @pytest.fixture

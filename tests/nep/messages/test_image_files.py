@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from nep.errors import DecodeError, EncodeError
 from nep.messages import image_codec
 from nep.messages.codecs import codec
-from nep.messages.image_files import MAX_PIXELS, check_size, examine
+from nep.messages.image_files import MAX_PIXELS, check_size, parse_header
 from tests.nep import bad_pictures as bad
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -28,7 +28,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 def test_decompression_bomb_is_rejected_before_decoding(name: str) -> None:
     data = bad.BOMBS[name]
     with pytest.raises(DecodeError) as caught:
-        examine(data)
+        parse_header(data)
     assert caught.value.size_bytes == len(data)
     assert image_codec.picture_info(data) is None
     with pytest.raises(EncodeError):
@@ -92,7 +92,7 @@ def test_decompression_bombs_use_little_memory_in_library_and_studio() -> None:
 )
 def test_rejected_image_error_states_the_reason(name: str, words: str) -> None:
     with pytest.raises(DecodeError) as caught:
-        examine(bad.BOMBS[name])
+        parse_header(bad.BOMBS[name])
     assert words in str(caught.value)
 
 
@@ -119,10 +119,10 @@ def test_png_text_profile_and_animation_chunks_are_stripped() -> None:
         bad.chunk(b"iCCP", b"p\0\0" + bomb),
         bad.chunk(b"acTL", struct.pack(">II", 1_000_000, 0)), bad.chunk(b"fcTL", bytes(26)),
     )  # fmt: skip
-    file = examine(plain[:33] + b"".join(more) + plain[33:] + b"rubbish behind its end")
+    file = parse_header(plain[:33] + b"".join(more) + plain[33:] + b"rubbish behind its end")
     assert bytes(file.data) == plain
     assert file.extension == {"shape": [20, 40, 3], "encoding": "png"}
-    assert examine(plain).data is plain, "what has nothing to be left out is not copied"
+    assert parse_header(plain).data is plain, "what has nothing to be left out is not copied"
 
 
 @pytest.mark.parametrize("order", [">", "<"])
@@ -165,7 +165,7 @@ def test_decoded_image_has_the_examined_size_for_any_corruption(
     for at, byte in changes:
         changed[at : at + 1] = bytes([byte])
     try:
-        file = examine(bytes(changed[:end]))
+        file = parse_header(bytes(changed[:end]))
         read = image_codec.read_file(file)
     except DecodeError:
         return

@@ -8,7 +8,7 @@ import pytest
 
 import nep
 from nep.messages.codecs import CODECS
-from nep.nodes.publisher import RejectedPayloads, path_of
+from nep.nodes.publisher import RejectedPayloads, unencodable_path
 from nep.system.log_rarely import is_logged
 
 
@@ -99,13 +99,13 @@ def test_alternating_valid_and_invalid_messages_are_logged_at_growing_intervals(
     ],
 )
 def test_path_of_the_unencodable_value_is_found(payload: object, place: str) -> None:
-    assert path_of(payload, CODECS["json"].encode) == place
+    assert unencodable_path(payload, CODECS["json"].encode) == place
 
 
 def test_path_of_a_self_referencing_payload_is_bounded() -> None:
     endless: list[object] = []
     endless.append(endless)
-    assert path_of(endless, CODECS["json"].encode).startswith("[0][0]")
+    assert unencodable_path(endless, CODECS["json"].encode).startswith("[0][0]")
 
 
 def test_only_powers_of_ten_are_logged() -> None:

@@ -22,25 +22,25 @@ from nep.programs.gateway.framing import PORT_A
 from nep.programs.gateway.graph_registrar import GraphRegistrar
 from nep.programs.gateway.portmap import PortMap, Registration, TopicLine
 from nep.programs.gateway.programs import OriginalProgram, ProgramTable, TopicLink
-from nep.programs.gateway.requests import RequestError, read_request
+from nep.programs.gateway.requests import RequestError, parse_request
 from nep.protocol import encoding
 from nep.protocol.graph_view import GraphView, TopicInfo
 from nep.protocol.requests import (
     AddPublisher,
     Done,
+    GraphReply,
     Join,
-    Look,
     NodeRecord,
     Ping,
     PublisherRecord,
+    QueryGraph,
     Renew,
     Renewed,
-    Seen,
     SubscriberCount,
     SubscriberRecord,
     TopicPublishers,
 )
-from nep.text import control_in
+from nep.text import first_control
 from tests.nep.programs import eventually
 
 
@@ -83,10 +83,10 @@ def test_renewal_reports_a_topic_whose_last_publisher_left() -> None:
     graph.apply(Join(NodeRecord("s", "S", "h", 1), 0, (), (subscriber,)), 1, 0.0, "s")
     revision = graph.revision
     graph.apply(AddPublisher(NodeRecord("p", "P", "h", 1), publisher), 1, 0.0, "p")
-    graph.drop(["p"])
+    graph.unregister_nodes(["p"])
     (reply,) = graph.apply(Renew("s", 7, revision, (), (SubscriberCount(2, 0, 0),)), 1, 0.5, "s")
-    assert isinstance(reply.answer, Renewed)
-    assert reply.answer.topics == (TopicPublishers("/t", ()),)
+    assert isinstance(reply.body, Renewed)
+    assert reply.body.topics == (TopicPublishers("/t", ()),)
 
 
 def test_bad_requests_of_many_senders_are_logged_at_a_bounded_rate(caplog: pytest.LogCaptureFixture) -> None:
@@ -112,34 +112,34 @@ def pair() -> Iterator[SimpleNamespace]:
 
 
 def test_graph_is_decoded_in_the_calling_thread_and_not_the_node_thread(pair: SimpleNamespace) -> None:
-    asked = pair.calls.begin(Look())
+    asked = pair.calls.send_request(QueryGraph())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, body = pair.router.recv_multipart()
     topics = {f"/t{n}": TopicInfo(f"/t{n}", "json", "json") for n in range(3)}
-    seen = Seen(7, 1, GraphView(7, 1, {}, topics))
-    pair.router.send_multipart([sender, encoding.encode_answer(seen, encoding.decode_request(body).call)])
+    seen = GraphReply(7, 1, GraphView(7, 1, {}, topics))
+    pair.router.send_multipart([sender, encoding.encode_reply(seen, encoding.decode_request(body).call)])
     eventually(lambda: pair.calls.read() == [] and asked.view is not None)
     assert asked.reply is None  # nothing was decoded yet
     assert pair.calls.wait(asked, 1.0) == seen
 
 
 def test_graph_reply_without_a_pending_call_is_not_decoded(pair: SimpleNamespace) -> None:
-    pair.calls.begin(Ping())
+    pair.calls.send_request(Ping())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()
-    pair.router.send_multipart([sender, encoding.encode_answer(Seen(7, 1, GraphView(7, 1)), 12345)])
-    pair.router.send_multipart([sender, encoding.encode_answer(Done(7, 1), 1)])
+    pair.router.send_multipart([sender, encoding.encode_reply(GraphReply(7, 1, GraphView(7, 1)), 12345)])
+    pair.router.send_multipart([sender, encoding.encode_reply(Done(7, 1), 1)])
     answers: list[object] = []
     eventually(lambda: bool(answers.extend(pair.calls.read()) or answers))
     assert [type(each.what) for each in answers] == [Done]  # type: ignore[attr-defined]
 
 
 def test_many_pushes_are_read_in_slices(pair: SimpleNamespace) -> None:
-    pair.calls.begin(Ping())
+    pair.calls.send_request(Ping())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, _body = pair.router.recv_multipart()
     for _ in range(120):
-        pair.router.send_multipart([sender, encoding.encode_answer(Renewed(7, 1))])
+        pair.router.send_multipart([sender, encoding.encode_reply(Renewed(7, 1))])
     sizes: list[int] = []
 
     def read() -> bool:
@@ -170,7 +170,7 @@ def test_unread_graph_replies_use_bounded_master_memory() -> None:
         while socket.poll(500):
             got += len(socket.recv()) == len(graph)
         assert 32 <= got < 200
-        eventually(lambda: port.ended(0.0) == [] and not port._unread)
+        eventually(lambda: port.take_ended_senders(0.0) == [] and not port._unread)
         assert port.send(sender, graph)
         assert socket.poll(5000)
     context.term()
@@ -182,13 +182,13 @@ CONTROLS = "Arm\x1b[2J\u202e\n\u2028"
 
 def test_original_node_names_are_escaped_and_truncated() -> None:
     graph = Graph(epoch=7, now=0.0, learn_s=0.0)
-    listing = GraphRegistrar(lambda request: graph.apply(request, -1, 0.0, "")[-1].answer, 7)  # type: ignore[arg-type, return-value]
+    listing = GraphRegistrar(lambda request: graph.apply(request, -1, 0.0, "")[-1].body, 7)  # type: ignore[arg-type, return-value]
     line = TopicLine("t", "bare", "json", "many2many")
     registration = Registration(line, CONTROLS, "publisher", "json", "A", None, None, None)
     link = TopicLink("t", "json", "json", "publisher")
     listing.show((OriginalProgram(registration.node_id, CONTROLS * 100, None, "A", "\x1b]0;x\x07", (link,)),))
     (node,) = graph.view().nodes.values()
-    assert not any(map(control_in, (node.id, node.name, node.language)))
+    assert not any(map(first_control, (node.id, node.name, node.language)))
     assert node.name.startswith("Arm\\x1b[2J\\u202e\\n\\u2028Arm")
     assert len(node.name) < 200
     assert all(0 < each.id < 2**63 for each in graph.view().topics["t"].publishers)
@@ -208,7 +208,7 @@ def test_alerts_about_original_nodes_are_escaped_and_bounded() -> None:
     for n in range(1000):
         native.report(f"topic:{n}", f"“{n}{CONTROLS}” stays")
     assert max(told) == 200
-    assert not any(map(control_in, shown))
+    assert not any(map(first_control, shown))
     for n in range(1000):
         native.resolve(f"topic:{n}")
     assert told[-1] == 0
@@ -222,24 +222,24 @@ def test_registration_without_connection_is_evicted_first() -> None:
     for n in range(3):
         known.add(Registration(line, f"n{n}", "publisher", "json", "A", None, None, None))
     registry.remove_ended()
-    assert registry.make_room()
+    assert registry.evict_unconnected()
     assert [each.node for each in known.registrations] == ["n1", "n2"]
-    assert registry.make_room()
-    assert registry.make_room()
-    assert not registry.make_room()
+    assert registry.evict_unconnected()
+    assert registry.evict_unconnected()
+    assert not registry.evict_unconnected()
 
 
 def test_original_request_with_oversized_text_is_rejected() -> None:
     request = b'{"node":"n","topic":"t","socket":"publisher","msg_type":"%s"}' % (b"x" * 10_000)
     with pytest.raises(RequestError, match="has 10000 letters"):
-        read_request(request, PORT_A)
+        parse_request(request, PORT_A)
 
 
 def test_unreadable_graph_raises_in_the_waiting_thread(pair: SimpleNamespace) -> None:
-    asked = pair.calls.begin(Look())
+    asked = pair.calls.send_request(QueryGraph())
     eventually(lambda: pair.calls.read() == [] and bool(pair.router.poll(10)))
     sender, body = pair.router.recv_multipart()
-    good = encoding.encode_answer(Seen(7, 1, GraphView(7, 1)), encoding.decode_request(body).call)
+    good = encoding.encode_reply(GraphReply(7, 1, GraphView(7, 1)), encoding.decode_request(body).call)
     pair.router.send_multipart([sender, good[:-3]])
     failed: list[str] = []
 
@@ -285,5 +285,5 @@ def test_request_is_sent_immediately_when_the_socket_connects_during_the_call() 
     """The look at the socket takes the only signal of it: without a second try it waits for half a second."""
     socket = JustConnected()
     calls = RpcClient(socket, "127.0.0.1:9", lambda: None)  # type: ignore[arg-type]
-    calls.begin(Ping())
+    calls.send_request(Ping())
     assert socket.sent == [encoding.encode_request(Ping(), 1)]

@@ -11,12 +11,12 @@ import pytest
 import nep
 from nep.errors import ClosedError, MasterUnreachable
 from nep.nodes.log_handler import (
-    BURST,
-    LAST_ERRORS,
     LEVELS,
     LOG_TOPIC,
     LOG_TYPE,
-    TEXT_LIMIT,
+    MAX_BURST,
+    MAX_LAST_ERRORS,
+    MAX_TEXT_LENGTH,
     LogHandler,
     LogRecord,
     ShownErrors,
@@ -67,7 +67,7 @@ def test_last_errors_are_kept_for_late_subscribers_up_to_a_limit():
         handler.logger.error("error %d %s", number, "x" * 2000)
     handler.close()
     assert "fine" not in str(errors.records)
-    assert len(errors.records[-1]) == LAST_ERRORS
+    assert len(errors.records[-1]) == MAX_LAST_ERRORS
     assert [record["text"][:8] for record in errors.records[-1]] == [
         f"error {number}" for number in range(10, 30)
     ]
@@ -86,7 +86,7 @@ def test_error_received_on_both_topics_is_shown_once():
     shown = ShownErrors()
     one, two = ({"level": "error", "text": text, "node": "robot", "stamp_ns": 7} for text in ("one", "two"))
     assert shown.is_new(LogRecord.from_plain(one))
-    assert [record.text for record in shown.new_in([two, one])] == ["two"]
+    assert [record.text for record in shown.new_records([two, one])] == ["two"]
     assert not shown.is_new(LogRecord.from_plain(two))
     fine = LogRecord.from_plain({"text": "fine", "node": "robot", "stamp_ns": 7})
     assert shown.is_new(fine)
@@ -97,7 +97,7 @@ def test_error_received_on_both_topics_is_shown_once():
     "payload", [None, 7, "text", {}, [None], [[]], [{}], [{"stamp_ns": 2**70, "level": "error"}]]
 )
 def test_malformed_error_list_is_ignored(payload):
-    assert ShownErrors().new_in(payload) == []
+    assert ShownErrors().new_records(payload) == []
 
 
 def test_memory_of_shown_errors_is_bounded():
@@ -106,8 +106,8 @@ def test_memory_of_shown_errors_is_bounded():
         assert shown.is_new(LogRecord("error", "x", "n", "robot", number + 1))
     assert len(shown._shown) <= 2000
     assert (
-        len(shown.new_in([{"level": "error", "stamp_ns": 10_000 + number} for number in range(999)]))
-        == LAST_ERRORS
+        len(shown.new_records([{"level": "error", "stamp_ns": 10_000 + number} for number in range(999)]))
+        == MAX_LAST_ERRORS
     )
 
 
@@ -162,8 +162,8 @@ def test_log_burst_is_limited_and_dropped_records_are_counted_exactly(kept):
     handler.close()
     told = sum(int(text.split()[0]) for text in kept.texts if not text.isdigit())
     shown = [text for text in kept.texts if text.isdigit()]
-    assert shown == [str(number) for number in range(BURST)]
-    assert told == 10_000 - BURST
+    assert shown == [str(number) for number in range(MAX_BURST)]
+    assert told == 10_000 - MAX_BURST
 
 
 def test_rate_limited_logging_resumes_after_a_pause(kept):
@@ -196,9 +196,9 @@ def test_records_wait_for_a_master_and_are_dropped_when_the_node_closes():
 def test_unformattable_record_does_not_raise_and_long_text_is_truncated(handler, kept, capsys):
     handler.logger.propagate = False  # pytest's own handler raises
     handler.logger.info("%d", "no number")
-    handler.logger.info("x" * (TEXT_LIMIT + 5))
+    handler.logger.info("x" * (MAX_TEXT_LENGTH + 5))
     handler.close()
-    assert kept.texts == [f"{'x' * TEXT_LIMIT}… ({TEXT_LIMIT + 5} characters)"]
+    assert kept.texts == [f"{'x' * MAX_TEXT_LENGTH}… ({MAX_TEXT_LENGTH + 5} characters)"]
     capsys.readouterr()  # logging itself tells of the first on the error stream
 
 

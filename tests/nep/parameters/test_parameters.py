@@ -11,7 +11,7 @@ import pytest
 
 import nep
 from nep.masters.master import Master
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from tests.nep.meeting import Make
 from tests.nep.programs import eventually, running
 
@@ -44,7 +44,7 @@ def test_parameter_values_are_published_on_a_latched_topic(make: Make) -> None:
     node.parameters.declare("speed", 0.5)
     node.parameters.declare("names", ["a"])
     node.parameters["speed"] = 0.75
-    sub = make("tool").new_sub(place_of(node.id), "nep/patterns/parameters")
+    sub = make("tool").new_sub(parameters_topic(node.id), "nep/patterns/parameters")
     ok, state = sub.listen(timeout_s=30.0)
     assert ok
     assert state["node"] == "robot"  # type: ignore[index]
@@ -123,7 +123,7 @@ def test_change_callback_can_reject_new_values(pair: tuple[nep.Node, nep.Node]) 
 def test_malformed_parameter_calls_are_rejected(pair: tuple[nep.Node, nep.Node]) -> None:
     node, other = pair
     node.parameters.declare("speed", 1)
-    client = other.new_client(place_of(node.id), timeout_s=30.0)
+    client = other.new_client(parameters_topic(node.id), timeout_s=30.0)
     for wrong in (None, 5, [], {"set": 5}, {"set": [1]}, "list"):
         answer = client.call(wrong)
         assert re.search(r"\bmap\b.*'set'", answer["refused"])  # type: ignore[index]

@@ -22,19 +22,19 @@ from nep.masters.leases import encode_renewed, read_renewal
 from nep.masters.master import Master
 from nep.messages.packing import pack_saturated
 from nep.protocol import encoding, requests, wire
-from nep.protocol.encoding import AnswerEncoder
+from nep.protocol.encoding import ReplyEncoder
 from nep.protocol.requests import (
     COUNT_MAX,
     AddPublisher,
     AddSubscriber,
+    GraphReply,
     Join,
-    Look,
     NodeRecord,
     PublisherCount,
     PublisherRecord,
+    QueryGraph,
     Renew,
     Request,
-    Seen,
     SubscriberCount,
     SubscriberRecord,
 )
@@ -95,8 +95,8 @@ def test_every_reply_round_trips(kind: type[Any]) -> None:
     @MANY
     @given(of(kind))
     def check(answer: Any) -> None:
-        for body in (encoding.encode_answer(answer, 7), AnswerEncoder().encode(answer, 7)):
-            call, read = encoding.decode_answer(body)
+        for body in (encoding.encode_reply(answer, 7), ReplyEncoder().encode(answer, 7)):
+            call, read = encoding.decode_reply(body)
             assert (call, type(read)) == (7, kind)
         with_hosts(answer, ("127.0.0.1",))
 
@@ -108,7 +108,7 @@ def test_every_reply_round_trips(kind: type[Any]) -> None:
 def test_every_fast_renewal_reply_can_be_decoded(
     last_seqs: dict[int, int], epoch: int, next_s: float
 ) -> None:
-    call, read = encoding.decode_answer(encode_renewed(7, epoch, epoch, last_seqs, ("h",), next_s))
+    call, read = encoding.decode_reply(encode_renewed(7, epoch, epoch, last_seqs, ("h",), next_s))
     assert (call, type(read)) == (7, requests.Renewed)
 
 
@@ -117,9 +117,9 @@ def test_every_fast_renewal_reply_can_be_decoded(
 def test_arbitrary_requests_and_replies_raise_only_wire_errors(name: str, what: object, call: object) -> None:
     encoding.decode_request(pack_saturated({"do": name, "call": call, "what": what}))
     read_renewal(pack_saturated({"do": "renew", "call": call, "what": what}))
-    for answer in encoding._ANSWERS:
+    for answer in encoding._REPLIES:
         with contextlib.suppress(WireError):
-            encoding.decode_answer(pack_saturated({"is": answer, "re": call, "what": what}))
+            encoding.decode_reply(pack_saturated({"is": answer, "re": call, "what": what}))
 
 
 @settings(MANY, max_examples=150)
@@ -127,7 +127,7 @@ def test_arbitrary_requests_and_replies_raise_only_wire_errors(name: str, what: 
 def test_arbitrary_requests_do_not_raise_in_the_graph_or_break_its_view(
     asked: list[Request], is_foreign: bool
 ) -> None:
-    graph, packer = Graph(epoch=7, now=0.0, learn_s=0.0), AnswerEncoder()
+    graph, packer = Graph(epoch=7, now=0.0, learn_s=0.0), ReplyEncoder()
     honest = NodeRecord("0" * 16, "honest", "host", 1)
     graph.apply(Join(honest, 0, (PublisherRecord(1, "/a", "json", "json"),)), 1, 0.0, honest.id)
     for now, request in enumerate(asked):
@@ -135,13 +135,13 @@ def test_arbitrary_requests_do_not_raise_in_the_graph_or_break_its_view(
         if is_foreign and isinstance(request, Join | AddPublisher | AddSubscriber):
             route = request.node.id
         for each in graph.apply(request, 1, float(now) / 100, route or "x", is_foreign=is_foreign):
-            packer.encode(each.answer, 1)
+            packer.encode(each.body, 1)
         graph.tick(float(now) / 100)
-    (answer,) = graph.apply(Look(), 1, 1.0, "looker")
-    assert isinstance(answer.answer, Seen)
-    call, seen = encoding.decode_answer(packer.encode(answer.answer, 5))
-    assert (call, type(seen)) == (5, Seen)
-    for topic in answer.answer.view.topics.values():
+    (answer,) = graph.apply(QueryGraph(), 1, 1.0, "looker")
+    assert isinstance(answer.body, GraphReply)
+    call, seen = encoding.decode_reply(packer.encode(answer.body, 5))
+    assert (call, type(seen)) == (5, GraphReply)
+    for topic in answer.body.view.topics.values():
         assert topic.lost is None or 0 <= topic.lost <= COUNT_MAX
         for told in topic.publishers:
             assert 0 <= told.count <= COUNT_MAX

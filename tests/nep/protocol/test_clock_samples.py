@@ -173,13 +173,13 @@ def test_coarse_clock_resolution_increases_the_uncertainty() -> None:
 def test_samples_are_cleared_for_another_master() -> None:
     pair = Pair(0)
     pair.renew(0, 0)
-    pair.samples.forget()
+    pair.samples.clear()
     assert pair.samples.offset() is None
     assert pair.samples.steps == 0
 
 
 def test_uncertainty_grows_for_different_clocks_only() -> None:
-    difference = ClockDifference(5, 1000, known_at_ns=0)
+    difference = ClockDifference(5, 1000, measured_at_ns=0)
     assert difference.uncertainty_at(20_000) == 1001
     assert difference.uncertainty_at(-(10**12)) == 1000
     assert SAME_CLOCK.uncertainty_at(10**18) == 0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from nep.errors import WireError
 from nep.protocol import encoding
 from nep.protocol.graph_view import NodeInfo, PublisherInfo, TopicInfo
-from nep.protocol.requests import Look, PublisherCount, Renew, SubscriberCount
+from nep.protocol.requests import PublisherCount, QueryGraph, Renew, SubscriberCount
 
 PUBLISHER: dict[str, object] = {
     "id": 5,
@@ -35,7 +35,7 @@ TOPIC: dict[str, object] = {
     "lost": 0,
     "loss_ratio": 0.0,
 }
-KINDS = (TopicInfo, PublisherInfo, NodeInfo, Renew, PublisherCount, SubscriberCount, Look)
+KINDS = (TopicInfo, PublisherInfo, NodeInfo, Renew, PublisherCount, SubscriberCount, QueryGraph)
 ITEMS = (
     st.none()
     | st.booleans()

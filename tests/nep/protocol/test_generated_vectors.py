@@ -13,7 +13,7 @@ from nep.errors import WireError
 from nep.messages.packing import unpack
 from nep.protocol import wire
 from nep.protocol.batch import read_parts
-from nep.protocol.encoding import decode_answer, decode_request, encode_answer, encode_request
+from nep.protocol.encoding import decode_reply, decode_request, encode_reply, encode_request
 from tests.nep.protocol import wire_tables
 from tools import wire_vectors
 
@@ -66,7 +66,11 @@ def test_batch_is_decoded_or_rejected_with_its_code(vector: dict[str, Any]) -> N
 @pytest.mark.parametrize("vector", FILTERS, ids=name_of)
 def test_filter_is_decoded_and_encoded(vector: dict[str, Any]) -> None:
     part = bytes.fromhex(vector["filter"])
-    hello, read, shares = wire.parse_hello(part), wire.parse_read(part), wire.parse_shares(part)
+    hello, read, shares = (
+        wire.parse_hello(part),
+        wire.parse_acknowledgement(part),
+        wire.parse_acceptance(part),
+    )
     if "error" in vector:
         assert (hello, read, shares) == (None, None, None)
         return
@@ -76,7 +80,7 @@ def test_filter_is_decoded_and_encoded(vector: dict[str, Any]) -> None:
         assert wire.topic_part(said["topic"]) == part
     elif kind == "hello":
         assert hello is not None
-        level = hello.one_part + hello.tells + hello.batches
+        level = hello.one_part + hello.acknowledges + hello.batches
         assert (str(hello.subscriber), hello.topic, level) == (
             said["subscriber"],
             said["topic"],
@@ -87,11 +91,11 @@ def test_filter_is_decoded_and_encoded(vector: dict[str, Any]) -> None:
     elif kind == "read":
         assert read is not None
         assert wire_vectors.as_text(read._asdict()) == said
-        assert wire.read_part(read) == part
+        assert wire.acknowledgement_part(read) == part
     else:
         assert shares is not None
         assert wire_vectors.as_text(shares._asdict()) == said
-        assert wire.shares_part(shares) == part
+        assert wire.acceptance_part(shares) == part
 
 
 @pytest.mark.parametrize("vector", [*MASTER["asked"], *MASTER["pushed"]], ids=name_of)
@@ -101,8 +105,8 @@ def test_request_reply_and_push_are_decoded_and_encoded(vector: dict[str, Any]) 
     assert not isinstance(received.request, WireError)
     assert encode_request(received.request, received.call) == request
     body = bytes.fromhex(vector.get("answer") or vector["push"])
-    call, answer = decode_answer(body)
-    assert encode_answer(answer, call) == body
+    call, answer = decode_reply(body)
+    assert encode_reply(answer, call) == body
     assert wire_vectors.as_text(unpack(body)) == (vector.get("answer_means") or vector["means"])
 
 

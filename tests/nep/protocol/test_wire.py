@@ -53,10 +53,10 @@ def test_payload_of_another_size_than_declared_is_rejected(payload: bytes, told:
 
 
 def test_fast_header_packing_matches_the_header_class() -> None:
-    head = wire.pack_quickly(wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
+    head = wire.pack_header(wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
     assert head == wire.Header(3, wire.LATCHED, 5, 6, 7, 17).pack()
     assert wire.read_header(head) == wire.Header(3, wire.LATCHED, 5, 6, 7, 17)
-    assert wire.unpack_quickly(head) == (wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
+    assert wire.unpack_header(head) == (wire.form_of(3, wire.LATCHED), 17, 5, 6, 7)
 
 
 @given(st.lists(st.binary(max_size=60), max_size=5))
@@ -120,17 +120,17 @@ def test_invalid_hello_is_not_parsed(part: bytes) -> None:
     assert wire.parse_hello(part) is None
 
 
-@given(st.builds(wire.Read, *[st.integers(0, 2**64 - 1)] * 4))
-def test_acknowledgement_round_trip(read: wire.Read) -> None:
-    assert wire.parse_read(wire.read_part(read)) == read
-    assert wire.parse_hello(wire.read_part(read)) is None
+@given(st.builds(wire.Acknowledgement, *[st.integers(0, 2**64 - 1)] * 4))
+def test_acknowledgement_round_trip(read: wire.Acknowledgement) -> None:
+    assert wire.parse_acknowledgement(wire.acknowledgement_part(read)) == read
+    assert wire.parse_hello(wire.acknowledgement_part(read)) is None
 
 
 @given(st.binary(max_size=80) | st.text("0123456789abcdef/-", max_size=70).map(str.encode))
 def test_invalid_acknowledgement_is_not_parsed(junk: bytes) -> None:
-    read = wire.parse_read(b"\xffread/" + junk)
-    assert read is None or wire.read_part(read) == b"\xffread/" + junk.lower()
-    assert wire.parse_read(junk) is None
+    read = wire.parse_acknowledgement(b"\xffread/" + junk)
+    assert read is None or wire.acknowledgement_part(read) == b"\xffread/" + junk.lower()
+    assert wire.parse_acknowledgement(junk) is None
 
 
 @pytest.mark.parametrize("topic", ["a", "/Pepper/camera", "ü/ä", "x" * 200, "a=b,c", "機器人"])

@@ -18,7 +18,7 @@ import zmq
 
 import nep
 from nep.masters.master import Master
-from nep.messages.codecs import codec_numbered
+from nep.messages.codecs import codec_by_number
 from nep.messages.encoded import Encoded
 from nep.messages.packing import unpack
 from nep.protocol import wire
@@ -49,7 +49,7 @@ def meaning_of(means: dict[str, Any]) -> dict[str, Any]:
 
 
 def type_of(vector: dict[str, Any]) -> str:
-    codec = codec_numbered(vector["means"]["codec"])
+    codec = codec_by_number(vector["means"]["codec"])
     assert codec is not None
     return codec.name
 
@@ -100,7 +100,7 @@ def test_publisher_sends_the_bytes_of_the_vector(
     if len(parts) == 1:  # only to those who say that they read it
         theirs.subscribe(wire.hello_part(7, said["topic"], one_part=True))
     theirs.connect(known.endpoints[0])
-    eventually(lambda: publisher.subscribers if len(parts) == 1 else sends.is_heard)
+    eventually(lambda: publisher.subscribers if len(parts) == 1 else sends.has_subscribers)
     if len(parts) == 1:
         assert theirs.recv_multipart()[0] == wire.hello_part(7, said["topic"], one_part=True)
     payload = bytes.fromhex(said["payload"])

@@ -21,7 +21,7 @@ STEP_NS = 10_000_000
 
 def limits(**changed: float) -> WriterLimits:
     """The usual ones, on a disk that may be nearly full."""
-    return replace(WriterLimits(least_free_bytes=0), **changed)
+    return replace(WriterLimits(min_free_bytes=0), **changed)
 
 
 class TestClock:

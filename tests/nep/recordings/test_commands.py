@@ -17,8 +17,8 @@ import typer
 
 import nep
 from nep.cli.app import app
-from nep.cli.recording_files import time_ns
-from nep.cli.ring import has_ring
+from nep.cli.recording_files import parse_time_ns
+from nep.cli.ring import has_flight_recorder
 from nep.errors import NepError, RecordingError, RecordingsUnavailableError, ServiceError
 from nep.recordings.reader import Recording
 from tests.nep.programs import eventually
@@ -75,7 +75,7 @@ def test_record_command_writes_a_complete_private_file_when_interrupted(master, 
     assert path.stat().st_mode & 0o777 == 0o600
     with Recording(path) as recording:
         assert [each.message.payload["n"] for each in recording.read()] == list(range(50))
-        assert recording.words["note"] == "first"
+        assert recording.recorder_metadata["note"] == "first"
 
 
 def test_record_command_stops_after_its_duration_and_prints_json(master, tmp_path, capfdbinary):
@@ -127,14 +127,14 @@ def test_ring_command_saves_the_last_seconds_on_command_and_on_signal(master, tm
             node.new_client("flight_recorder/keep", timeout_s=60.0).call({"seconds": "x"})
         child.send_signal(signal.SIGTERM)
         child.communicate(timeout=60)
-        eventually(lambda: not has_ring(robot.graph()))
+        eventually(lambda: not has_flight_recorder(robot.graph()))
         with pytest.raises(NepError, match="'nep recording ring' is not running"):
             run(*words)
     assert child.returncode == 0
     assert sorted(each.name for each in tmp_path.iterdir()) == [each.name for each in files()]
     with Recording(told["path"]) as recording:
         assert list(recording.topics) == ["/arm/joints"]
-        assert recording.words["note"] == "it fell"
+        assert recording.recorder_metadata["note"] == "it fell"
         assert recording.message_count == told["message_count"] > 0
     for wrong in (("--seconds", 0), ("--seconds", "nan"), ("--size", -1)):
         with pytest.raises(typer.BadParameter):
@@ -286,10 +286,10 @@ def test_play_command_stops_publishing_a_topic_when_a_robot_it_moves_connects(ma
 
 
 def test_shell_completion_offers_topics_of_the_file(path):
-    from nep.cli.recording_files import _complete_recorded
+    from nep.cli.recording_files import _complete_recorded_topic
 
     def offered(file):
-        return _complete_recorded(SimpleNamespace(params={"file": file}), "/a")
+        return _complete_recorded_topic(SimpleNamespace(params={"file": file}), "/a")
 
     assert offered(path) == ["/arm/joints"]
     assert offered(path.parent / "none") == offered(None) == []
@@ -335,15 +335,15 @@ def test_start_time_is_parsed_from_seconds_or_clock_time(text, after_s):
     utc = datetime.fromtimestamp(START / 1e9 + 90, timezone.utc)
     at = utc.astimezone()
     given = text.format(clock=f"{at:%H:%M:%S}", day=f"{at:%Y-%m-%d}", utc=f"{utc:%H:%M:%S}")
-    assert time_ns(given, START, START + HOUR) == START + round(after_s * 1e9)
+    assert parse_time_ns(given, START, START + HOUR) == START + round(after_s * 1e9)
 
 
 def test_clock_time_after_midnight_is_on_the_next_day():
     at = datetime.fromtimestamp(START / 1e9, timezone.utc).astimezone()
     midnight = at.replace(hour=23, minute=59, second=50, microsecond=0)
     start = int(midnight.timestamp()) * 10**9
-    assert time_ns("00:00:05", start, start + 60 * 10**9) == start + 15 * 10**9
-    assert time_ns("00:00:05", start, start + 10**9) < start  # it has ended before
+    assert parse_time_ns("00:00:05", start, start + 60 * 10**9) == start + 15 * 10**9
+    assert parse_time_ns("00:00:05", start, start + 10**9) < start  # it has ended before
 
 
 @pytest.mark.parametrize(
@@ -362,4 +362,4 @@ def test_clock_time_after_midnight_is_on_the_next_day():
 )
 def test_invalid_time_is_rejected(text):
     with pytest.raises(typer.BadParameter, match="is not a valid"):
-        time_ns(text, START, START + HOUR)
+        parse_time_ns(text, START, START + HOUR)

@@ -17,7 +17,7 @@ import pytest
 from nep.errors import RecordingError, RecordingsUnavailableError
 from nep.messages import image_codec
 from nep.messages.message import Message
-from nep.recordings.export import Part, export, flattened
+from nep.recordings.export import Part, export, flatten
 from nep.recordings.reader import Recording
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.mcap_doctor import McapDoctor
@@ -52,7 +52,7 @@ def recording(tmp_path):
 def test_csv_export_has_every_field_of_every_decodable_message(recording, tmp_path):
     progress = []
     made = export(recording, "csv", tmp_path / "out", progress=lambda *told: progress.append(told))
-    assert [(each.topic, each.path.name, each.count, each.unreadable) for each in made] == [
+    assert [(each.topic, each.path.name, each.count, each.undecodable_count) for each in made] == [
         ("/arm/state", "arm_state.csv", 3, 1),
         ("/t", "t.csv", 1, 0),
     ]
@@ -94,7 +94,7 @@ def test_export_renames_conflicting_fields_and_escapes_invalid_characters(tmp_pa
     record(tmp_path / "a.mcap", [[message(seq, value) for seq, value in enumerate(values, 1)]])
     with Recording(tmp_path / "a.mcap") as recording:
         (made,) = export(recording, kind, tmp_path / "out")
-    assert (made.count, made.unreadable) == (2, 0)
+    assert (made.count, made.undecodable_count) == (2, 0)
     if kind == "csv":
         with made.path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -190,10 +190,10 @@ def test_failed_video_export_raises_and_leaves_no_file(tmp_path, monkeypatch):
     record(tmp_path / "a.mcap", [[picture(seq) for seq in range(1, 4)]])
     with Recording(tmp_path / "a.mcap") as recording:
         with monkeypatch.context() as patched:
-            patched.setattr("nep.recordings.film.MAX_S", 0.015)
+            patched.setattr("nep.recordings.film.MAX_DURATION_S", 0.015)
             with pytest.raises(RecordingError, match="more than a day"):
                 export(recording, "mp4", tmp_path / "out")
-        monkeypatch.setattr("nep.recordings.film.Film.close", truncate)
+        monkeypatch.setattr("nep.recordings.film.VideoFile.close", truncate)
         with pytest.raises(RecordingError, match="the disk may be full"):
             export(recording, "mp4", tmp_path / "out")
     assert not list((tmp_path / "out").iterdir())
@@ -250,15 +250,17 @@ def test_invalid_export_requests_raise_errors(recording, tmp_path, monkeypatch):
 
 
 def test_scalars_and_empty_collections_are_flattened_to_a_column():
-    assert flattened(5) == {"value": 5}
-    assert flattened({}) == {"value": "{}"}
-    assert flattened({"a": {}, "b": [], "c": b"\0"}) == {"a": "{}", "b": "[]", "c": "\"b'\\\\x00'\""}
+    assert flatten(5) == {"value": 5}
+    assert flatten({}) == {"value": "{}"}
+    assert flatten({"a": {}, "b": [], "c": b"\0"}) == {"a": "{}", "b": "[]", "c": "\"b'\\\\x00'\""}
 
 
 def test_mcap_export_of_a_range_preserves_bytes_times_notes_and_run(tmp_path):
     path = tmp_path / "a.mcap"
     run = {"id": "1", "name": "Greeting", "until_ns": None}
-    with RecordingWriter(path, note="first", clock=TestClock(), limits=limits(figures_s=1e6)) as writer:
+    with RecordingWriter(
+        path, note="first", clock=TestClock(), limits=limits(stats_interval_s=1e6)
+    ) as writer:
         for seq in range(40):
             writer.post([picture(seq) if seq % 4 == 0 else json_message(seq, f"/{'ab'[seq % 2]}")])
             assert writer.flush()
@@ -272,7 +274,7 @@ def test_mcap_export_of_a_range_preserves_bytes_times_notes_and_run(tmp_path):
         wanted = [
             (each.log_ns, kept(each.message)) for each in whole.read(part.start_ns, part.end_ns, part.topics)
         ]
-        notes = list(whole.said("notes"))[1:]
+        notes = list(whole.entries("notes"))[1:]
         told: list[tuple[int, int]] = []
         (made,) = export(whole, "mcap", tmp_path / "out", part, progress=lambda *each: told.append(each))
         assert (made.path, made.count, told[-1]) == (
@@ -289,8 +291,8 @@ def test_mcap_export_of_a_range_preserves_bytes_times_notes_and_run(tmp_path):
     with Recording(made.path) as recording:
         assert recording.is_complete
         assert [(each.log_ns, kept(each.message)) for each in recording.read()] == wanted
-        assert recording.words["note"] == "first"
-        assert list(recording.said("notes")) == notes
-        assert [value for _at, value in recording.said("runs")] == [run]  # not once for each second
+        assert recording.recorder_metadata["note"] == "first"
+        assert list(recording.entries("notes")) == notes
+        assert [value for _at, value in recording.entries("runs")] == [run]  # not once for each second
     assert McapDoctor(made.path).problems == []
     assert sorted(each.name for each in (tmp_path / "out").iterdir()) == ["a.mcap"]

@@ -82,7 +82,7 @@ def test_every_mcap_variant_of_other_programs_is_read(tmp_path: Path, kind: str)
         assert sum(recording.densities(SECOND, 2 * SECOND, 7)["/wheel"]) == COUNT
         assert ("robot", {"serial": "12"}) in recording.facts.metadata
         assert [each.name for each in recording.facts.attachments] == ["map.png"]
-        assert not recording.damage
+        assert not recording.corruption
     assert [each.name for each in tmp_path.iterdir()] == ["theirs.mcap"]
 
 
@@ -151,7 +151,7 @@ def test_exported_range_keeps_encodings_schemas_and_metadata_without_loss_counts
         (made,) = export(recording, "mcap", tmp_path / "part", part)
     assert made.count == 20
     with Recording(made.path) as recording:
-        assert recording.figures() == {}
+        assert recording.stats() == {}
         assert {each.name: each.message_count for each in recording.topics.values()} == {
             "/lamp": 0,
             "/wheel": 20,
@@ -242,6 +242,6 @@ def test_exported_range_of_own_recording_counts_its_losses(tmp_path: Path) -> No
         times = [each.log_ns for each in recording.read()]
         (made,) = export(recording, "mcap", tmp_path / "out", Part(times[1], times[5]))
     with Recording(made.path) as recording:
-        figures = recording.figures()["/odom"]
+        figures = recording.stats()["/odom"]
         assert (figures.received, figures.lost, figures.late) == (4, 1, 0)
         assert [each.message.seq for each in recording.read()] == [2, 3, 5, 6]

@@ -14,7 +14,7 @@ from nep.errors import RecordingError, RecordingTooLargeError
 from nep.messages.message import Message
 from nep.recordings.export import export
 from nep.recordings.file_reader import FileReader
-from nep.recordings.formats.damage import damage_words
+from nep.recordings.formats.damage import corruption_text
 from nep.recordings.formats.index import read_index
 from nep.recordings.formats.limits import ReadBudget, open_budget
 from nep.recordings.reader import Recording
@@ -90,14 +90,14 @@ def test_decompression_bomb_in_a_chunk_is_reported_as_damage(paths: list[Path], 
     (path,) = (each for each in paths if each.stem == name)
     with Recording(path) as recording:
         assert list(recording.read()) == []
-        (damage,) = recording.damage
+        (damage,) = recording.corruption
         assert (damage.start_ns, damage.end_ns) == hostile.TIMES
 
 
 def test_chunk_is_indexed_once_despite_repeated_summary_entries(paths: list[Path]) -> None:
     (path,) = (each for each in paths if each.stem.startswith("3 000 entries"))
     with FileReader(path) as reader:
-        assert len(reader.chunks()) + len(reader.damage) <= 1
+        assert len(reader.chunks()) + len(reader.corruption) <= 1
 
 
 def test_open_cost_is_bounded_by_the_file_size(paths: list[Path]) -> None:
@@ -117,7 +117,7 @@ def test_read_budget_limits_bytes_and_seconds(tmp_path: Path) -> None:
     path.write_bytes(hostile.closed(hostile.channel() + hostile.chunk_of(hostile.message()) * 10))
     size = path.stat().st_size
     with FileReader(path, budget=ReadBudget(path, 100_000)) as reader:
-        assert len(list(reader.raw(None, None, {1}))) == 10
+        assert len(list(reader.read_raw(None, None, {1}))) == 10
     with pytest.raises(RecordingTooLargeError):
         FileReader(path, budget=ReadBudget(path, size // 2))
     clock = iter([0.0, *[2.0] * 100])
@@ -128,7 +128,7 @@ def test_read_budget_limits_bytes_and_seconds(tmp_path: Path) -> None:
 def test_overlapping_chunks_are_read_without_holding_all_messages(paths: list[Path]) -> None:
     (path,) = (each for each in paths if each.stem == "all chunks at all times")
     with FileReader(path) as reader:
-        assert sum(1 for _each in reader.raw(None, None, {1})) == 20_000
+        assert sum(1 for _each in reader.read_raw(None, None, {1})) == 20_000
 
 
 @pytest.mark.parametrize("kind", ["chunks", "no chunks", "no summary", "no message index"])
@@ -148,8 +148,8 @@ def test_damaged_bytes_raise_only_recording_errors(tmp_path: Path, kind: str) ->
                 list(recording.read())
                 recording.newest(recording.end_ns)
                 recording.densities(0, 2**64 - 1, 5)
-                recording.figures()
-                assert damage_words(recording.damage, recording.start_ns) or not recording.damage
+                recording.stats()
+                assert corruption_text(recording.corruption, recording.start_ns) or not recording.corruption
         except RecordingError as error:
             assert error.reason  # noqa: PT017 - either is right
 

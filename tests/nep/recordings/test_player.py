@@ -131,7 +131,7 @@ def test_loop_repeats_a_range_until_it_is_ended(recording, times):
     playback.play()
     found = [seq for _at, seq in run(playback, clock, 0.5)]
     assert found[:9] == [21, 22, 23, 24, 20, 21, 22, 23, 24]
-    playback.end_loop()
+    playback.clear_loop()
     found = [seq for _at, seq in run(playback, clock, 2.0)]
     assert found[-1] == COUNT - 1
     assert playback.status().is_at_end
@@ -224,16 +224,16 @@ def test_player_thread_delivers_messages_in_order_and_seeks_separately(recording
     came, jumps, ended = [], [], threading.Event()
     playback = Playback(recording)
     with Player(playback, came.extend, on_jump=jumps.append, on_end=ended.set) as player:
-        player.order(lambda each: setattr(each, "speed", 10.0))
-        player.order(Playback.play)
+        player.apply(lambda each: setattr(each, "speed", 10.0))
+        player.apply(Playback.play)
         assert ended.wait(30)
         assert [kept(each) for each in came] == [kept(each.message) for each in recording.read()]
         assert not jumps
-        player.order(lambda each: each.seek(times[50]))
+        player.apply(lambda each: each.seek(times[50]))
         until(lambda: jumps)
         assert {each.seq for each in jumps[0]} == {49, 50}
         with pytest.raises(ValueError, match=r"0\.1 to 10"):
-            player.order(lambda each: setattr(each, "speed", 0.0))
+            player.apply(lambda each: setattr(each, "speed", 0.0))
         assert player.status.position_ns == times[50]
     player.close()
 
@@ -245,7 +245,7 @@ def test_exception_of_the_sink_ends_playback_and_is_reported(recording):
         raise ConnectionError("nobody is there")
 
     with Player(Playback(recording), refuse, on_end=ended.set) as player:
-        player.order(Playback.play)
+        player.apply(Playback.play)
         assert ended.wait(30)
         assert str(player.problem) == "nobody is there"
         assert not player.status.is_playing

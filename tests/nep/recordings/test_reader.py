@@ -50,7 +50,7 @@ def test_recording_reports_start_count_and_topics(recording, everything):
         ("/b", 120),
         ("/rare", 2),
     ]
-    assert recording.words["end"] == ""
+    assert recording.recorder_metadata["end"] == ""
 
 
 @settings(max_examples=60)
@@ -129,7 +129,7 @@ def test_unfinished_file_gives_the_same_messages_and_counts(path, everything, tm
         assert not opened.is_complete
         assert [kept(each.message) for each in opened.read()] == [kept(each.message) for each in everything]
         assert opened.newest(everything[50].log_ns).keys() == {"/a", "/b", "/rare"}
-        assert {topic: each.received for topic, each in opened.figures().items()} == {
+        assert {topic: each.received for topic, each in opened.stats().items()} == {
             "/a": 120,
             "/b": 120,
             "/rare": 2,
@@ -157,12 +157,12 @@ def test_damaged_chunk_is_skipped_and_counted(path, everything, tmp_path):
     damaged.write_bytes(data)
     with Recording(damaged) as opened:
         found = [each.log_ns for each in opened.read()]
-        assert opened.damaged_chunks == 1
+        assert opened.corrupt_range_count == 1
         assert found == [
             each.log_ns for each in everything if not chunk.start_ns <= each.log_ns <= chunk.end_ns
         ]
         opened.newest(chunk.end_ns)
-        assert opened.damaged_chunks == 1
+        assert opened.corrupt_range_count == 1
 
 
 @pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 30, 1000])
@@ -238,7 +238,7 @@ def test_messages_of_overlapping_chunks_are_read_in_order(tmp_path, everything):
         table_of = opened.facts.channels
     writer = FileWriter(tmp_path / "b.mcap")
     for number, definition in table_of.items():
-        writer.table.put(number, definition)
+        writer.table.add_numbered(number, definition)
     rnd = random.Random(2)
     times = [rnd.randrange(1000) for _each in range(300)]
     for at, log_ns in enumerate(times):
@@ -280,4 +280,4 @@ def test_reading_a_closed_recording_raises_closed_error(path):
 
 def test_test_clock_times_match_the_test_constants(everything):
     assert START_NS < everything[0].log_ns < START_NS + 100 * STEP_NS
-    assert limits().least_free_bytes == 0
+    assert limits().min_free_bytes == 0

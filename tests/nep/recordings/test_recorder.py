@@ -16,7 +16,7 @@ import pytest
 
 import nep
 from nep.errors import BadTopicError
-from nep.protocol.topic_glob import glob_matches, widened
+from nep.protocol.topic_glob import glob_matches, widened_pattern
 from nep.protocol.topic_pattern import matches
 from nep.recordings import child
 from nep.recordings.child import RecorderService
@@ -73,7 +73,7 @@ def test_widened_pattern_matches_every_topic_of_the_original_pattern(pattern):
     topics = ["/a/b", "/ab/b", "q", "/x/y", "/x/ayb/c/d", "/cam1", "cams", "/r/cam2", "/plain", "/a/b/c"]
     for topic in topics:
         if glob_matches(pattern, topic):
-            assert matches(widened(pattern), topic)
+            assert matches(widened_pattern(pattern), topic)
 
 
 def test_each_message_is_recorded_once_including_the_first_of_later_topics(make):
@@ -148,7 +148,7 @@ def test_recorded_messages_equal_received_messages_byte_for_byte(master, tmp_pat
 
     with Recording(path) as recording:
         found = sorted(all_of(each.message) for each in recording.read())
-        figures = recording.figures()
+        figures = recording.stats()
     assert found == sorted(all_of(each) for each in live)
     assert {(each.received, each.lost, each.late) for each in figures.values()} == {(10, 0, 0)}
 
@@ -160,13 +160,13 @@ def test_recorder_service_executes_commands(master, tmp_path):
         return [each for each in events if each["event"] == kind]
 
     def order(**content: object) -> None:
-        service.order(json.dumps(content).encode())
+        service.execute(json.dumps(content).encode())
 
     with (
         nep.node("recorder", master=master.address) as node,
         nep.node("robot", master=master.address) as robot,
     ):
-        service = RecorderService(node, lambda event: events.append(dict(event)), figures_s=0.01)
+        service = RecorderService(node, lambda event: events.append(dict(event)), stats_interval_s=0.01)
         publisher = robot.new_pub("/a")
         order(op="ring", folder=str(tmp_path / "ring"), seconds=60)
         order(op="record", path=str(tmp_path / "a.mcap"), note="first", topics=["/a"])
@@ -191,7 +191,7 @@ def test_recorder_service_executes_commands(master, tmp_path):
             b'{"op":"say","role":"runs","value":3}',
             b"\xff",
         ):
-            service.order(wrong)
+            service.execute(wrong)
         order(op="record", path=str(tmp_path / "nowhere" / "a.mcap"))
         order(op="record", path=str(tmp_path / "c.mcap"), topics=["two words"])
         service.close()
@@ -201,14 +201,14 @@ def test_recorder_service_executes_commands(master, tmp_path):
     assert ended["status"]["message_count"] == 5
     with Recording(tmp_path / "a.mcap") as recording:
         assert [each.message.payload for each in recording.read()] == [{"n": n} for n in range(5)]
-        assert recording.words["note"] == "first"
-        assert [value for _at, value in recording.said("notes")] == [{"text": "it fell"}]
-        assert [value for _at, value in recording.said("runs")] == [{"id": "1", "name": "Greeting"}]
-        assert list(recording.said("alarms")) == []
+        assert recording.recorder_metadata["note"] == "first"
+        assert [value for _at, value in recording.entries("notes")] == [{"text": "it fell"}]
+        assert [value for _at, value in recording.entries("runs")] == [{"id": "1", "name": "Greeting"}]
+        assert list(recording.entries("alarms")) == []
     with Recording(tmp_path / "kept.mcap") as recording:
-        assert [value for _at, value in recording.said("alarms")] == [{"id": "2"}]
-        assert [value for _at, value in recording.said("runs")] == [{"id": "1", "name": "Greeting"}]
-        assert (recording.topics["/a"].message_count, recording.words["note"]) == (5, "the fall")
+        assert [value for _at, value in recording.entries("alarms")] == [{"id": "2"}]
+        assert [value for _at, value in recording.entries("runs")] == [{"id": "1", "name": "Greeting"}]
+        assert (recording.topics["/a"].message_count, recording.recorder_metadata["note"]) == (5, "the fall")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.mcap", "kept.mcap", "ring"]
     assert not list((tmp_path / "ring").iterdir())
 
@@ -222,15 +222,15 @@ def test_recording_stops_at_its_duration_or_size_limit(master, tmp_path, limit, 
         nep.node("robot", master=master.address) as robot,
     ):
         service = RecorderService(
-            node, lambda event: events.append(dict(event)), figures_s=0.01, clock=lambda: now[0]
+            node, lambda event: events.append(dict(event)), stats_interval_s=0.01, clock=lambda: now[0]
         )
         publisher = robot.new_pub("/a")
         for wrong in ({"seconds": 0}, {"seconds": "x"}, {"seconds": float("inf")}, {"size_bytes": 0}):
             path = tmp_path / "none.mcap"
-            service.order(json.dumps({"op": "record", "path": str(path), **wrong}).encode())
+            service.execute(json.dumps({"op": "record", "path": str(path), **wrong}).encode())
             assert not path.exists()
         assert [each["event"] for each in events] == ["problem"] * 4
-        service.order(json.dumps({"op": "record", "path": str(tmp_path / "a.mcap"), **ends}).encode())
+        service.execute(json.dumps({"op": "record", "path": str(tmp_path / "a.mcap"), **ends}).encode())
         publisher.publish({"n": random.Random(1).randbytes(2000).hex()})
 
         def written() -> int:
@@ -261,15 +261,15 @@ def test_recording_that_stops_on_its_own_is_reported_and_another_can_start(maste
         return [each for each in events if each["event"] == kind]
 
     def order(**content: object) -> None:
-        service.order(json.dumps(content).encode())
+        service.execute(json.dumps(content).encode())
 
-    soon = limits(figures_s=0.001)
+    soon = limits(stats_interval_s=0.001)
     monkeypatch.setattr(child, "RecordingWriter", partial(RecordingWriter, limits=soon))
-    full = limits(figures_s=0.001, least_free_bytes=2**62)
+    full = limits(stats_interval_s=0.001, min_free_bytes=2**62)
     monkeypatch.setattr(child, "FlightRecorder", partial(FlightRecorder, limits=full))
     path = tmp_path / "a.mcap"
     with nep.node("recorder", master=master.address) as node:
-        service = RecorderService(node, lambda event: events.append(dict(event)), figures_s=1000.0)
+        service = RecorderService(node, lambda event: events.append(dict(event)), stats_interval_s=1000.0)
         order(op="record", path=str(path))
         path.unlink()
         until(lambda: seen("ended"))
@@ -287,7 +287,7 @@ def test_recording_that_stops_on_its_own_is_reported_and_another_can_start(maste
 
 def test_command_line_that_is_too_long_is_discarded(monkeypatch):
     monkeypatch.setattr(child, "_MAX_LINE_BYTES", 10)
-    lines = child._lines(io.BytesIO(b'{"a":1}\n' + b"x" * 25 + b'{"op":1}\n\n{"b":2}'))
+    lines = child._read_lines(io.BytesIO(b'{"a":1}\n' + b"x" * 25 + b'{"op":1}\n\n{"b":2}'))
     assert list(lines) == [b'{"a":1}\n', b"", b"\n", b'{"b":2}']
 
 

@@ -51,8 +51,8 @@ def test_remote_reader_returns_the_same_as_a_local_reader(path: Path, reader: Re
         assert there.newest_times(middle) == here.newest_times(middle)
         span = (here.start_ns, here.end_ns + 1, 30)
         assert there.densities(*span) == here.densities(*span)
-        assert there.figures() == here.figures()
-        assert list(there.figures_over_time(here.figure_pieces())) == list(here.figures_over_time())
+        assert there.stats() == here.stats()
+        assert list(there.stats_over_time(here.stats_chunks())) == list(here.stats_over_time())
         assert there.after(middle, "/list") is not None
     with pytest.raises(ClosedError):
         next(there.read())
@@ -78,7 +78,7 @@ def test_unreadable_file_raises_and_other_files_stay_readable(
     (tmp_path / "bomb.mcap").write_bytes(hostile.files()["zstd frame larger than its chunk states"]())
     with reader.open(tmp_path / "bomb.mcap") as bomb:
         assert list(bomb.read()) == []
-        assert len(bomb.damage) == 1
+        assert len(bomb.corruption) == 1
     with reader.open(path) as whole:
         assert next(whole.read())
 
@@ -132,7 +132,7 @@ def test_invalid_requests_receive_an_error_reply() -> None:
         {"op": "next", "cursor": []},
         {"op": ["x"]},
     ):
-        assert "error" in service.answer(request)
+        assert "error" in service.reply(request)
 
 
 def test_truncated_or_invalid_frame_is_read_as_end_of_stream() -> None:

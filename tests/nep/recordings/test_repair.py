@@ -67,13 +67,13 @@ def test_repaired_file_is_complete_and_keeps_its_figures(path, tmp_path):
     assert progress[-1] == (damaged.stat().st_size, damaged.stat().st_size)
     with Recording(report.path) as recording, Recording(path) as before:
         assert recording.is_complete
-        assert recording.words["repaired"] == "1"
-        assert recording.figures() == before.figures()
+        assert recording.recorder_metadata["repaired"] == "1"
+        assert recording.stats() == before.stats()
 
 
 def test_repair_of_an_undamaged_recording_loses_nothing(path, tmp_path):
     report = repair(path, tmp_path / "copy.mcap")
-    assert report.is_whole
+    assert report.is_complete
     assert read(report.path) == [kept(each) for each in ALL]
 
 
@@ -89,7 +89,7 @@ def test_repair_drops_only_the_damaged_chunk_and_counts_its_messages(path, tmp_p
     report = repair(tmp_path / "a.mcap")
     gone = {kept(each) for each in PARTS[4]}
     assert read(report.path) == [kept(each) for each in ALL if kept(each) not in gone]
-    assert (report.discarded, report.damaged_places) == (len(PARTS[4]), 1)
+    assert (report.discarded, report.damaged_range_count) == (len(PARTS[4]), 1)
     assert report.discarded_bytes >= chunks[4].length
 
 

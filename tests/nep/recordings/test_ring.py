@@ -31,22 +31,22 @@ def test_flight_recorder_keeps_the_last_seconds_plus_at_most_one_segment(tmp_pat
         fill(ring, 1, 1001)
         status = ring.status
         assert 2.0 <= status.seconds <= 2.0 * 9 / 8 + 0.3
-        made = ring.keep(tmp_path / "a.mcap", 2.0, "it fell")
+        made = ring.save(tmp_path / "a.mcap", 2.0, "it fell")
         assert 2.0 <= made.duration_s <= 2.2
         with Recording(tmp_path / "a.mcap") as recording:
             seqs = [each.message.seq for each in recording.read()]
             assert seqs == list(range(seqs[0], 1001))
-            assert len(seqs) == made.message_count == recording.figures()["/odom"].received
-            assert recording.words["note"] == "it fell"
-            assert (recording.words["kept"], recording.is_complete) == ("1", True)
+            assert len(seqs) == made.message_count == recording.stats()["/odom"].received
+            assert recording.recorder_metadata["note"] == "it fell"
+            assert (recording.recorder_metadata["kept"], recording.is_complete) == ("1", True)
             assert [kept(each.message) for each in recording.read()] == [
                 kept(json_message(seq)) for seq in seqs
             ]
         assert McapDoctor(tmp_path / "a.mcap").problems == []
-        short = ring.keep(tmp_path / "b.mcap", 0.5)
+        short = ring.save(tmp_path / "b.mcap", 0.5)
         assert 0.5 <= short.duration_s <= 0.7
         fill(ring, 1001, 1101)  # and it goes on
-        ring.keep(tmp_path / "c.mcap", 60.0)
+        ring.save(tmp_path / "c.mcap", 60.0)
         with Recording(tmp_path / "c.mcap") as recording:
             assert recording.newest(recording.end_ns)["/odom"].message.seq == 1100
     assert not list((tmp_path / "ring").iterdir())
@@ -60,7 +60,7 @@ def test_flight_recorder_is_limited_by_bytes_before_seconds(tmp_path):
             there = sum(each.stat().st_size for each in tmp_path.iterdir())
             assert there <= size * 9 / 8 + 2000
         assert ring.status.seconds < 20
-        assert ring.keep(tmp_path / "kept", 1e6).message_count > 100
+        assert ring.save(tmp_path / "kept", 1e6).message_count > 100
         (tmp_path / "kept").unlink()
 
 
@@ -77,7 +77,7 @@ def test_segment_being_copied_is_removed_after_the_copy(tmp_path, monkeypatch):
         fill(ring, 1, 101)
         with monkeypatch.context() as patched:
             patched.setattr(ring_module, "FileWriter", SlowWriter)
-            thread = threading.Thread(target=lambda: made.append(ring.keep(tmp_path / "a.mcap", 1.0)))
+            thread = threading.Thread(target=lambda: made.append(ring.save(tmp_path / "a.mcap", 1.0)))
             thread.start()
             assert copying.wait(30)
         fill(ring, 101, 601)
@@ -93,7 +93,7 @@ def test_segment_being_copied_is_removed_after_the_copy(tmp_path, monkeypatch):
 
 def test_saved_flight_recording_counts_only_losses_of_its_seconds(tmp_path):
     clock = TestClock()
-    with FlightRecorder(tmp_path / "ring", clock=clock, limits=limits(figures_s=1e-9)) as ring:
+    with FlightRecorder(tmp_path / "ring", clock=clock, limits=limits(stats_interval_s=1e-9)) as ring:
         ring.post([json_message(1), json_message(5)])  # three are missing, long ago
         assert ring._writer.flush()
         ring.post([json_message(6)])
@@ -105,11 +105,11 @@ def test_saved_flight_recording_counts_only_losses_of_its_seconds(tmp_path):
         ring.post([json_message(10)])
         assert ring._writer.flush()
         assert ring._writer.flush()
-        ring.keep(tmp_path / "all.mcap", 3600.0)
-        ring.keep(tmp_path / "last.mcap", 1.0)
+        ring.save(tmp_path / "all.mcap", 3600.0)
+        ring.save(tmp_path / "last.mcap", 1.0)
     with Recording(tmp_path / "last.mcap") as recording:
         assert [each.message.seq for each in recording.read()] == [7, 9, 10]
-        assert recording.figures()["/odom"].lost in {0, 1}  # of this second, never the three
+        assert recording.stats()["/odom"].lost in {0, 1}  # of this second, never the three
 
 
 def test_segments_of_dead_processes_are_removed_and_others_kept(tmp_path):
@@ -133,37 +133,37 @@ def test_invalid_flight_recorder_requests_raise_errors(tmp_path):
     with FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits()) as ring:
         ring.post([json_message(1)])
         with pytest.raises(RecordingError, match=r"file'; .*already exists"):
-            ring.keep(tmp_path / "file", 1.0)
+            ring.save(tmp_path / "file", 1.0)
         with pytest.raises(RecordingError):
-            ring.keep(tmp_path / "nowhere" / "a.mcap", 1.0)
-        assert ring.keep(tmp_path / "a.mcap", 1.0).message_count == 1
+            ring.save(tmp_path / "nowhere" / "a.mcap", 1.0)
+        assert ring.save(tmp_path / "a.mcap", 1.0).message_count == 1
         for segment in (tmp_path / "ring").iterdir():
             with suppress(OSError):
                 segment.write_bytes(b"damaged" * (segment.stat().st_size // 7 + 1))
         with pytest.raises(RecordingError, match="damaged"):
-            ring.keep(tmp_path / "b.mcap", 1e6)
+            ring.save(tmp_path / "b.mcap", 1e6)
         assert not (tmp_path / "b.mcap").exists()
         ring.post([json_message(2)])  # what comes later is good again
-        assert ring.keep(tmp_path / "c.mcap", 1e6).message_count == 1
+        assert ring.save(tmp_path / "c.mcap", 1e6).message_count == 1
     with Recording(tmp_path / "c.mcap") as recording:
         assert [each.message.seq for each in recording.read()] == [2]
-        assert recording.words["damaged"] == "1"
+        assert recording.recorder_metadata["damaged"] == "1"
 
 
 def test_saving_an_empty_or_closed_flight_recorder_raises(tmp_path):
     ring = FlightRecorder(tmp_path / "ring", clock=TestClock(), limits=limits())
     with pytest.raises(RecordingError, match="no messages received yet"):
-        ring.keep(tmp_path / "a.mcap", 1.0)
+        ring.save(tmp_path / "a.mcap", 1.0)
     ring.post([json_message(1)])
     for wrong in (0.0, -1.0, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="above 0"):
-            ring.keep(tmp_path / "a.mcap", wrong)
+            ring.save(tmp_path / "a.mcap", wrong)
     ring.close()
     ring.close()
     ring.post([json_message(2)])
     assert ring.status.unkept == 1
     with pytest.raises(RecordingError):
-        ring.keep(tmp_path / "a.mcap", 1.0)
+        ring.save(tmp_path / "a.mcap", 1.0)
     assert [each.name for each in tmp_path.iterdir()] == ["ring"]
 
 
@@ -173,7 +173,7 @@ def test_full_disk_is_reported_and_leaves_no_flight_recorder_files(tmp_path):
         tmp_path / "ring",
         seconds=1.0,
         clock=TestClock(),
-        limits=limits(least_free_bytes=2**62, figures_s=0.001),
+        limits=limits(min_free_bytes=2**62, stats_interval_s=0.001),
         on_problem=told.append,
     )
     with ring:

@@ -10,7 +10,7 @@ import typer
 
 import nep
 from nep.errors import RecordingError
-from nep.messages.message import arrived, kind_of
+from nep.messages.message import message_kind, received_message
 from nep.recordings.reader import Recording
 from nep.recordings.split import SplitFiles, part_path
 from nep.recordings.writer import RecordingWriter
@@ -20,7 +20,7 @@ from tests.nep.recordings.messages import TestClock, json_message, limits
 from tests.nep.recordings.test_commands import run
 
 PART = 100_000
-STATE = arrived(kind_of("/arm/state", "json", "json", is_latched=True), b'{"on":true}', 1, 1, 3)
+STATE = received_message(message_kind("/arm/state", "json", "json", is_latched=True), b'{"on":true}', 1, 1, 3)
 
 
 def split(path: Path, sequences: range) -> SplitFiles:
@@ -49,9 +49,12 @@ def test_split_files_are_complete_and_together_hold_every_message_once(tmp_path:
         with Recording(path) as recording:
             found = [each.message.seq for each in recording.read(topics=["/odom"])]
             sequences += found
-            figures = recording.figures()["/odom"]
+            figures = recording.stats()["/odom"]
             assert (figures.received, figures.lost, figures.late) == (len(found), 0, 0)
-            assert (recording.words["part"], recording.words["note"]) == (str(number), "long")
+            assert (recording.recorder_metadata["part"], recording.recorder_metadata["note"]) == (
+                str(number),
+                "long",
+            )
             states = [each.message.payload for each in recording.read(topics=["/arm/state"])]
             assert states == [{"on": True}]
     assert sequences == list(range(1, 401))
@@ -61,7 +64,7 @@ def test_recording_below_the_split_size_is_one_file(tmp_path: Path) -> None:
     files = split(tmp_path / "tour.mcap", range(1, 5))
     assert [each.name for each in tmp_path.iterdir()] == ["tour-001.mcap"]
     with Recording(files.paths[0]) as recording:
-        assert "part" not in recording.words
+        assert "part" not in recording.recorder_metadata
 
 
 def test_split_does_not_overwrite_a_file_and_keeps_the_previous_part_complete(tmp_path: Path) -> None:

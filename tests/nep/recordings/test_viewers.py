@@ -166,7 +166,7 @@ def kept_by_a_ring(folder: Path) -> Path:
     with FlightRecorder(folder / "ring", seconds=60.0, clock=TestClock(), limits=limits()) as ring:
         for message in odd_messages():
             ring.post([message])
-        ring.keep(folder / "kept.mcap", 60.0)
+        ring.save(folder / "kept.mcap", 60.0)
     return folder / "kept.mcap"
 
 

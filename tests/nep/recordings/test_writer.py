@@ -14,7 +14,7 @@ import pytest
 
 from nep.errors import RecordingError
 from nep.messages.clocks import OWN_CLOCK, ClockDifference, PublisherClock
-from nep.messages.message import Message, arrived, kind_of
+from nep.messages.message import Message, message_kind, received_message
 from nep.recordings.formats.figures import MAX_LOST
 from nep.recordings.formats.mcap_file import FileWriter
 from nep.recordings.reader import Recording
@@ -38,7 +38,7 @@ class HeldDestination:
         self.file = FileWriter(path)
         self.is_held, self.go_on = threading.Event(), threading.Event()
 
-    def flushed(self) -> None:
+    def on_flushed(self) -> None:
         self.is_held.set()
         assert self.go_on.wait(30)
 
@@ -48,7 +48,7 @@ class HeldDestination:
     def finish(self) -> None:
         self.file.finish()
 
-    def fail(self) -> None:
+    def abort(self) -> None:
         self.file.close()
 
 
@@ -81,14 +81,16 @@ def test_messages_beyond_the_queue_limit_are_counted_in_status_and_recording(tmp
     status = writer.status
     assert (status.message_count, status.unkept, status.problem) == (10, 15, "")
     with Recording(path) as recording:
-        figures = recording.figures()["/odom"]
+        figures = recording.stats()["/odom"]
     assert (figures.received, figures.unkept, figures.lost) == (25, 15, 0)
     assert [each.seq for each in read(path)] == list(range(1, 11))
 
 
 def test_slow_disk_does_not_block_post(tmp_path):
     destination = HeldDestination(tmp_path / "a.mcap")
-    writer = RecordingWriter(destination, clock=TestClock(), limits=limits(queue_bytes=1000, flush_s=0.001))
+    writer = RecordingWriter(
+        destination, clock=TestClock(), limits=limits(queue_bytes=1000, flush_interval_s=0.001)
+    )
     writer.post([json_message(1)])
     assert destination.is_held.wait(30)
     for seq in range(2, 102):
@@ -100,8 +102,8 @@ def test_slow_disk_does_not_block_post(tmp_path):
     assert status.unkept > 80
     with Recording(tmp_path / "a.mcap") as recording:
         assert recording.message_count == status.message_count
-        assert recording.figures()["/odom"].unkept == status.unkept
-        assert recording.figures()["/odom"].lost == 0
+        assert recording.stats()["/odom"].unkept == status.unkept
+        assert recording.stats()["/odom"].lost == 0
 
 
 def test_lost_late_and_undecodable_messages_are_counted_per_topic(tmp_path):
@@ -115,7 +117,7 @@ def test_lost_late_and_undecodable_messages_are_counted_per_topic(tmp_path):
     with RecordingWriter(path, clock=TestClock(), limits=limits()) as writer:
         writer.post([*messages, broken, Message("/original", b"{}", "json", "json")])
     with Recording(path) as recording:
-        figures = recording.figures()
+        figures = recording.stats()
     assert (figures["/odom"].received, figures["/odom"].lost, figures["/odom"].late) == (7, 2, 1)
     assert (figures["/camera"].undecodable, figures["/camera"].lost) == (1, 0)
     assert figures["/original"].lost is None
@@ -124,12 +126,12 @@ def test_lost_late_and_undecodable_messages_are_counted_per_topic(tmp_path):
 
 def test_figures_record_the_time_of_a_loss(tmp_path):
     path = tmp_path / "a.mcap"
-    with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.001)) as writer:
+    with RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=0.001)) as writer:
         for seqs in ((1, 2), (5,), (6,)):
             writer.post([json_message(seq) for seq in seqs])
             until(lambda last=seqs[-1]: writer.status.topics.get("/odom") and last_seen(writer, last))
     with Recording(path) as recording:
-        times = [(at, each["/odom"].lost) for at, each in recording.figures_over_time() if "/odom" in each]
+        times = [(at, each["/odom"].lost) for at, each in recording.stats_over_time() if "/odom" in each]
         seen = {each.message.seq: each.log_ns for each in recording.read()}
     lost_at = next(at for at, lost in times if lost == 2)
     assert seen[5] <= lost_at <= seen[6]
@@ -143,9 +145,9 @@ def last_seen(writer: RecordingWriter, seq: int) -> bool:
 def test_receive_times_follow_stamps_of_known_clocks_and_never_decrease(tmp_path):
     path, now = tmp_path / "a.mcap", [START_NS]
     kinds = {
-        "own": kind_of("/own", "json", "json", clock=OWN_CLOCK),
-        "other": kind_of("/other", "json", "json", clock=PublisherClock(ClockDifference(1000, 10))),
-        "unknown": kind_of("/unknown", "json", "json"),
+        "own": message_kind("/own", "json", "json", clock=OWN_CLOCK),
+        "other": message_kind("/other", "json", "json", clock=PublisherClock(ClockDifference(1000, 10))),
+        "unknown": message_kind("/unknown", "json", "json"),
     }
     with RecordingWriter(path, clock=lambda: now[0], limits=limits()) as writer:
         now[0] += 100_000
@@ -157,7 +159,7 @@ def test_receive_times_follow_stamps_of_known_clocks_and_never_decrease(tmp_path
             ("own", 70_000),
             ("own", 10**9),
         ]
-        writer.post([arrived(kinds[name], b"{}", START_NS + at, 1, 1) for name, at in batch])
+        writer.post([received_message(kinds[name], b"{}", START_NS + at, 1, 1) for name, at in batch])
     with Recording(path) as recording:
         times = [each.log_ns - START_NS for each in recording.read()]
     assert times == [50_000, 60_000, 60_000, 100_000, 100_000, 100_000]
@@ -195,7 +197,7 @@ def test_writer_reports_a_really_full_disk_and_counts_unwritten_messages(tmp_pat
         "from nep.recordings.writer import RecordingWriter, WriterLimits\n"
         "import os\n"
         "path = Path(sys.argv[1]) / 'a.mcap'\n"
-        "writer = RecordingWriter(path, limits=WriterLimits(least_free_bytes=0))\n"
+        "writer = RecordingWriter(path, limits=WriterLimits(min_free_bytes=0))\n"
         "count = 0\n"
         "while not writer.problem:\n"
         "    count += 1\n"
@@ -219,7 +221,9 @@ def test_writer_stops_with_a_complete_file_before_the_disk_is_full(tmp_path, mon
     monkeypatch.setattr(
         "nep.recordings.formats.destination.shutil.disk_usage", lambda _folder: SimpleNamespace(free=free[0])
     )
-    writer = RecordingWriter(path, clock=TestClock(), limits=limits(least_free_bytes=1000, figures_s=0.001))
+    writer = RecordingWriter(
+        path, clock=TestClock(), limits=limits(min_free_bytes=1000, stats_interval_s=0.001)
+    )
     writer.post([json_message(1)])
     assert writer.flush()
     free[0] = 999
@@ -228,13 +232,13 @@ def test_writer_stops_with_a_complete_file_before_the_disk_is_full(tmp_path, mon
     assert McapDoctor(path).problems == []
     with Recording(path) as recording:
         assert (recording.is_complete, recording.message_count) == (True, 1)
-        assert "disk is full" in recording.words["end"]
+        assert "disk is full" in recording.recorder_metadata["end"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows removes no file that is open")
 def test_deleted_recording_file_is_reported(tmp_path):
     path = tmp_path / "a.mcap"
-    writer = RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=0.001))
+    writer = RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=0.001))
     writer.post([json_message(1)])
     assert writer.flush()
     path.unlink()
@@ -267,7 +271,7 @@ def test_extreme_sequence_numbers_do_not_stop_the_recording(tmp_path):
         writer.post(messages)
     assert (writer.status.problem, writer.status.message_count) == ("", 6)
     with Recording(path) as recording:
-        assert recording.figures()["/odom"].lost == MAX_LOST
+        assert recording.stats()["/odom"].lost == MAX_LOST
 
 
 def test_no_file_is_left_if_the_disk_is_full_from_the_start(tmp_path, monkeypatch):

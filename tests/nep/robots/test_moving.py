@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nep.programs.robots import MovingTopics, RobotControls, controls_in, moving_topics
+from nep.programs.robots import MovingTopics, RobotControls, moving_topics, parse_controls
 from nep.programs.robots.moving import original_robots
 from nep.protocol.graph_view import (
     GraphView,
@@ -33,21 +33,21 @@ def graph(*topics: TopicInfo, nodes: tuple[NodeInfo, ...] = (), patterns: tuple[
 
 def test_robot_is_moved_by_the_topics_of_its_description() -> None:
     moving = MovingTopics([ROVER])
-    assert moving.moved_by("/Rover/drive") == moving.moved_by("/Rover/world") == ("Rover",)
-    assert moving.moved_by("/Rover/command") == ()  # the name alone says nothing
-    assert moving.moved_by("/elsewhere", "robot/command") == ("/elsewhere",)
+    assert moving.robots_moved_by("/Rover/drive") == moving.robots_moved_by("/Rover/world") == ("Rover",)
+    assert moving.robots_moved_by("/Rover/command") == ()  # the name alone says nothing
+    assert moving.robots_moved_by("/elsewhere", "robot/command") == ("/elsewhere",)
 
 
 def test_rize_command_topic_moves_each_robot() -> None:
     fido = RobotControls("Fido", frozenset({"/Fido/command"}))
-    assert MovingTopics([ROVER, fido]).moved_by("robot_action") == ("Rover", "Fido")
-    assert MovingTopics().moved_by("robot_action") == ("robot_action",)
+    assert MovingTopics([ROVER, fido]).robots_moved_by("robot_action") == ("Rover", "Fido")
+    assert MovingTopics().robots_moved_by("robot_action") == ("robot_action",)
 
 
 def test_wildcards_in_a_description_protect_every_topic_that_matches() -> None:
     moving = MovingTopics([RobotControls("Rover", frozenset({"/Rover/*/go"}))])
-    assert moving.moved_by("/Rover/left/go") == ("Rover",)
-    assert moving.moved_by("/Rover/go") == ()
+    assert moving.robots_moved_by("/Rover/left/go") == ("Rover",)
+    assert moving.robots_moved_by("/Rover/go") == ()
 
 
 @pytest.mark.parametrize(
@@ -59,13 +59,13 @@ def test_wildcards_in_a_description_protect_every_topic_that_matches() -> None:
     ],
 )
 def test_partly_invalid_description_yields_its_valid_topics(description: object, topics: set[str]) -> None:
-    found = controls_in(description, "R")
+    found = parse_controls(description, "R")
     assert found == RobotControls("R", frozenset(topics))
 
 
 @pytest.mark.parametrize("description", [None, 3, [], {}, {"title": "R"}, {"rb:topics": {"command": ""}}])
 def test_description_without_a_topic_describes_no_robot(description: object) -> None:
-    assert controls_in(description, "R") is None
+    assert parse_controls(description, "R") is None
 
 
 def test_program_with_unread_description_is_protected_on_all_its_subscriptions() -> None:
@@ -75,21 +75,23 @@ def test_program_with_unread_description_is_protected_on_all_its_subscriptions()
         patterns=(PatternInfo("/Rover/parts/*", "json", (SubscriberInfo(3, "n", 0, 0),)),),
     )  # fmt: skip
     moving = moving_topics(view, (), ["/Rover/description"])
-    assert moving.moved_by("/go") == moving.moved_by("/Rover/command") == ("Rover",)
-    assert moving.moved_by("/Rover/parts/arm") == ("Rover",)
-    assert moving.moved_by("/other") == ()
+    assert moving.robots_moved_by("/go") == moving.robots_moved_by("/Rover/command") == ("Rover",)
+    assert moving.robots_moved_by("/Rover/parts/arm") == ("Rover",)
+    assert moving.robots_moved_by("/other") == ()
 
 
 def test_driver_without_a_published_description_yet_is_protected() -> None:
     answers = topic("/Rover/answer", "robot/answer", publisher="n")
     view = graph(answers, topic("/go", subscriber="n"))
-    assert moving_topics(view, ()).moved_by("/go") == ("Rover",)
+    assert moving_topics(view, ()).robots_moved_by("/go") == ("Rover",)
     announced = graph(
         answers,
         topic("/go", subscriber="n"),
         topic("/Rover/description", "robot/description", publisher="n"),
     )
-    assert moving_topics(announced, [ROVER]).moved_by("/go") == ()  # its description says what moves it
+    assert (
+        moving_topics(announced, [ROVER]).robots_moved_by("/go") == ()
+    )  # its description says what moves it
 
 
 def test_topic_of_the_command_type_moves_a_robot_of_unknown_name() -> None:
@@ -98,9 +100,9 @@ def test_topic_of_the_command_type_moves_a_robot_of_unknown_name() -> None:
         patterns=(PatternInfo("/x/*", "robot/command", (SubscriberInfo(3, "n", 0, 0),)),),
     )
     moving = moving_topics(view, [ROVER])
-    assert moving.moved_by("/Fido/go", "json") == ("/Fido/go",)
-    assert moving.moved_by("/x/y") == ("/x/y",)
-    assert moving_topics(view, [], own_nodes=["n"]).moved_by("/x/y") == ()
+    assert moving.robots_moved_by("/Fido/go", "json") == ("/Fido/go",)
+    assert moving.robots_moved_by("/x/y") == ("/x/y",)
+    assert moving_topics(view, [], own_nodes=["n"]).robots_moved_by("/x/y") == ()
 
 
 def test_robots_of_original_nep_are_named_after_their_nodes() -> None:
@@ -111,4 +113,4 @@ def test_robots_of_original_nep_are_named_after_their_nodes() -> None:
     heard = TopicInfo("robot_action", "json", "json", (), tuple(SubscriberInfo(1, id, 0, 0) for id in "nm"))
     view = graph(heard, nodes=nodes)
     moving = moving_topics(view, original_robots(view))
-    assert moving.moved_by("robot_action") == ("pepper_driver",)
+    assert moving.robots_moved_by("robot_action") == ("pepper_driver",)

@@ -331,7 +331,7 @@ def test_spin_wakes_for_a_new_server_and_for_each_call(
     master: Master, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A wait without a wake takes an hour: one that is lost would be a call without an answer."""
-    monkeypatch.setattr("nep.nodes.work.SLICE_S", 3600.0)
+    monkeypatch.setattr("nep.nodes.work.WAIT_SLICE_S", 3600.0)
     with nep.node("server") as a, nep.node("client") as b:
         spinner = threading.Thread(target=a.spin, name="spin")
         spinner.start()  # before there is a server

@@ -159,7 +159,7 @@ def test_client_that_does_not_read_does_not_block_others(
     node: nep.Node, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It asks for large answers and reads none: the others have theirs."""
-    monkeypatch.setattr("nep.backends.nanomsg.direct_services._ANSWER_MS", 200)
+    monkeypatch.setattr("nep.backends.nanomsg.direct_services._REPLY_TIMEOUT_MS", 200)
     at = node.direct("127.0.0.1", port)
     node.new_server("/big", lambda n: "x" * n, at, threads=2)
     with socket.create_connection(("127.0.0.1", port)) as rude:

@@ -48,11 +48,11 @@ def test_calls_and_replies_match_the_vectors(vector: dict[str, Any]) -> None:
         assert NATIVE.call(number, means["codec"], timeout_s, payload) == parts
         assert NATIVE.read_call(parts) == (number, means["codec"], timeout_s, payload)
         with pytest.raises(WireError):
-            NATIVE.read_answer(parts)
+            NATIVE.read_reply(parts)
     else:
         reply = Reply(CallKind(means["kind"]), payload, means["codec"])
-        assert NATIVE.answer(number, reply) == parts
-        assert NATIVE.read_answer(parts) == (number, reply)
+        assert NATIVE.reply(number, reply) == parts
+        assert NATIVE.read_reply(parts) == (number, reply)
         with pytest.raises(WireError):
             NATIVE.read_call(parts)
 
@@ -62,7 +62,7 @@ def test_malformed_parts_are_rejected_with_their_error_code(
     vector: dict[str, Any], stream: tuple[TcpStream, socket.socket]
 ) -> None:
     if "parts" in vector:
-        for read in (NATIVE.read_call, NATIVE.read_answer):
+        for read in (NATIVE.read_call, NATIVE.read_reply):
             with pytest.raises(WireError) as refused:
                 read(parts_of(vector))
             assert refused.value.code == vector["error"]

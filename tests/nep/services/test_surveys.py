@@ -260,11 +260,11 @@ def test_invalid_survey_arguments_are_rejected(make: Make) -> None:
 
 def test_back_end_without_surveys_or_services_raises(master: Master, monkeypatch: pytest.MonkeyPatch) -> None:
     with nep.node("here") as node:
-        monkeypatch.delattr(ZeromqTransport, "survey")
+        monkeypatch.delattr(ZeromqTransport, "create_surveyor")
         for make_one in (node.new_surveyor, node.new_respondent):
             with pytest.raises(nep.NepError, match=r"'zeromq' .*surveys"):
                 make_one("/who")
-        monkeypatch.delattr(ZeromqTransport, "server")
+        monkeypatch.delattr(ZeromqTransport, "create_server")
         for make_one in (node.new_server, node.new_client, node.new_surveyor, node.new_respondent):
             with pytest.raises(nep.NepError, match=r"'zeromq' .*services"):
                 make_one("/who")

@@ -16,7 +16,7 @@ import pytest
 
 import nep
 from nep.backends.zenoh import keys
-from nep.backends.zenoh.library import callback, library
+from nep.backends.zenoh.library import create_handler, load_zenoh
 from nep.protocol.requests import PublisherRecord, SubscriberRecord
 from tests.nep.programs import eventually, running
 
@@ -88,7 +88,7 @@ def stranger(routed: str) -> Iterator[Any]:
         "connect": {"endpoints": [routed]},
         "scouting": {"multicast": {"enabled": False}},
     }
-    with library().open(library().Config.from_json5(json.dumps(told))) as session:
+    with load_zenoh().open(load_zenoh().Config.from_json5(json.dumps(told))) as session:
         yield session
 
 
@@ -203,7 +203,7 @@ def test_nep_client_calls_a_zenoh_program(
     key = "nep/v1/serve/%2Fecho/0000000000000001/00000000000000ab"
     client = make("client", routed).new_client("/echo", timeout_s=LONG_S)
     assert not client.is_connected
-    queryable = stranger.declare_queryable(key, callback(answer))
+    queryable = stranger.declare_queryable(key, create_handler(answer))
     token = stranger.liveliness().declare_token("nep/v1/live/someone/srv/ab/%2Fecho/1")
     assert client.call({"n": 1}) == {"n": 1}
     for what in ("nothing", "nonsense", "error"):  # and it is not said that it has ended
@@ -265,11 +265,11 @@ def test_direct_servers_are_rejected(make: Make) -> None:
 
 @pytest.mark.parametrize("word", ["/x", "%", "a/b", "*", "é 漢", "x" * 180])
 def test_service_token_round_trip(word: str) -> None:
-    endpoint = keys.serve_key(word, 2**63, 2**64 - 1)
+    endpoint = keys.service_key(word, 2**63, 2**64 - 1)
     server = PublisherRecord(2**64 - 1, f"nep.service:{word}", "service", "service", (endpoint,))
     client = SubscriberRecord(1, f"nep.service:{word}", "service")
-    assert keys.parse_live(keys.server_key("n", server)) == ("n", server)
-    assert keys.parse_live(keys.client_key("n", client)) == ("n", client)
+    assert keys.parse_token(keys.server_key("n", server)) == ("n", server)
+    assert keys.parse_token(keys.client_key("n", client)) == ("n", client)
 
 
 @pytest.mark.parametrize(
@@ -293,7 +293,7 @@ def test_service_token_round_trip(word: str) -> None:
     ],
 )
 def test_invalid_service_token_is_not_parsed(words: str) -> None:
-    assert keys.parse_live(f"nep/v1/live/n/{words}") is None
+    assert keys.parse_token(f"nep/v1/live/n/{words}") is None
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there are no forks here")

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from nep.system.frozen_code import LOADER, hold_code
+from nep.system.frozen_code import LOADER_MODULE, keep_archive_open
 
 writers = pytest.importorskip("PyInstaller.archive.writers")
 reader = pytest.importorskip("PyInstaller.loader.pyimod01_archive")
@@ -28,7 +28,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """A program that runs, and the reader of its modules."""
     file = frozen(tmp_path / "program", "old", "late")
     importers = SimpleNamespace(pyz_archive=reader.ZlibArchiveReader(str(file)))
-    monkeypatch.setitem(sys.modules, LOADER, importers)
+    monkeypatch.setitem(sys.modules, LOADER_MODULE, importers)
     return SimpleNamespace(file=file, archive=importers.pyz_archive)
 
 
@@ -41,7 +41,7 @@ def made_by(archive, name: str) -> str:
 @pytest.fixture
 def held(program: SimpleNamespace):
     """The program, holding its code."""
-    assert hold_code()
+    assert keep_archive_open()
     yield program
     os.close(int(program.archive._filename.rpartition("/")[2]))
 
@@ -71,13 +71,13 @@ def test_import_from_a_removed_program_exits_without_hold_code(program) -> None:
 
 def test_hold_code_ignores_a_program_already_removed(program) -> None:
     program.file.unlink()
-    assert not hold_code()
+    assert not keep_archive_open()
     assert program.archive._filename == str(program.file)
 
 
 def test_hold_code_does_nothing_when_running_from_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delitem(sys.modules, LOADER, raising=False)
-    assert not hold_code()
+    monkeypatch.delitem(sys.modules, LOADER_MODULE, raising=False)
+    assert not keep_archive_open()
 
 
 @only_linux

@@ -83,7 +83,7 @@ def test_host_name_is_resolved_again_only_after_an_interval(caplog: pytest.LogCa
 def shared() -> Iterator[SharedContext]:
     made = shared_context()
     yield made
-    made.leave()
+    made.release()
 
 
 def test_unanswered_name_lookup_does_not_block_other_nodes(shared: SharedContext, master: Master) -> None:
@@ -97,12 +97,12 @@ def test_unanswered_name_lookup_does_not_block_other_nodes(shared: SharedContext
         eventually(lambda: book.asked == ["robot"])
         try:
             with pytest.raises(nep.MasterUnreachable, match=r"computer 'robot'; .*IP address"):
-                link.wait_for_name(0.05)
+                link.wait_for_address(0.05)
             pub, sub = other.new_pub("topic"), other.new_sub("topic")
             pub.publish(1)
             assert sub.listen(timeout_s=30.0) == (True, 1)
             book.may_answer.set()
-            link.wait_for_name(30.0)
+            link.wait_for_address(30.0)
             assert "topic" in link.query_graph(30.0).topics
             assert book.threads == ["nep-name-robot"]
             assert link.endpoint == f"tcp://127.0.0.1:{port}"

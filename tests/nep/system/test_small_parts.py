@@ -42,7 +42,7 @@ def test_inbox_keeps_the_newest_messages_within_both_limits(
 ) -> None:
     inbox = Inbox("all", most, max_bytes)
     dropped = sum(inbox.put(message(n, size)) for n, size in enumerate(sizes))
-    kept = inbox.take_all()
+    kept = inbox.pop_all()
     assert len(kept) + dropped == len(sizes)
     assert [each.seq for each in kept] == list(range(dropped, len(sizes)))
     assert len(kept) <= most
@@ -53,7 +53,7 @@ def test_inbox_keeps_the_newest_messages_within_both_limits(
 def test_inbox_of_the_latest_message_counts_no_drops() -> None:
     inbox = Inbox("latest")
     assert [inbox.put(message(n)) for n in range(3)] == [0, 0, 0]
-    assert [each.seq for each in inbox.take_all()] == [2]
+    assert [each.seq for each in inbox.pop_all()] == [2]
 
 
 def remote(id: int, node: str = "n", name: str = "N") -> RemotePublisher:
@@ -101,12 +101,12 @@ def test_tail_loss_is_counted_one_renewal_later_and_reverted_if_late() -> None:
 def test_restarted_publisher_replaces_the_silent_one() -> None:
     sources = PublisherTracker()
     sources.get(1).remote = remote(1)
-    assert sources.replaced_by(remote(2)) == []
+    assert sources.replaced_publishers(remote(2)) == []
     sources.get(1).is_silent = True
-    assert sources.replaced_by(remote(2)) == [1]
-    assert sources.replaced_by(remote(2, name="other")) == []
+    assert sources.replaced_publishers(remote(2)) == [1]
+    assert sources.replaced_publishers(remote(2, name="other")) == []
     sources.mark_closing(1, 7, now=10.0)
-    assert (sources.expired(12.9), sources.expired(13.0)) == ([], [1])
+    assert (sources.expired_publishers(12.9), sources.expired_publishers(13.0)) == ([], [1])
 
 
 def test_back_ends_are_discovered_and_a_similar_name_is_suggested() -> None:
@@ -435,19 +435,19 @@ def test_number_of_unlisted_publishers_is_bounded() -> None:
 def test_number_of_greeted_subscribers_is_bounded() -> None:
     subscriptions = Subscriptions("t", 7)
     for number in range(MAX_SUBSCRIBERS + 1000):
-        greeted = subscriptions.note(b"\1" + hello_part(number, "t", tells=True), 0)
+        greeted = subscriptions.handle_event(b"\1" + hello_part(number, "t", tells=True), 0)
         assert (greeted is not None) == (number < MAX_SUBSCRIBERS)
     assert (
         len(subscriptions.seen) == len(subscriptions.hellos) == len(subscriptions.windows) == MAX_SUBSCRIBERS
     )
     assert subscriptions.refusals.count == 1000
-    assert subscriptions.note(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
-    assert subscriptions.note(b"\0" + hello_part(5, "t", tells=True), 0) is None
-    assert subscriptions.note(b"\1" + hello_part(77_777, "t"), 0) is not None
+    assert subscriptions.handle_event(b"\1" + hello_part(5, "t", tells=True), 0) is not None  # it came again
+    assert subscriptions.handle_event(b"\0" + hello_part(5, "t", tells=True), 0) is None
+    assert subscriptions.handle_event(b"\1" + hello_part(77_777, "t"), 0) is not None
     assert not subscriptions.all_acknowledge
     for number in range(50_000):  # nor do other filters pile up
-        subscriptions.note(b"\1t\0" + b"%d" % number, 0)
-        subscriptions.note(b"\1t", 0)
+        subscriptions.handle_event(b"\1t\0" + b"%d" % number, 0)
+        subscriptions.handle_event(b"\1t", 0)
     assert len(subscriptions.legacy_filters) == 1
 
 
@@ -455,9 +455,9 @@ def test_sink_batch_size_is_bounded() -> None:
     inbox = Inbox("all", max_bytes=1000)
     for number in range(10):
         inbox.put(message(number, 100))
-    assert [each.seq for each in inbox.take_all(250)] == [0, 1, 2]
-    assert [each.seq for each in inbox.take_all(0)] == []
-    assert len(inbox.take_all(10_000)) == 7
+    assert [each.seq for each in inbox.pop_all(250)] == [0, 1, 2]
+    assert [each.seq for each in inbox.pop_all(0)] == []
+    assert len(inbox.pop_all(10_000)) == 7
     assert inbox.put(message(11, 1000)) == 0
 
 
@@ -465,7 +465,7 @@ def test_silent_publishers_beyond_a_limit_expire() -> None:
     sources = PublisherTracker()
     for number in range(1, UNLISTED_MAX + 11):
         sources.add_listed(remote(number, name=f"N{number}")).is_silent = number != 5
-    assert sources.expired(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
+    assert sources.expired_publishers(0.0) == [1, 2, 3, 4, 6, 7, 8, 9, 10]
 
 
 def test_lost_message_that_is_received_later_is_counted_once() -> None:

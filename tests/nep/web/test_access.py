@@ -61,14 +61,14 @@ def test_origin_is_normalized_as_by_browsers() -> None:
 
 def test_token_is_read_from_the_url_or_the_header() -> None:
     access = Access(token="s3cret")
-    assert access.is_given("/?token=s3cret", None)
-    assert access.is_given("/a/b?x=1&token=s3cret", None)
-    assert access.is_given("/", "Bearer s3cret")
-    assert access.is_given("/", "bearer  s3cret")
-    assert access.is_given("/", None) is None
-    assert access.is_given("/", "Basic s3cret") is None
+    assert access.check_token("/?token=s3cret", None)
+    assert access.check_token("/a/b?x=1&token=s3cret", None)
+    assert access.check_token("/", "Bearer s3cret")
+    assert access.check_token("/", "bearer  s3cret")
+    assert access.check_token("/", None) is None
+    assert access.check_token("/", "Basic s3cret") is None
     for path, header in (("/?token=wrong", None), ("/", "Bearer é"), ("/?token=%ff", None)):
-        assert access.is_given(path, header) is False
+        assert access.check_token(path, header) is False
 
 
 def signed(token: str, time_s: int, end_s: int, rand: str = "r") -> Auth:
@@ -78,12 +78,12 @@ def signed(token: str, time_s: int, end_s: int, rand: str = "r") -> Auth:
 
 def test_auth_is_valid_once_and_for_a_limited_time() -> None:
     check = AuthCheck("s3cret", clock=lambda: 1_000.0)
-    assert check.is_right(signed("s3cret", 1_001, 2_000))
-    assert not check.is_right(signed("s3cret", 1_001, 2_000))
-    assert check.is_right(signed("s3cret", 1_001, 2_000, "other"))
-    assert not check.is_right(signed("wrong", 1_001, 2_000))
-    assert not check.is_right(signed("s3cret", 900, 2_000))
-    assert not check.is_right(signed("s3cret", 1_001, 999))
+    assert check.verify(signed("s3cret", 1_001, 2_000))
+    assert not check.verify(signed("s3cret", 1_001, 2_000))
+    assert check.verify(signed("s3cret", 1_001, 2_000, "other"))
+    assert not check.verify(signed("wrong", 1_001, 2_000))
+    assert not check.verify(signed("s3cret", 900, 2_000))
+    assert not check.verify(signed("s3cret", 1_001, 999))
 
 
 def test_server_for_other_computers_needs_a_token() -> None:

@@ -88,7 +88,7 @@ def test_robots_are_allowed_and_denied_while_a_page_is_connected(
     assert "Rover" in page.refusal("publish", topic="/orders", msg=1)
     page.refusal("publish", topic="/orders", msg=2)
     (refused,) = server.refusals  # once in ten seconds
-    assert (refused.kind, refused.robot, refused.who) == ("robot", "Rover", "127.0.0.1")
+    assert (refused.kind, refused.robot, refused.client) == ("robot", "Rover", "127.0.0.1")
     server.set_allow_moving(["Rover"])
     page.send("publish", topic="/orders", msg=3)
     assert orders.listen(timeout_s=30) == (True, 3)
@@ -148,10 +148,10 @@ def test_topics_of_a_page_have_limits_rates_and_counts(server: WebServer, node: 
     page.receive("publish")
     eventually(lambda: [each.sent_count for each in server.pages[0].topics] == [1, 1])
     reads, publishes = server.pages[0].topics
-    assert (reads.topic, reads.is_published, reads.at_most_per_s) == ("/odom", False, 10)
-    assert (publishes.topic, publishes.is_published, publishes.at_most_per_s) == ("/buttons", True, None)
-    eventually(lambda: all(each.rate > 0 and each.bytes_per_s > 10 for each in server.pages[0].topics))
-    assert server.pages[0].published == ("/buttons",)
+    assert (reads.topic, reads.is_published, reads.max_rate_hz) == ("/odom", False, 10)
+    assert (publishes.topic, publishes.is_published, publishes.max_rate_hz) == ("/buttons", True, None)
+    eventually(lambda: all(each.rate_hz > 0 and each.bytes_per_s > 10 for each in server.pages[0].topics))
+    assert server.pages[0].published_topics == ("/buttons",)
 
 
 def test_page_is_identified_as_a_web_page_in_the_graph(server: WebServer, node: nep.Node, page: Peer) -> None:
@@ -165,13 +165,13 @@ def test_blocked_page_is_rejected_until_it_is_unblocked(server: WebServer, open_
     first, twin, other = open_page(origin=own), open_page(origin=own), open_page()
     eventually(lambda: len(server.pages) == 3)
     page_id = server.pages[0].id
-    server.keep_out(page_id)
+    server.block_page(page_id)
     assert not is_open(first.connection)
     assert is_open(twin.connection)
     assert is_open(other.connection)
     assert refused_to_connect(server, origin=own)
     assert server.refusals[-1].kind == "kept out"
-    server.let_in(page_id)
+    server.unblock_page(page_id)
     assert is_open(open_page(origin=own).connection)
 
 

@@ -11,7 +11,7 @@ from nep.messages.message import Message
 from nep.programs.web.limits import MAX_CONTROL_BYTES
 from nep.programs.web.messages.operations import Subscribe
 from nep.programs.web.outgoing import Frame
-from nep.programs.web.send_queue import Feed, Queued, SendQueue
+from nep.programs.web.send_queue import Feed, QueuedMessage, SendQueue
 
 
 def message(number: int, *, size: int = 1) -> Message:
@@ -95,7 +95,7 @@ def test_topics_are_sent_round_robin_after_other_operations() -> None:
         waiting.add(quiet, message(9))
         waiting.put([Frame(b"status", is_text=True)])
         taken = [await waiting.pop() for _left in range(5)]
-        return [each.message.seq if isinstance(each, Queued) else each.data for each in taken]
+        return [each.message.seq if isinstance(each, QueuedMessage) else each.data for each in taken]
 
     assert asyncio.run(drain()) == [b"status", 0, 9, 1, 2]
 

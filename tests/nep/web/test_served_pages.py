@@ -12,7 +12,7 @@ import pytest
 
 from nep.masters.master import Master
 from nep.programs.web import Access, WebServer, WebSettings
-from nep.programs.web.served_pages import PageRequest, answer, starter_page
+from nep.programs.web.served_pages import PageRequest, respond, starter_page
 from nep.protocol.wire import check_topic
 from tests.nep.web.conftest import Peer
 
@@ -24,7 +24,7 @@ def asked(
     path: str = "/", method: str = "GET", hosts: tuple[str, ...] = ("192.168.1.5:9090",), token: str = ""
 ) -> tuple[int, str]:
     access = Access({"http://lab.example.org"}, token)
-    found = answer(PageRequest(method, path, hosts, OWN), access)
+    found = respond(PageRequest(method, path, hosts, OWN), access)
     return found.status.value, found.body.decode()
 
 
@@ -82,7 +82,7 @@ def test_token_is_required_for_pages_and_absent_from_rejections(path: str) -> No
 
 
 def test_pages_run_only_their_own_scripts_and_load_no_external_resources() -> None:
-    found = answer(PageRequest("GET", "/", ("localhost:9090",), OWN), Access())
+    found = respond(PageRequest("GET", "/", ("localhost:9090",), OWN), Access())
     policy = found.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy
     assert "connect-src 'self' ws://localhost:9090;" in policy
@@ -124,7 +124,7 @@ def test_page_opened_without_the_token_is_listed_as_rejected(master: Master) -> 
     settings = WebSettings(port=0, master=master.address, access=Access(token=TOKEN))
     with WebServer(settings) as server:
         assert response(server, "/")[0] == HTTPStatus.UNAUTHORIZED
-        assert [(each.kind, each.who) for each in server.refusals] == [("token", "127.0.0.1")]
+        assert [(each.kind, each.client) for each in server.refusals] == [("token", "127.0.0.1")]
         path = server.test_page_url.partition(str(server.port))[2]
         assert response(server, path)[0] == HTTPStatus.OK
 

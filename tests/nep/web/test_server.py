@@ -304,7 +304,10 @@ def test_connected_pages_are_listed_with_their_topics_and_can_be_disconnected(
     page.send("advertise", topic="/buttons", type="nep/Json")
     page.send("subscribe", topic="/odom", type="nep/Json")
     eventually(
-        lambda: [(each.published, each.subscribed) for each in server.pages] == [(("/buttons",), ("/odom",))]
+        lambda: (
+            [(each.published_topics, each.subscribed_topics) for each in server.pages]
+            == [(("/buttons",), ("/odom",))]
+        )
     )
     (listed,) = server.pages
     assert (listed.address, listed.origin) == ("127.0.0.1", "http://localhost:8000")

@@ -10,7 +10,7 @@ import pytest
 
 import nep
 from app.robots.driver.driver import Driver, EventLoop
-from app.robots.driver.tasks import STOP_ANSWER_S
+from app.robots.driver.tasks import STOP_REPLY_TIMEOUT_S
 from app.robots.kit import Call, Failed, Kind, Link, action, safe_stop
 from tests.robots.conftest import Ears, FakeClock, eventually
 
@@ -183,7 +183,7 @@ def test_coroutine_that_ignores_cancellation_is_reported_until_it_ends(drone):
     eventually(lambda: "begun" in body.events)  # "running" is told before; who has not begun need not listen
     ears.command(id="s", op="stop")
     eventually(lambda: "told" in body.events and "stopped" in body.events)
-    clock.advance(STOP_ANSWER_S + 0.01)
+    clock.advance(STOP_REPLY_TIMEOUT_S + 0.01)
     assert ears.final("s", "stop")["error"] == "Drone may still move: stubborn is still running"
     body.let_go.set()
     eventually(lambda: [a["not_ended"] for a in ears.heard["answer"] if a["op"] == "alive"][-1] == [])

@@ -154,8 +154,8 @@ def good_for(parameter: Parameter) -> object:
         low, high = parameter.minimum, parameter.maximum
         return low if low is not None and low > 0 else min(0, 0 if high is None else high)
     if parameter.kind == "list":
-        held = parameter.each or Parameter("value", "value", "text")
-        return [good_for(each) for each in parameter.places] or [good_for(held)] * parameter.min_length
+        held = parameter.item or Parameter("value", "value", "text")
+        return [good_for(each) for each in parameter.prefix_items] or [good_for(held)] * parameter.min_length
     if parameter.kind == "object":
         return {each.name: good_for(each) for each in parameter.fields if each.required}
     return {"boolean": False, "colour": "#20c0e0"}.get(parameter.kind, "x" * max(1, parameter.min_length))

@@ -10,7 +10,7 @@ import nep
 from app.core.run.control import STOP_TIMEOUT_S
 from app.robots.driver.driver import Driver
 from app.robots.driver.task import ProgramId, Task
-from app.robots.driver.tasks import STOP_ANSWER_S, Watchdog
+from app.robots.driver.tasks import STOP_REPLY_TIMEOUT_S, Watchdog
 from app.robots.identity import program_of
 from app.robots.kit import Failed
 from tests.robots.conftest import TURTLE, Ears, eventually
@@ -189,7 +189,7 @@ def test_ineffective_stop_is_reported_as_failure(turtle):
     eventually(lambda: "running" in ears.states("1"))
     ears.command(id="s", op="stop")
     eventually(lambda: body.stops >= 1)
-    clock.advance(STOP_ANSWER_S + 0.01)
+    clock.advance(STOP_REPLY_TIMEOUT_S + 0.01)
     still = "Turtle may still move: ignore is still running"
     assert ears.final("s", "stop")["error"] == still
     assert (ears.final("1")["state"], ears.final("1")["error"]) == ("failed", still)
@@ -268,7 +268,7 @@ def test_hanging_stop_is_reported_to_each_caller_and_commands_are_rejected(turtl
 
 
 def test_stop_answer_timeout_is_at_most_half_of_the_studio_timeout():
-    assert 0 < STOP_ANSWER_S <= STOP_TIMEOUT_S / 2
+    assert 0 < STOP_REPLY_TIMEOUT_S <= STOP_TIMEOUT_S / 2
 
 
 def test_late_command_of_a_stopped_program_is_canceled(turtle):
@@ -398,13 +398,19 @@ def test_forged_heartbeat_does_not_sustain_motion_after_the_action():
     dog = Watchdog(1.0)
     program, forger = ProgramId("p", 1), ProgramId("p", 2)
     drive = Task(
-        "1", "drive", lambda _call: None, lambda _answer: None, ("base",), program=program, goes_on=True
+        "1",
+        "drive",
+        lambda _call: None,
+        lambda _answer: None,
+        ("base",),
+        program=program,
+        continues_after_success=True,
     )
-    dog.hear(program, 0.0, watch=True)
-    dog.ends_well(drive)
-    dog.hear(forger, 0.9, watch=True)
-    assert not dog.bites(0.95, [])
-    assert dog.bites(1.0, [])
+    dog.record_heartbeat(program, 0.0, watch=True)
+    dog.record_success(drive)
+    dog.record_heartbeat(forger, 0.9, watch=True)
+    assert not dog.check_expired(0.95, [])
+    assert dog.check_expired(1.0, [])
 
 
 def test_only_the_caller_can_cancel_and_everyone_can_stop(turtle, node):

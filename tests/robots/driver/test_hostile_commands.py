@@ -10,7 +10,7 @@ import threading
 import pytest
 
 import nep
-from app.robots.description.inputs import Parameter, problems_of
+from app.robots.description.inputs import Parameter, input_problems
 from app.robots.driver.driver import Driver, EventLoop
 from app.robots.driver.receiver import MAX_COMMAND_BYTES
 from app.robots.heartbeat import Heartbeat
@@ -93,10 +93,10 @@ def test_unknown_names_are_checked_in_bounded_time():
     """Issue 26: looking for a similar name for each of 200 000 names took 3.5 s."""
     parameters = (Parameter("text", "text", "text"),)
     given = {"text": "hi"} | {f"text{number}": 1 for number in range(20_000)}
-    problems = problems_of(parameters, given)
+    problems = input_problems(parameters, given)
     assert len(problems) < 10
-    assert problems[-1].sentence == "19995 more names are unknown"
-    assert problems_of(parameters, {"txt": "hi"})[0].sentence == "unknown name “txt”; did you mean “text”?"
+    assert problems[-1].message == "19995 more names are unknown"
+    assert input_problems(parameters, {"txt": "hi"})[0].message == "unknown name “txt”; did you mean “text”?"
 
 
 @pytest.fixture
@@ -295,7 +295,7 @@ def test_heartbeat_survives_a_publisher_that_raises():
         told.set()
 
     heart = Heartbeat("p", "heartbeat of the test")
-    heart.beat("Turtle", publish)
+    heart.start("Turtle", publish)
     assert told.wait(30.0)
     heart.close()
 

@@ -76,13 +76,13 @@ def test_stop_command_has_the_fields_that_older_drivers_read(robot):
 
 def test_rize_answers_are_parsed(robot):
     sent = rize.to_command(robot, "say", {"text": "hello"}, "1")
-    good = rize.from_answer({**sent, "state": "success"})
+    good = rize.from_reply({**sent, "state": "success"})
     assert (good["id"], good["op"], good["state"], good["error"]) == ("1", "invoke", "succeeded", None)
-    bad = rize.from_answer({**sent, "primitives": [sent["primitives"]], "state": "failure"})
+    bad = rize.from_reply({**sent, "primitives": [sent["primitives"]], "state": "failure"})
     assert (bad["state"], bad["error"]) == ("failed", "Pepper could not say")
-    assert rize.from_answer(sent) is None
-    assert rize.from_answer("noise") is None
-    assert rize.from_answer({"state": "success"}) is None
+    assert rize.from_reply(sent) is None
+    assert rize.from_reply("noise") is None
+    assert rize.from_reply({"state": "success"}) is None
 
 
 def test_ready_message_of_a_robot_is_parsed():
@@ -282,6 +282,6 @@ def test_example_rize_driver_executes_commands(network):
     finally:
         process.kill()
         output, _ = process.communicate()
-    read = [rize.from_answer(answer) for answer in answers]
+    read = [rize.from_reply(answer) for answer in answers]
     assert [(answer["id"], answer["state"]) for answer in read] == [("Turtle", "succeeded"), ("2", "failed")]
     assert output.startswith("Turtle says: hello {")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.robots.driver.call import Canceled, MonotonicClock
-from app.robots.driver.task import Answer, Task
+from app.robots.driver.task import Task, TaskReply
 from app.robots.driver.tasks import Tasks
 from tests.robots.conftest import eventually
 
@@ -19,7 +19,7 @@ class World:
 
     def __init__(self) -> None:
         self.began: list[str] = []
-        self.answers: dict[str, list[Answer]] = {}
+        self.answers: dict[str, list[TaskReply]] = {}
         self.let_go: dict[str, threading.Event] = {}
         self.tasks = Tasks("Bot", lambda: None, MonotonicClock(), within_s=0.1, watchdog_s=None)
         self.tasks.start()
@@ -108,7 +108,7 @@ def test_number_of_running_tasks_without_resources_is_limited(world: World) -> N
 def test_stop_is_answered_after_all_tasks_ended(world: World) -> None:
     world.ask("kick", ("legs",), cancellable=False, obeys=False)
     eventually(ran(world, "kick"))
-    stopped: list[Answer] = []
+    stopped: list[TaskReply] = []
     world.tasks.call_soon(lambda: world.tasks.stop(stopped.append))
     world.ask("after", ("arm",))
     eventually(lambda: world.states("after")[-1] in {"failed", "accepted", "running"})

@@ -24,7 +24,7 @@ from app.robots.driver.schema import (
     input_schema,
     schema_of,
 )
-from app.robots.driver.schema_values import given, to_json
+from app.robots.driver.schema_values import from_json, to_json
 from app.robots.kit import Call, Kind, Link, action, event, safe_stop, sensor
 from tests.pseudo import untranslated
 from tests.robots.conftest import Ears, eventually
@@ -211,10 +211,10 @@ def test_composite_types_are_converted_to_schemas(kind, schema):
     ],
 )
 def test_values_round_trip_between_json_and_python(kind, json, python):
-    made = given(kind, json)
+    made = from_json(kind, json)
     assert made == python
     assert type(made) is type(python)
-    assert given(kind, to_json(kind, made)) == python
+    assert from_json(kind, to_json(kind, made)) == python
 
 
 @pytest.mark.parametrize(

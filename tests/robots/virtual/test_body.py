@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.robots.virtual.body import RADIUS, TOUCH_LEAST_S, Body
+from app.robots.virtual.body import MIN_TOUCH_S, RADIUS, Body
 from app.robots.virtual.motion import Joint, Motion
 from app.robots.virtual.room import Room
-from app.robots.virtual.simulation import drawable
+from app.robots.virtual.simulation import drawing_state
 
 STEP = 1 / 30
 
@@ -24,7 +24,7 @@ def run(body: Body, until, limit_s: float = 60.0) -> float:
 
 
 def events(body: Body) -> list[tuple[str, dict[str, object]]]:
-    return [(happening.event, happening.data) for happening in body.happenings]
+    return [(happening.event, happening.data) for happening in body.events]
 
 
 def test_robot_turns_by_the_angle_within_the_requested_speed():
@@ -53,24 +53,24 @@ def test_robot_stops_in_front_of_a_person_and_publishes_a_bumped_event():
     body = Body()
     motion = body.walk(2.0, 0.35)
     run(body, lambda: motion.done)
-    assert motion.blocked
+    assert motion.is_blocked
     gap = math.hypot(body.x - body.room.people[0].x, body.y - body.room.people[0].y)
     assert gap >= RADIUS + body.room.people[0].radius
     assert events(body) == [("bumped", {"side": "front"})]
     assert body.distance < 0.05
-    assert body.still
+    assert body.is_still
 
 
 @pytest.mark.parametrize("start", [lambda b: b.walk(2.0, 0.35), lambda b: b.turn(360, 90)])
 def test_robot_brakes_from_full_speed_within_a_tenth_of_a_second(start):
-    body = Body(room=Room().moved("person", 0.0, 2.0))
+    body = Body(room=Room().with_moved("person", 0.0, 2.0))
     start(body)
     for _ in range(30):
         body.step(STEP)
-    assert body.rolling
+    assert body.is_rolling
     body.halt()
     before = (body.x, body.theta_deg)
-    assert run(body, lambda: body.still) <= 0.1 + 1e-9
+    assert run(body, lambda: body.is_still) <= 0.1 + 1e-9
     assert abs(body.x - before[0]) < 0.03
     assert abs(body.theta_deg - before[1]) < 6
     standing = (body.x, body.y, body.theta_deg)
@@ -80,11 +80,11 @@ def test_robot_brakes_from_full_speed_within_a_tenth_of_a_second(start):
 
 def test_head_stays_within_its_speed_and_angle_limits():
     body = Body()
-    body.head_yaw.aim(200)
+    body.head_yaw.set_target(200)
     body.step(0.5)
     assert body.head_yaw.angle == pytest.approx(60.0)
-    assert not body.still
-    run(body, lambda: body.still)
+    assert not body.is_still
+    run(body, lambda: body.is_still)
     assert body.head_yaw.angle == 119.0
 
 
@@ -111,14 +111,14 @@ def test_robot_waves_and_lowers_its_arm():
     assert body.arms["left"].angle == 0
     run(body, lambda: wave.done)
     assert (body.arms["right"].angle, body.elbows["right"].angle) == (0, 0)
-    assert body.still
+    assert body.is_still
 
 
 def test_touch_and_release_are_each_published_once():
     body = Body()
     body.touch("head", down=True)
     body.touch("head", down=True)
-    body.step(TOUCH_LEAST_S + 0.1)
+    body.step(MIN_TOUCH_S + 0.1)
     body.touch("head", down=False)
     body.touch("left_hand", down=False)
     body.hear("hello")
@@ -133,7 +133,7 @@ def test_short_tap_lasts_a_minimum_time_and_a_held_touch_lasts_longer():
     body = Body()
     body.touch("head", down=True)
     body.touch("head", down=False)
-    body.step(TOUCH_LEAST_S - 0.05)
+    body.step(MIN_TOUCH_S - 0.05)
     assert list(body.touched) == ["head"]
     body.step(0.1)
     assert events(body) == [("touched", {"place": "head"}), ("released", {"place": "head"})]
@@ -149,21 +149,21 @@ def test_short_tap_lasts_a_minimum_time_and_a_held_touch_lasts_longer():
 def test_spoken_share_of_a_speech_is_published():
     body = Body()
     speech = body.speak("x" * 100)
-    body.step(speech.seconds / 2)
-    assert drawable(body)["spoken"] == pytest.approx(0.5, abs=0.02)
+    body.step(speech.duration_s / 2)
+    assert drawing_state(body)["spoken"] == pytest.approx(0.5, abs=0.02)
     run(body, lambda: speech.done)
-    assert body.spoken == 0.0
+    assert body.spoken_fraction == 0.0
 
 
 def test_heard_word_is_shown_for_some_seconds():
     body = Body()
-    assert drawable(body)["heard"] == ""
+    assert drawing_state(body)["heard"] == ""
     body.hear("hello")
     body.step(1)
-    assert drawable(body)["heard"] == "hello"
+    assert drawing_state(body)["heard"] == "hello"
     body.step(4)
-    assert drawable(body)["heard"] == ""
-    assert body.heard == "hello"  # the sensor keeps it
+    assert drawing_state(body)["heard"] == ""
+    assert body.last_word == "hello"  # the sensor keeps it
 
 
 def test_battery_drains_faster_while_moving():
@@ -179,9 +179,9 @@ def test_reset_restores_pose_touches_and_room():
     body.turn(90, 90)
     body.step(1)
     body.touch("head", down=True)
-    body.room = body.room.moved("ball", 0.5, 1.0)
+    body.room = body.room.with_moved("ball", 0.5, 1.0)
     body.reset(Room())
-    run(body, lambda: body.still)
+    run(body, lambda: body.is_still)
     assert (body.x, body.theta_deg, body.touched, body.room) == (-0.5, 0.0, {}, Room())
 
 
@@ -189,7 +189,7 @@ def test_drawable_state_has_the_fields_that_studio_draws():
     body = Body()
     body.touch("head", down=True)
     body.speak("Hi")
-    drawn = drawable(body)
+    drawn = drawing_state(body)
     assert {k: drawn[k] for k in ("x", "speech", "touched", "moving")} == {
         "x": -0.5, "speech": "Hi", "touched": ["head"], "moving": False,
     }  # fmt: skip
@@ -210,10 +210,10 @@ def test_robot_never_overlaps_obstacles(plan):
         else:
             body.turn(amount * 90, 90)
         body.step(seconds)
-        assert body.room.free(body.x, body.y, RADIUS - 1e-6)
+        assert body.room.is_free(body.x, body.y, RADIUS - 1e-6)
     body.halt()
     body.step(0.2)
-    assert body.still
+    assert body.is_still
 
 
 @given(st.floats(-3, 3), st.floats(0.05, 0.5))
@@ -231,7 +231,7 @@ def test_motion_ends_exactly_at_its_amount(amount, speed):
 
 def test_joint_holds_its_angle():
     joint = Joint(100, -10, 10)
-    joint.aim(5)
+    joint.set_target(5)
     joint.step(0.01)
     joint.hold()
     joint.step(1)

@@ -48,22 +48,22 @@ def test_shape_behind_the_camera_has_no_outline():
 
 @pytest.mark.parametrize("place", [(1.95, -0.78), (1.6, -0.5), (2.5, 0.9), (2.2, -1.2)])
 def test_ball_is_detected_at_its_position(camera, eyes, place):
-    body = Body(room=Room().moved("person", -2.0, -2.0).moved("ball", *place))
+    body = Body(room=Room().with_moved("person", -2.0, -2.0).with_moved("ball", *place))
     lens = lens_of(body)
     (found,) = eyes.balls(camera.picture(body.room, lens))
     ball = body.room.balls[0]
     seen = lens.to_camera(np.array([[ball.x, ball.y, ball.z]]))
     expected = lens.to_pixels(seen)[0]
-    assert found.middle == pytest.approx(tuple(expected), abs=2.5)
+    assert found.centre == pytest.approx(tuple(expected), abs=2.5)
     assert found.box[2] == pytest.approx(2 * ball.radius * lens.focal / seen[0][2], abs=5)
-    left, _ = angles_to(lens, found.middle)
-    bearing = math.degrees(math.atan2(ball.y - lens.place[1], ball.x - lens.place[0]))
+    left, _ = angles_to(lens, found.centre)
+    bearing = math.degrees(math.atan2(ball.y - lens.position[1], ball.x - lens.position[0]))
     assert left == pytest.approx(bearing, abs=1.5)
 
 
 def test_ball_outside_the_view_is_not_detected(camera, eyes):
     for theta in range(0, 360, 30):
-        body = Body(room=Room().moved("ball", -2.2, -2.2), theta_deg=float(theta) - 60)
+        body = Body(room=Room().with_moved("ball", -2.2, -2.2), theta_deg=float(theta) - 60)
         lens = lens_of(body)
         found = eyes.balls(camera.picture(body.room, lens))
         visible = lens.to_camera(np.array([[-2.2, -2.2, 0.15]]))[0]
@@ -79,7 +79,7 @@ def test_marker_is_detected(camera, eyes, theta):
     card = body.room.markers[0]
     expected = lens.to_pixels(lens.to_camera(np.array([[card.x, card.y, card.z]])))[0]
     assert found.name == "marker 7"
-    assert found.middle == pytest.approx(tuple(expected), abs=3)
+    assert found.centre == pytest.approx(tuple(expected), abs=3)
 
 
 def test_face_is_detected_at_the_skin_pixels(camera, eyes):
@@ -89,7 +89,7 @@ def test_face_is_detected_at_the_skin_pixels(camera, eyes):
     (found,) = eyes.faces(body.room, lens)
     assert found.name == "Aiko"
     assert found.confidence > 0.9
-    x, y = (round(value) for value in found.middle)
+    x, y = (round(value) for value in found.centre)
     blue, green, red = (int(part) for part in picture[y, x])
     assert red > green > blue  # skin
     assert red > 180
@@ -105,7 +105,7 @@ def test_face_is_detected_only_while_visible(eyes):
     assert not seen(Body(theta_deg=90.0))
     assert not seen(Body(theta_deg=180.0))
     assert not seen(Body(theta_deg=30.5))  # at the edge, most of it outside
-    hidden = Body(room=Room().moved("person", 0.35, -2.4), theta_deg=-75.0)
+    hidden = Body(room=Room().with_moved("person", 0.35, -2.4), theta_deg=-75.0)
     tall = hidden.room.boxes[1]
     assert tall.height > hidden.room.people[0].face_z
     assert not seen(hidden)
@@ -132,7 +132,7 @@ def test_same_state_gives_the_same_camera_image(camera):
 
 
 def test_every_pixel_is_painted_in_all_directions(camera):
-    room = Room().moved("ball", -2.3, -2.3)
+    room = Room().with_moved("ball", -2.3, -2.3)
     for theta in range(0, 360, 15):
         for pitch in (-40.0, 0.0, 36.0):
             picture = camera.picture(room, Lens((-0.5, 0.3, 1.12), float(theta), pitch))

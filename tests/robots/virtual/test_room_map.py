@@ -9,7 +9,7 @@ import random
 import pytest
 
 from app.robots.virtual.room import Room
-from app.robots.virtual.room_map import KINDS, MAX_COUNT, MAX_OF_A_KIND, RoomMap
+from app.robots.virtual.room_map import KINDS, MAX_COUNT, MAX_PER_KIND, RoomMap
 
 
 def clock(start: int = 1000):
@@ -45,7 +45,7 @@ def test_maps_converge_for_any_order_of_messages() -> None:
             case 1:
                 one.remove(chance.choice(["ball", "ball 2", "Aiko", "table"]))
             case 2:
-                one.put_back()
+                one.restore_start()
             case _:
                 one.move(chance.choice(["ball", "Aiko", "shelf"]), chance.uniform(-2, 2), 0.0)
         told.append(one.message())
@@ -69,11 +69,11 @@ def test_objects_stay_inside_and_their_number_per_kind_is_limited() -> None:
     assert made.move("table", 99.0, -99.0)
     table = made.room().thing("table")
     assert (table.x, table.y) == (3.0 - table.width / 2, -2.5 + table.depth / 2)
-    names = [made.add("ball", 0.0, 0.0) for _ in range(MAX_OF_A_KIND + 2)]
+    names = [made.add("ball", 0.0, 0.0) for _ in range(MAX_PER_KIND + 2)]
     assert names[-3:] == [None, None, None]
     assert made.add("piano", 0.0, 0.0) is None
     assert not made.move("piano", 1.0, 1.0)
-    made.put_back()
+    made.restore_start()
     assert made.room() == Room()
 
 

@@ -14,17 +14,17 @@ from app.robots.simulated import ROBOT as PEPPER
 from app.robots.turtle import ROBOT as TURTLE
 from app.robots.virtual.body import RADIUS, Body
 from app.robots.virtual.camera import Camera, lens_of
-from app.robots.virtual.neighbours import GONE_AFTER_S, Neighbours
-from app.robots.virtual.room import Other, Room
+from app.robots.virtual.neighbours import PRESENCE_TIMEOUT_S, Neighbours
+from app.robots.virtual.room import OtherRobot, Room
 from app.robots.virtual.room_map import TOPIC, RoomMap
 from app.robots.virtual.wheels import WheelBody
 from tests.robots.conftest import Ears, FakeClock, eventually
 
-OTHER = Other("Turtle", 0.6, 0.0, 180.0, 0.17, 0.34, "turtle")
+OTHER = OtherRobot("Turtle", 0.6, 0.0, 180.0, 0.17, 0.34, "turtle")
 
 
-def with_other(room: Room, other: Other = OTHER) -> Room:
-    return replace(room.moved("Aiko", 2.5, 2.0), others=(other,))
+def with_other(room: Room, other: OtherRobot = OTHER) -> Room:
+    return replace(room.with_moved("Aiko", 2.5, 2.0), other_robots=(other,))
 
 
 # ---- one body ---------------------------------------------------------------------------------------
@@ -36,12 +36,12 @@ def test_robot_stops_in_front_of_another_robot_and_measures_its_distance() -> No
     motion = body.walk(2.0, 0.35)
     while not motion.done:
         body.step(0.1)
-    assert motion.blocked
+    assert motion.is_blocked
     assert body.x <= OTHER.x - OTHER.radius - RADIUS + 0.01
     away = body.walk(-0.3, 0.3)
     while not away.done:
         body.step(0.1)
-    assert not away.blocked
+    assert not away.is_blocked
 
 
 def test_overlapping_robot_can_only_move_away() -> None:
@@ -58,13 +58,13 @@ def test_overlapping_robot_can_only_move_away() -> None:
 def test_camera_shows_the_other_robots() -> None:
     body = Body()
     camera = Camera(body.room)
-    empty = replace(with_other(Room()), others=())
+    empty = replace(with_other(Room()), other_robots=())
     alone = camera.picture(empty, lens_of(body)).astype(int)
-    for other in (replace(OTHER, x=1.5), Other("Ada", 1.5, 0.0, 180.0, 0.27, 1.2)):
+    for other in (replace(OTHER, x=1.5), OtherRobot("Ada", 1.5, 0.0, 180.0, 0.27, 1.2)):
         seen = camera.picture(with_other(Room(), other), lens_of(body)).astype(int)
         assert (abs(seen - alone).max(axis=2) > 30).mean() > 0.01
-    hidden = Other("Ada", 0.2, 0.0, 180.0, 0.27, 1.2)
-    assert with_other(Room(), hidden).hidden((-0.5, 0.0, 1.1), (1.5, 0.0, 0.9))
+    hidden = OtherRobot("Ada", 0.2, 0.0, 180.0, 0.27, 1.2)
+    assert with_other(Room(), hidden).is_hidden((-0.5, 0.0, 1.1), (1.5, 0.0, 0.9))
 
 
 # ---- held by a person -----------------------------------------------------------------------------
@@ -74,12 +74,12 @@ def test_held_robot_stands_still_and_continues_after_release() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
-    body.hold(held=True)
+    body.set_lifted(held=True)
     x = body.x
     body.step(2.0)
     assert (body.x, motion.done) == (x, False)
     body.carry(0.0, -1.0)
-    body.hold(held=False)
+    body.set_lifted(held=False)
     body.step(5.0)
     assert motion.done
     assert motion.moved == pytest.approx(0.5, abs=0.01)
@@ -90,11 +90,11 @@ def test_stop_ends_the_motion_of_a_held_robot() -> None:
     body = Body(theta_deg=180.0)
     motion = body.walk(0.5, 0.3)
     body.step(0.5)
-    body.hold(held=True)
+    body.set_lifted(held=True)
     body.halt()
     body.step(0.2)
     assert motion.done
-    assert body.still
+    assert body.is_still
 
 
 @pytest.mark.parametrize("body", [Body(), WheelBody()], ids=["pepper", "turtle"])
@@ -104,7 +104,7 @@ def test_robot_is_carried_up_to_walls_and_furniture_but_not_into_them(body) -> N
     before = (body.x, body.y)
     table = body.room.thing("table")
     body.carry(table.x, table.y)
-    assert body.room.free(body.x, body.y, 0.1)
+    assert body.room.is_free(body.x, body.y, 0.1)
     assert (body.x, body.y) != (table.x, table.y), before
 
 
@@ -116,21 +116,21 @@ def test_silent_robot_is_removed_from_the_neighbours() -> None:
     seen = Neighbours("Pepper", time, began_ns=5)
     told: list[dict[str, object]] = []
     Neighbours("Turtle", time, began_ns=1).publish_position(OTHER, lambda message: told.append(dict(message)))
-    seen.hear(told[0])
-    assert seen.others() == (OTHER,)
+    seen.receive(told[0])
+    assert seen.present_robots() == (OTHER,)
     for damaged in ({}, {**told[0], "x": "far"}, {**told[0], "radius": 50}, {**told[0], "robot": "Pepper"}):
-        seen.hear(damaged)
-    assert seen.others() == (OTHER,)
-    time.advance(GONE_AFTER_S + 0.1)
-    assert seen.others() == ()
+        seen.receive(damaged)
+    assert seen.present_robots() == (OTHER,)
+    time.advance(PRESENCE_TIMEOUT_S + 0.1)
+    assert seen.present_robots() == ()
 
 
 def test_later_robot_makes_way() -> None:
     time = FakeClock()
     first, second = Neighbours("A", time, began_ns=1), Neighbours("B", time, began_ns=2)
-    first.publish_position(Other("A", 0, 0, 0, 0.27, 1.2), second.hear)
-    second.publish_position(Other("B", 0, 0.1, 0, 0.27, 1.2), first.hear)
-    assert (first.makes_way(0, 0, 0.27), second.makes_way(0, 0.1, 0.27)) == (False, True)
+    first.publish_position(OtherRobot("A", 0, 0, 0, 0.27, 1.2), second.receive)
+    second.publish_position(OtherRobot("B", 0, 0.1, 0, 0.27, 1.2), first.receive)
+    assert (first.must_give_way(0, 0, 0.27), second.must_give_way(0, 0.1, 0.27)) == (False, True)
 
 
 # ---- over the network ----------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import pytest
 
 import nep
 from app.robots.driver.driver import Driver
-from app.robots.simulated import ROBOT, room_of
+from app.robots.simulated import ROBOT, create_room
 from tests.robots.conftest import Ears, eventually
 
 
@@ -235,9 +235,9 @@ def test_camera_images_are_published_while_subscribed(node, pepper):
 
 
 def test_seed_determines_the_object_positions():
-    assert room_of(5) == room_of(5)
-    assert room_of(5) != room_of(6)
-    assert room_of(None).balls[0].x == 1.95
+    assert create_room(5) == create_room(5)
+    assert create_room(5) != create_room(6)
+    assert create_room(None).balls[0].x == 1.95
 
 
 def test_reset_restores_robot_and_room(pepper):

@@ -19,7 +19,7 @@ from app.robots.virtual.camera import Camera
 from app.robots.virtual.lens import Lens
 from app.robots.virtual.room import Room
 from app.robots.virtual.vision import colours_in
-from app.robots.virtual.wheels import BRAKING, PRESS_S, RADIUS, START, WheelBody
+from app.robots.virtual.wheels import BRAKING, PRESS_DURATION_S, RADIUS, START_POSE, WheelBody
 from tests.robots.conftest import Ears, eventually
 
 
@@ -38,7 +38,7 @@ def test_wheels_reach_the_requested_speed_and_brake_within_a_tenth_of_a_second()
     assert body.x < -0.3
     body.drive(0.0, 0.0)
     body.step(0.5 / BRAKING + 0.02)
-    assert body.still
+    assert body.is_still
     x = body.x
     body.step(1.0)
     assert body.x == x
@@ -68,12 +68,12 @@ def test_robot_stops_at_an_obstacle_and_publishes_the_bumped_side(start, speed, 
     body = WheelBody(x=start[0], y=start[1], theta_deg=start[2])
     body.drive(speed, 0.0)
     body.step(3.0)
-    assert body.bumped == side
-    assert body.still
-    assert [(h.event, h.data) for h in body.happenings] == [("bump", {"side": side})]
+    assert body.pressed_bumper == side
+    assert body.is_still
+    assert [(h.event, h.data) for h in body.events] == [("bump", {"side": side})]
     body.drive(-speed, 0.0)
     body.step(0.5)
-    assert body.bumped == ""
+    assert body.pressed_bumper == ""
 
 
 def test_robot_pushes_the_ball_and_measures_the_distance_ahead() -> None:
@@ -90,11 +90,11 @@ def test_pressed_bumper_stops_the_robot_and_is_released_after_a_moment() -> None
     body.drive(0.5, 0.0)
     body.step(0.5)
     body.press("left")
-    body.step(PRESS_S / 2)
-    assert (body.bumped, body.still) == ("left", True)
-    body.step(PRESS_S)
-    assert body.bumped == ""
-    assert [(h.event, h.data) for h in body.happenings] == [("bump", {"side": "left"})]
+    body.step(PRESS_DURATION_S / 2)
+    assert (body.pressed_bumper, body.is_still) == ("left", True)
+    body.step(PRESS_DURATION_S)
+    assert body.pressed_bumper == ""
+    assert [(h.event, h.data) for h in body.events] == [("bump", {"side": "left"})]
 
 
 # ---- what it sees ----------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ def pose(ears: Ears) -> tuple[float, float, float]:
 
 def test_robot_moves_turns_and_goes_to_a_place(turtle) -> None:
     _, ears = turtle
-    x, y, theta = START
+    x, y, theta = START_POSE
     ears.invoke("1", "move", distance=0.3)
     assert near(ears.final("1")["output"]["moved"], 0.3, 0.05)
     ears.invoke("2", "turn", angle=-35)
@@ -172,7 +172,7 @@ def test_carrying_the_robot_does_not_count_as_moved_distance(turtle) -> None:
     body, ears = turtle
     ears.invoke("1", "move", distance=0.4)
     eventually(lambda: ears.answers("1") and any(a["feedback"] for a in ears.answers("1")))
-    body.wheels.act({"hold": True})
+    body.wheels.apply_change({"hold": True})
     body.wheels.act({"move": "robot", "x": 0.5, "y": 1.2})
     body.wheels.act({"hold": False})
     assert near(ears.final("1")["output"]["moved"], 0.4, 0.05)
@@ -182,7 +182,7 @@ def test_carrying_the_robot_does_not_count_as_moved_distance(turtle) -> None:
 def test_triggered_colour_event_is_validated_against_the_description(turtle) -> None:
     body, ears = turtle
     for wrong in ({"name": "pink"}, {"name": "red", "area": 3}, {"name": "red", "x": "left"}, {}):
-        body.wheels.act({"happen": "colour", **wrong})
+        body.wheels.apply_change({"happen": "colour", **wrong})
     body.wheels.act({"happen": "bump", "side": "top"})
     body.wheels.act({"happen": "colour", "name": "green", "area": 0.5})
     eventually(lambda: {"name": "green", "x": 0.0, "area": 0.5} in ears.heard["colour"])

@@ -10,7 +10,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.core.documents.backpack import Backpack
-from app.ui.panels.behaviour.backpack_keeper import BackpackKeeper
+from app.ui.panels.behaviour.backpack_keeper import BackpackController
 from tests.ui.blockly_person import START, Person, workspace
 
 pytest_plugins = ["tests.ui.blockly_fixtures"]
@@ -38,7 +38,7 @@ class Window:
         self.said: list[str] = []
         self.undo: list = []
         self.backpack = Backpack(folder)
-        self.keeper = BackpackKeeper(self, self.backpack, view)  # type: ignore[arg-type]
+        self.keeper = BackpackController(self, self.backpack, view)  # type: ignore[arg-type]
 
     def toast(self, words: str, _button: str = "", run=None) -> None:
         self.said.append(words)
@@ -236,7 +236,7 @@ def test_backpack_of_another_studio_is_loaded_and_unknown_blocks_are_preserved(
         "next": {"block": {"type": "control_wait"}},
     }
     wrong = {"type": "control_wait", "inputs": {"SECONDS": {"block": {"type": "control_wait"}}}}
-    Backpack(tmp_path).put([strange, wrong, {"type": "control_wait", "extraState": 5, "icons": 7}])
+    Backpack(tmp_path).add([strange, wrong, {"type": "control_wait", "extraState": 5, "icons": 7}])
     open_it(them, 3)  # opening it looks
     them.wait_for("document.querySelector('.nepBackpack').title", "Backpack (3)")
     them.click(f"{IN_SHEET}:first-child > .blocklyPath")

@@ -181,9 +181,9 @@ def test_block_removed_by_undo_is_not_in_the_bin(qtbot, view, them, told):
 
 def test_fix_that_moves_blocks_is_not_a_deletion(qtbot, view, them, told):
     hat = {**START, "id": "other", "x": 400, "next": {"block": {"type": "control_wait", "id": "three"}}}
-    view.change(workspace(START, WAITS, hat))
+    view.apply_edit(workspace(START, WAITS, hat))
     them.wait_for("!!document.querySelector('[data-id=other] [data-id=three]')")
-    view.change(workspace({**START, "next": hat["next"]}, WAITS))
+    view.apply_edit(workspace({**START, "next": hat["next"]}, WAITS))
     them.wait_for("!!document.querySelector('[data-id=start] [data-id=three]')")
     them.wait_for("!document.querySelector('[data-id=other]')")
     them.click("[data-id=two] > .blocklyPath", dy=10)

@@ -24,10 +24,10 @@ def test_bridge_forwards_page_calls_as_signals(qtbot):
     for slot, signal, args in [
         (bridge.changed, bridge.edited, ["a", 3, "{}"]),
         (bridge.history, bridge.undo_changed, [True, False]),
-        (bridge.selected, bridge.block_chosen, ["b1"]),
-        (bridge.flushed, bridge.answered, [7, "{}"]),
-        (bridge.failed, bridge.went_wrong, ["no command x"]),
-        (bridge.ready, bridge.came_up, []),
+        (bridge.selected, bridge.block_selected, ["b1"]),
+        (bridge.flushed, bridge.workspace_flushed, [7, "{}"]),
+        (bridge.failed, bridge.error_reported, ["no command x"]),
+        (bridge.ready, bridge.page_ready, []),
     ]:
         with qtbot.waitSignal(signal) as got:
             slot(*args)

@@ -35,11 +35,11 @@ class Told:
         self.homes: list[str] = []
         self.pictures: list[tuple[bytes, float]] = []
         self.deleted: list[int] = []
-        view.block_carried.connect(lambda place, _home: self.places.append(place))
-        view.carried_seen.connect(lambda *each: self.pictures.append(each))
-        view.block_dropped.connect(self.dropped.append)
-        view.blocks_brought.connect(lambda count, how, _home: self.brought.append((count, how)))
-        view.blocks_brought.connect(lambda _count, _how, home: self.homes.append(home))
+        view.blocks_dragged_outside.connect(lambda place, _home: self.places.append(place))
+        view.drag_picture_rendered.connect(lambda *each: self.pictures.append(each))
+        view.blocks_dropped_outside.connect(self.dropped.append)
+        view.blocks_transferred.connect(lambda count, how, _home: self.brought.append((count, how)))
+        view.blocks_transferred.connect(lambda _count, _how, home: self.homes.append(home))
         view.blocks_deleted.connect(self.deleted.append)
 
 
@@ -87,7 +87,7 @@ def chains(them: Person) -> list[list[str]]:
 def bring(qtbot, view, told: Told, key: str = "b") -> None:
     qtbot.waitUntil(lambda: bool(told.dropped), timeout=WAIT_MS)
     view.show_tab(key, {})
-    view.bring_blocks()
+    view.move_dragged_blocks()
     qtbot.waitUntil(lambda: bool(told.brought), timeout=WAIT_MS)
 
 
@@ -146,7 +146,7 @@ def test_undo_from_the_toast_reverts_the_move_in_both_tabs(qtbot, view, them, to
         them.press(Qt.Key.Key_Delete)
         them.until(lambda: chains(them) == [["wait", "wait"]], "another edit came later")
     view.show_tab("a", {})
-    view.give_blocks_back()
+    view.undo_block_move()
     qtbot.waitUntil(lambda: chains(them) == BEFORE, timeout=WAIT_MS)
     view.show_tab("b", {})
     qtbot.waitUntil(lambda: chains(them) == rest, timeout=WAIT_MS)
@@ -168,7 +168,7 @@ def test_multi_selection_is_moved_together_or_stays_in_place(qtbot, view, them, 
     assert chains(them) == [["started"], ["wait"], ["wait"]]
     view.show_tab("a", {})
     them.until(lambda: chains(them) == [["started"], ["wait"]], "the script closes behind them")
-    view.give_blocks_back()
+    view.undo_block_move()
     them.until(lambda: chains(them) == BEFORE, "they are in their script again")
     view.show_tab("b", {})
     them.until(lambda: chains(them) == [["started"]], "and gone there")
@@ -258,7 +258,7 @@ def test_drag_continues_in_the_opened_tab_and_connects_to_a_script(qtbot, view, 
     qtbot.waitUntil(lambda: chains(them) == [["started", "wait", "wait"]], timeout=WAIT_MS)
     view.show_tab("a", {})
     them.until(lambda: chains(them) == [["started"], ["wait"]], "and is gone where it was")
-    view.give_blocks_back()
+    view.undo_block_move()
     them.until(lambda: chains(them) == BEFORE, "both are as before")
     view.show_tab("b", {})
     them.until(lambda: chains(them) == [["started"]], "in both tabs")
@@ -358,7 +358,7 @@ def test_mixed_selection_of_blocks_and_notes_is_moved_to_another_tab(
     view.show_tab("a", {})
     them.until(lambda: chains(them) == [["started"], ["wait", "wait"]], "the block is gone")
     assert "workspaceComments" not in them.newest()
-    view.give_blocks_back()
+    view.undo_block_move()
     them.until(lambda: chains(them) == BEFORE, "the block is back")
     assert [each["text"] for each in them.newest()["workspaceComments"]] == ["Look"]
     view.show_tab("b", {})

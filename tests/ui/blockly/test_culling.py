@@ -73,7 +73,7 @@ def test_far_script_is_rendered_after_joining_another_by_redo(person):
     them.wait_for(drawn("here", "below"), ["here"])
     joined = script("here", 40, 40)
     joined["next"]["block"]["next"] = {"block": below["next"]["block"]}
-    them.view.change(workspace(joined))
+    them.view.apply_edit(workspace(joined))
     them.wait_for(drawn("here_wait", "below_wait"), ["here_wait", "below_wait"])
     them.view.undo()
     them.wait_for(f"{drawn('here_wait', 'below_wait')}.length", 1)  # Blockly may show what came back

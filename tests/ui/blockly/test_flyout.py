@@ -202,7 +202,7 @@ def test_dropdown_choice_in_the_flyout_applies_to_the_dragged_block(qtbot, opene
 def test_new_variable_appears_in_the_flyout_immediately(qtbot, opened, width):
     them = opened(width)
     them.open_category("Variables")
-    with qtbot.waitSignal(them.view.command_wanted, timeout=WAIT_MS) as asked:
+    with qtbot.waitSignal(them.view.command_requested, timeout=WAIT_MS) as asked:
         them.click(".blocklyFlyoutButton")
     assert asked.args == ["variable.new"]
     them.view.edit_variable({"do": "new", "name": "steps"})

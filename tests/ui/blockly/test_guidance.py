@@ -48,7 +48,7 @@ def test_empty_canvas_shows_the_first_step_and_offers_a_robot_until_one_exists(
     assert empty.ask(SAID) == "Drag “when started” here"
     assert empty.ask(BUTTONS) == ["Use the virtual robot", "Show me", "Open an example"]
     asked: list[str] = []
-    view.wanted.connect(asked.append)
+    view.canvas_button_pressed.connect(asked.append)
     empty.click(".nepBegin button:nth-child(1)", dx=20)
     empty.click(".nepBegin button:nth-child(3)", dx=20)
     empty.until(lambda: asked == ["robot", "examples"], "the window hears what was pressed")

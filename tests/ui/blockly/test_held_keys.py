@@ -19,7 +19,7 @@ class Watch(QObject):
         self._keys = keys
 
     def eventFilter(self, _watched, event) -> bool:
-        return self._keys.keeps(event)
+        return self._keys.hold_event(event)
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def test_held_keys_are_delivered_in_order(field, keys):
     keys.hold()
     QTest.keyClicks(field, "bc")
     assert field.text() == "a"
-    keys.let_go()
+    keys.release()
     QTest.keyClicks(field, "d")
     assert field.text() == "abcd"
 
@@ -54,7 +54,7 @@ def test_click_or_focus_change_delivers_held_keys(field, keys, how):
     if how == "mouse":
         QTest.mouseClick(field, Qt.LeftButton)
     else:
-        keys.keeps(QFocusEvent(QFocusEvent.Type.FocusOut))
+        keys.hold_event(QFocusEvent(QFocusEvent.Type.FocusOut))
     QTest.keyClicks(field, "c")
     assert field.text() == "abc"
 
@@ -62,7 +62,7 @@ def test_click_or_focus_change_delivers_held_keys(field, keys, how):
 def test_keys_held_for_a_crashed_page_are_discarded(field, keys):
     keys.hold()
     QTest.keyClicks(field, "ab")
-    keys.forget()
-    keys.let_go()
+    keys.discard_all()
+    keys.release()
     QTest.keyClicks(field, "c")
     assert field.text() == "c"

@@ -9,7 +9,7 @@ from PySide6.QtCore import QMimeData
 from app.blocks.compiler.stack import Stack
 from app.core.documents.file_format import parse_file
 from app.errors import DocumentError
-from app.ui.blockly.page_json import data_url, pairs, texts
+from app.ui.blockly.page_json import decode_data_url, parse_string_pairs, parse_strings
 from app.ui.shell.commands.behaviours import read_stack
 from app.ui.widgets.field_drag import MIME, dropped_field
 from tests import hostile
@@ -36,12 +36,12 @@ def text_of(payload: bytes) -> str:
 
 def test_page_values_are_parsed_or_empty() -> None:
     for text in map(text_of, LISTS):
-        assert all(isinstance(each, str) for each in texts(text))
-        assert all(len(each) == 2 for each in pairs(text))
-        assert isinstance(data_url(f"data:image/png;base64,{text}"), bytes)
-    assert pairs('[["Pepper", "battery"]]') == (("Pepper", "battery"),)
-    assert texts('["a", "b"]') == ("a", "b")
-    assert data_url("data:image/png;base64,aGk=") == b"hi"
+        assert all(isinstance(each, str) for each in parse_strings(text))
+        assert all(len(each) == 2 for each in parse_string_pairs(text))
+        assert isinstance(decode_data_url(f"data:image/png;base64,{text}"), bytes)
+    assert parse_string_pairs('[["Pepper", "battery"]]') == (("Pepper", "battery"),)
+    assert parse_strings('["a", "b"]') == ("a", "b")
+    assert decode_data_url("data:image/png;base64,aGk=") == b"hi"
 
 
 def test_stacks_and_behaviours_are_parsed_or_rejected() -> None:

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 
 from app.blocks import editor_definitions
 from app.ui.blockly.view import BlocklyView
-from app.ui.shell.actions.shortcuts import FIXED
+from app.ui.shell.actions.shortcuts import FIXED_KEYS
 from tests.blocks.samples import number, robot, started, workspace
 from tests.ui.blockly_person import WAIT_MS, Person, editor
 
@@ -134,5 +134,5 @@ def test_focus_stays_where_the_deleted_block_was(qtbot, them):
 
 
 def test_every_block_shortcut_is_listed():
-    listed = {key for fixed in FIXED if fixed.place == "Blocks" for key in fixed.key.split(", ")}
+    listed = {key for fixed in FIXED_KEYS if fixed.scope == "Blocks" for key in fixed.key.split(", ")}
     assert {"Ctrl+D", "Ctrl+M", "Ctrl+L", "Ctrl+B", "Delete", "Alt+Down"} <= listed

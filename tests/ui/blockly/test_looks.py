@@ -215,7 +215,7 @@ def test_toolbox_reports_that_no_robot_is_connected(view, person):
 def test_window_is_notified_of_sensors_shown_in_the_open_toolbox(view, person):
     them = person(START)
     told: list[tuple] = []
-    view.sensors_offered.connect(told.append)
+    view.visible_sensors_changed.connect(told.append)
     them.open_category("Sensors")
     them.until(lambda: told, "the sensors are told")
     assert ("Pepper", "battery") in told[-1]

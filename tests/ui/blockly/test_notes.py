@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 
 from app import resources
 from app.blocks import editor_definitions
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import robot, workspace
@@ -171,7 +171,7 @@ NOTES = "[...document.querySelectorAll('.nepTab:not([hidden]) .blocklyComment')]
 
 
 def test_notes_of_examples_do_not_overlap_blocks(qtbot):
-    pepper = parse(td_for(PEPPER.thing_model, "Pepper"))
+    pepper = parse(thing_description(PEPPER.thing_model, "Pepper"))
     view = editor(qtbot, editor_definitions([pepper]), 1320, 760)
     view.set_toolbox_pinned(False)
     them = Person(qtbot, view)

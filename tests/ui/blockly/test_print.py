@@ -54,7 +54,7 @@ class Pages:
 
 def printed(qtbot, view: BlocklyView, title: str = "Tea for two") -> Pages | None:
     got: list[bytes] = []
-    view.pdf(title, "23 November 2026", A4, got.append)
+    view.render_pdf(title, "23 November 2026", A4, got.append)
     qtbot.waitUntil(lambda: bool(got), timeout=WAIT_MS)
     return Pages(got[0]) if got[0] else None
 

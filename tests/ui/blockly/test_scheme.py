@@ -68,4 +68,4 @@ def test_page_references_no_external_origin():
     page = content("/index.html")[1].decode()
     assert "http:" not in page
     assert "https:" not in page
-    assert blockly_scheme.PAGE == "app://blocks/index.html"
+    assert blockly_scheme.PAGE_URL == "app://blocks/index.html"

@@ -25,23 +25,23 @@ TABS = "document.querySelectorAll('.nepTab').length"
 def test_placeholder_tab_is_replaced_by_the_first_document() -> None:
     tabs = Tabs()
     assert tabs.shown.program.blocks == EMPTY
-    assert tabs.show("a", WorkspaceJson.of(A)) == ""
+    assert tabs.show("a", WorkspaceJson.from_blocks(A)) == ""
     assert tabs[""] is None
-    assert tabs.show("b", WorkspaceJson.of(B)) is None
-    assert tabs.show("a", WorkspaceJson.of({})) is None
+    assert tabs.show("b", WorkspaceJson.from_blocks(B)) is None
+    assert tabs.show("a", WorkspaceJson.from_blocks({})) is None
     assert tabs.shown.program.blocks == A
 
 
 def test_edits_of_a_closed_or_replaced_program_are_ignored() -> None:
     tabs = Tabs()
-    tabs.show("a", WorkspaceJson.of(A))
+    tabs.show("a", WorkspaceJson.from_blocks(A))
     before = tabs.shown.generation
-    assert tabs.edited("a", before) is tabs.shown
-    tabs.replace(WorkspaceJson.of(B))
-    assert tabs.edited("a", before) is None
+    assert tabs.tab_for_edit("a", before) is tabs.shown
+    tabs.replace(WorkspaceJson.from_blocks(B))
+    assert tabs.tab_for_edit("a", before) is None
     generation = tabs.shown.generation
     assert tabs.close("a")
-    assert tabs.edited("a", generation) is None
+    assert tabs.tab_for_edit("a", generation) is None
     assert not tabs.close("a")
     assert tabs.shown.program.blocks == EMPTY
 
@@ -194,7 +194,7 @@ def test_script_added_by_an_external_change_is_placed_in_free_visible_space(
     them = person(*scripts)
     before = them.tops()
     added = {"type": "events_received", "id": "added", "fields": {"NAME": "go"}, "x": 1320, "y": 40}
-    view.change(workspace(*before, added))
+    view.apply_edit(workspace(*before, added))
     here = them.box("[data-id=added] > .blocklyPath")
     canvas = them.ask(
         "(r => [r.right, r.bottom])(document.querySelector('.blocklySvg').getBoundingClientRect())"
@@ -213,7 +213,7 @@ def test_external_change_is_one_undo_step(qtbot, two, view) -> None:
     here = f"[...{SHOWN}.querySelectorAll('.blocklyBlockCanvas .blocklyDraggable')].map(e => e.dataset.id)"
     before = two.ask(here)
     fixed = workspace({**START, "next": {"block": {"type": "control_wait", "id": "added"}}})
-    view.change(fixed)
+    view.apply_edit(fixed)
     two.wait_for(f"({here}).includes('added')")
     assert view.workspace == fixed
     view.undo()

@@ -19,7 +19,7 @@ ANSWER = "(e => e && !e.hidden && e.textContent)(document.querySelector('.nepTry
 def asked(view) -> list[dict]:
     """What was to be tried."""
     made: list[dict] = []
-    view.try_asked.connect(lambda text: made.append(json.loads(text)))
+    view.try_requested.connect(lambda text: made.append(json.loads(text)))
     return made
 
 

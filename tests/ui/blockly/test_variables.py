@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 
 from app.blocks import editor_definitions
-from app.blocks.runtime.variables import brief
+from app.blocks.runtime.variables import display_value
 from app.ui.blockly.view import BlocklyView
 from tests.blocks.samples import block, get, list_of, number, started, workspace, write
 from tests.ui.blockly_person import WAIT_MS, Person, editor
@@ -39,11 +39,11 @@ def them(person) -> Person:
 
 
 def values(**held: object) -> dict[str, dict[str, object]]:
-    return {id: brief(id, value).to_json() for id, value in held.items()}
+    return {id: display_value(id, value).to_json() for id, value in held.items()}
 
 
 def test_watched_variable_shows_a_value_card_that_is_saved_in_the_file(qtbot, view, them) -> None:
-    with qtbot.waitSignal(view.values_watched, timeout=WAIT_MS) as watched:
+    with qtbot.waitSignal(view.watched_variables_changed, timeout=WAIT_MS) as watched:
         view.edit_variable({"do": "watch", "id": "score"})
     assert watched.args == [("score",)]
     them.wait_for(CARDS, [["score", UNKNOWN]])
@@ -78,7 +78,7 @@ def test_variable_dropdown_offers_a_new_variable_and_opens_the_dialogs_of_the_wi
     qtbot, view, them
 ) -> None:
     asked: list[str] = []
-    view.command_wanted.connect(asked.append)
+    view.command_requested.connect(asked.append)
     them.click("[data-id=get] .blocklyDropdownField")
     them.wait_for(f"{MENU}.length >= 4")
     entries = them.ask(MENU)
@@ -124,7 +124,7 @@ def test_rename_and_delete_of_a_variable_are_one_undo_step_each(qtbot, view, the
 
 def test_block_menu_shows_the_value_of_its_variable(qtbot, view, them) -> None:
     asked: list[str] = []
-    view.command_wanted.connect(asked.append)
+    view.command_requested.connect(asked.append)
     them.click("[data-id=set] > .blocklyPath", 10, 8)
     them.press(Qt.Key.Key_F10, Qt.KeyboardModifier.ShiftModifier)
     them.wait_for(f"{MENU}.some(e => e.startsWith('Show the value of “score”'))")
@@ -134,7 +134,7 @@ def test_block_menu_shows_the_value_of_its_variable(qtbot, view, them) -> None:
 
 def test_page_only_sends_known_commands_to_the_window(qtbot, view, them) -> None:
     asked: list[str] = []
-    view.command_wanted.connect(asked.append)
+    view.command_requested.connect(asked.append)
     view._bridge.command("file.quit")
     view._bridge.command("variable.new")
     assert asked == ["variable.new"]
@@ -142,7 +142,7 @@ def test_page_only_sends_known_commands_to_the_window(qtbot, view, them) -> None
 
 def test_new_list_becomes_the_default_of_the_list_blocks(qtbot, view, them) -> None:
     asked: list[str] = []
-    view.command_wanted.connect(asked.append)
+    view.command_requested.connect(asked.append)
     them.open_category("Lists")
     words = "[...document.querySelectorAll('.blocklyFlyout .blocklyFlyoutButton')].map(e => e.textContent)"
     assert them.ask(words) == ["New list"]

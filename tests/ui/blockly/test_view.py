@@ -188,7 +188,7 @@ def test_blockly_uses_the_chosen_language_or_falls_back_to_english(qtbot, langua
 
 def test_page_texts_are_translated_by_the_window(qtbot, monkeypatch):
     monkeypatch.setattr(
-        "nep.i18n.editor_words", lambda: {"Find a block": "Buscar un bloque", "Duplicate": "Otra vez"}
+        "nep.i18n.editor_translations", lambda: {"Find a block": "Buscar un bloque", "Duplicate": "Otra vez"}
     )
     view = BlocklyView(language="es")
     qtbot.addWidget(view)

@@ -27,7 +27,7 @@ class ImageStream(images_module.ImageStream):
     def came(self, arriving_hz: float, shown_hz: float) -> None:
         """As if pictures had come and had been painted for two seconds; the next ones come after these."""
         begin = self._images.clock() - images_module.RATE_DELAY_S - images_module.RATE_WINDOW_S
-        for rate, hz in ((self.arriving, arriving_hz), (self._shown, shown_hz)):
+        for rate, hz in ((self.arrival_rate, arriving_hz), (self._display_rate, shown_hz)):
             for number in range(round(hz * images_module.RATE_WINDOW_S)):
                 rate.add(begin + (number + 1e-3) / hz)
 
@@ -37,7 +37,7 @@ class Images(images_module.Images):
 
     def __init__(
         self,
-        watch: Callable[[str], images_module.Watching] | None = None,
+        watch: Callable[[str], images_module.WatchHandle] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         super().__init__(watch or (lambda topic: Watches(str, str).open([topic])), clock)
@@ -61,21 +61,21 @@ class Images(images_module.Images):
 
     def add(self, stream: images_module.ImageStream) -> None:
         super().add(stream)
-        self.decode_waiting()
+        self.decode_pending()
 
     def offer(self, messages: Sequence[Message], key: str = "") -> None:
         super().offer(messages, key)
-        self.decode_waiting()
+        self.decode_pending()
 
-    def want(self, stream: images_module.ImageStream, size: tuple[int, int] | None) -> None:
-        super().want(stream, size)
-        self.decode_waiting()
+    def set_size(self, stream: images_module.ImageStream, size: tuple[int, int] | None) -> None:
+        super().set_size(stream, size)
+        self.decode_pending()
 
-    def show_as(self, stream: images_module.ImageStream, look: PictureLook) -> None:
-        super().show_as(stream, look)
-        self.decode_waiting()
+    def set_look(self, stream: images_module.ImageStream, look: PictureLook) -> None:
+        super().set_look(stream, look)
+        self.decode_pending()
 
-    def _begin_decoding(self) -> None:
+    def _start_decoding(self) -> None:
         return None
 
 

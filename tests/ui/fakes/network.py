@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Callable, Mapping, Sequence
 
 import nep
-from app.core.faults import error_words
-from app.core.network.source import GraphSeen, Job, JobFailed, MasterFound, Sink
+from app.core.faults import error_text
+from app.core.network.source import GraphReceived, Job, JobFailed, MasterFound, Sink
 from nep.errors import NepError
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -46,7 +46,7 @@ class Network:
 
     def tell(self, view: GraphView) -> None:
         """The master tells who is there."""
-        self._post_event(GraphSeen(view, 0.0))
+        self._post_event(GraphReceived(view, 0.0))
 
     def find_master(self) -> None:
         """A master answers."""
@@ -74,7 +74,7 @@ class Network:
         except NepError as error:
             self._post_event(JobFailed(what, str(error)))
         except Exception as error:  # noqa: BLE001  as the network does: one job that fails must not end all others
-            self._post_event(JobFailed(what, error_words(error)))
+            self._post_event(JobFailed(what, error_text(error)))
 
     def missed(self) -> Mapping[str, int]:
         return dict.fromkeys(self.wanted, 0)

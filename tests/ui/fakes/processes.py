@@ -9,7 +9,7 @@ from typing import IO
 
 from app.blocks import Program
 from app.core.robots import launcher as processes_module
-from app.core.run.runner import Kind, RunnerEvent
+from app.core.run.runner import EventKind, RunnerEvent
 from app.errors import RunnerError
 
 
@@ -124,7 +124,7 @@ class Runner:
     def stop(self) -> None:
         self.ends()
 
-    def _tell(self, kind: Kind, **more: object) -> None:
+    def _tell(self, kind: EventKind, **more: object) -> None:
         self._on_event(RunnerEvent(kind, self.run, **more))  # type: ignore[arg-type]
 
 

@@ -28,7 +28,7 @@ from app.core.run.runner import RunnerEvent
 from app.robots.description.model import Robot
 from nep.messages.message import Message
 from nep.nodes.subscriber import Subscriber
-from nep.programs.doctor import Finding, Tell
+from nep.programs.doctor import Finding, ProgressCallback
 from nep.programs.robots.moving import COMMAND_TYPE
 from tests.ui import sample_data
 from tests.ui.fakes.images import Images
@@ -63,7 +63,7 @@ class Clock:
 class Doctor(doctor_module.Doctor):
     """The real one; finds what the test says, at once and in the thread that asks."""
 
-    looking = False  # type: ignore[assignment]  # what a test says instead of a thread
+    is_running = False  # type: ignore[assignment]  # what a test says instead of a thread
 
     def __init__(self) -> None:
         super().__init__(self._find_at_once, lambda: 1_795_164_093.0)
@@ -74,7 +74,7 @@ class Doctor(doctor_module.Doctor):
         self.looked += 1
         self._run()
 
-    def _find_at_once(self, _topic: str, tell: Tell) -> tuple[Finding, ...]:
+    def _find_at_once(self, _topic: str, tell: ProgressCallback) -> tuple[Finding, ...]:
         if self.found is not None:  # else it breaks off
             tell(self.found, len(self.found), len(self.found))
         return self.found
@@ -113,10 +113,10 @@ class Session(session_module.Session):
             alerts=self.alerts, console=self.console, post_event=post, clock=self.clock,
             make_runner=self._make_runner,  # type: ignore[arg-type]
         )  # fmt: skip
-        self.runs.coming = lambda: self.coming
+        self.runs.coming = lambda: self.starting_robots
         self.runs.also_stops = self.acting.disarm
         self.doctor = Doctor()
-        self.launcher = Launcher(ADDRESS, post, self.fleet.is_there, self.clock)
+        self.launcher = Launcher(ADDRESS, post, self.fleet.is_present, self.clock)
         self.images = Images(self.watch, self.clock)
         self.master = MasterState("none", ADDRESS)
         self.alarms.path = self.acting.path = None  # kept in memory alone
@@ -160,14 +160,14 @@ class Session(session_module.Session):
         self.ticks += 1
         self.clock.now += TICK_S
         now_ns = self.clock.ns()
-        for topic in self.live.topics.live():
+        for topic in self.live.topics.existing_topics():
             if topic.rate_hz:
                 topic.last_stamp_ns = now_ns - round(self.ticks * 0.033 % (1 / topic.rate_hz) * 1e9)
         if self.ticks % 3 == 0:
             self.source.send(self._message("/blackboard", sample_data.blackboard(self.ticks / 30)))
         pictures: Images = self.live.images  # also while a recording shows
         for stream in pictures.streams:
-            if not stream.resting:
+            if not stream.is_suspended:
                 pictures.look(stream.topic)
         super().tick()
 
@@ -209,8 +209,8 @@ class Session(session_module.Session):
             self.source.listen(topics.command, COMMAND_TYPE),
             *([self.source.listen(topics.world, "json")] if topics.world is not None else []),
         ]
-        self.fleet.join(replace(robot, virtual=virtual), topics.description)
-        self.fleet.stopped({robot.name: ("confirmed in 41 ms, at 8:40", "ok")}, StopReport((), 0.0))
+        self.fleet.connect(replace(robot, virtual=virtual), topics.description)
+        self.fleet.apply_stop({robot.name: ("confirmed in 41 ms, at 8:40", "ok")}, StopReport((), 0.0))
         self.take_over()
         link = self.fleet.link(robot.name)
         assert link is not None
@@ -256,7 +256,7 @@ class Session(session_module.Session):
         for ago, level, origin, text in sample_data.LOG:
             clock.now = end - ago
             session.console.add(level, origin, text)
-        session.alerts.put(
+        session.alerts.raise_alert(
             "message:/faces", "error", "/faces sends text that is not JSON since 8:41.",
             "1 204 messages can't be decoded.", button="Show the bytes", action="inspect:/faces",
         )  # fmt: skip

@@ -56,8 +56,8 @@ class Document(document_module.Document):
         self.source: str | None = None
         self.absent_blocks: tuple[str, ...] | None = None
 
-    def _compiling(self) -> Callable[[], Program]:
-        compiling = super()._compiling()
+    def _compile_job(self) -> Callable[[], Program]:
+        compiling = super()._compile_job()
         told = {
             "problems": self.found,
             "sensors": self.sensors,

@@ -9,7 +9,7 @@ from typing import Protocol
 import pytest
 
 import nep
-from app.core.network.source import GraphSeen, JobFailed, LiveSource, MasterFound, Source
+from app.core.network.source import GraphReceived, JobFailed, LiveSource, MasterFound, Source
 from nep.masters.master import Master
 from nep.messages.message import Message
 from nep.nodes.node import Node
@@ -51,7 +51,9 @@ class RealWorld:
 
     def begin(self) -> None:
         self.source.start()
-        until(lambda: any(isinstance(each, GraphSeen) and "/a" in each.view.topics for each in self.events))
+        until(
+            lambda: any(isinstance(each, GraphReceived) and "/a" in each.view.topics for each in self.events)
+        )
 
     def send(self, payload: object) -> None:
         before = len(self.heard)
@@ -104,7 +106,7 @@ def world(request: pytest.FixtureRequest) -> Iterator[World]:
 def test_master_is_found_before_the_graph_is_reported(world: World) -> None:
     assert world.events == []
     world.begin()
-    assert [type(event) for event in world.events[:2]] == [MasterFound, GraphSeen]
+    assert [type(event) for event in world.events[:2]] == [MasterFound, GraphReceived]
     assert world.events[0] == MasterFound(world.source.address)
 
 
@@ -127,13 +129,13 @@ def test_messages_reach_every_sink_while_their_topic_is_watched(world: World) ->
 
 def test_missed_messages_are_counted_for_watched_topics_only(world: World) -> None:
     world.begin()
-    assert world.source.missed() == {}
+    assert world.source.lost_counts() == {}
     world.source.watch("/a")
     assert world.listens(True)
-    until(lambda: world.source.missed() == {"/a": 0})
+    until(lambda: world.source.lost_counts() == {"/a": 0})
     world.source.unwatch("/a")
     assert world.listens(False)
-    until(lambda: world.source.missed() == {})
+    until(lambda: world.source.lost_counts() == {})
 
 
 def test_jobs_get_a_node_run_in_order_and_failures_are_reported(world: World) -> None:

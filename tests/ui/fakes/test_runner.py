@@ -144,7 +144,7 @@ def endless() -> Mapping[str, object]:
 def shown(run: Run) -> tuple[object, ...]:
     """What can be pressed, and what stands there."""
     view = run.session.runs.view()
-    return view.state, view.can_run, view.can_pause, view.can_step, view.run_word, view.stop_word
+    return view.state, view.can_run, view.can_pause, view.can_step, view.run_label, view.stop_label
 
 
 READY = ("ready", True, False, True, "Run", "Stop")
@@ -154,7 +154,7 @@ PAUSED = ("paused", True, False, True, "Resume", "Stop")
 
 def test_program_runs_pauses_steps_resumes_and_stops(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     assert (shown(run), runs.active) == (READY, False)
     runs.run()
     assert (shown(run), runs.active) == (RUNNING, True)
@@ -174,7 +174,7 @@ def test_program_runs_pauses_steps_resumes_and_stops(run: Run) -> None:
     assert (shown(run), runs.stopped_blocks) == (RUNNING, ())
     run.works("c")
     runs.set_pace(0.5)
-    assert runs.view().slow
+    assert runs.view().is_slow
     runs.stop()
     assert not runs.active
     tick_until(run.session, lambda: runs.view().state == "ready")
@@ -186,17 +186,17 @@ def test_program_runs_pauses_steps_resumes_and_stops(run: Run) -> None:
 
 def test_pause_at_a_block_applies_at_once_and_is_not_a_pending_edit(run: Run) -> None:
     runs, blocks = run.session.runs, endless()
-    run.session.document.edited(blocks)
+    run.session.document.apply_edit(blocks)
     runs.run()
     run.works("c")
     marked = block("variables_change", "c", VAR={"id": "n"}, BY=number(1)) | {"data": '{"pause":true}'}
     loop = block("control_forever", "loop", BODY=[marked])
-    run.session.document.edited(workspace(started(loop), variables=("n",)))
+    run.session.document.apply_edit(workspace(started(loop), variables=("n",)))
     run.pauses_at("c")
-    assert not runs.view().edited
-    run.session.document.edited(blocks)
+    assert not runs.view().is_edited
+    run.session.document.apply_edit(blocks)
     tick_until(run.session, lambda: runs._breakpoints == ())
-    runs.go_on()
+    runs.resume()
     run.works("c")
     assert runs.view().state == "running"
 
@@ -209,7 +209,7 @@ def pressed_long_ago(run: Run) -> None:
 
 def test_run_again_stops_the_running_program_and_restarts_it(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     runs.run()
     run.works("c")
     first = runs._runner
@@ -235,7 +235,7 @@ def test_run_again_stops_the_running_program_and_restarts_it(run: Run) -> None:
 
 def test_stop_cancels_a_restart(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     runs.run()
     run.works("c")
     runs.restart()
@@ -247,7 +247,7 @@ def test_stop_cancels_a_restart(run: Run) -> None:
 
 def test_paused_program_is_restarted_from_its_beginning(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     runs.step()
     tick_until(run.session, lambda: runs.view().state == "paused")
     assert runs.view().can_restart
@@ -262,27 +262,27 @@ def test_edits_during_a_run_are_reported_as_pending_until_undone(run: Run) -> No
 
     def says() -> bool:
         """Whether the bar says so, once the newest edit is compiled."""
-        tick_until(run.session, lambda: document.newest() is document.program())
+        tick_until(run.session, lambda: document.newest_program() is document.program())
         runs.tick()
         view = runs.view()
-        assert view.edited == (view.detail == "Your changes take effect at the next run")
-        return view.edited
+        assert view.is_edited == (view.detail == "Your changes take effect at the next run")
+        return view.is_edited
 
-    document.edited(endless())
+    document.apply_edit(endless())
     runs.run()
     run.works("c")
     assert not says()
     more = workspace(started(block("control_forever", "loop", BODY=[]), write(text("Hi"))))
-    document.edited(more)
+    document.apply_edit(more)
     assert says()
-    document.edited(endless())
+    document.apply_edit(endless())
     assert not says(), "undone: it is what runs"
-    document.edited(more)
+    document.apply_edit(more)
     assert says()
     run.session.documents.new()
-    run.session.document.edited(more)
+    run.session.document.apply_edit(more)
     runs.tick()
-    assert (runs.view().edited, runs.view().run_word) == (False, "Run"), "another tab shows"
+    assert (runs.view().is_edited, runs.view().run_label) == (False, "Run"), "another tab shows"
     run.session.documents.show(document)
     assert says()
     runs.restart()
@@ -294,7 +294,7 @@ def test_edits_during_a_run_are_reported_as_pending_until_undone(run: Run) -> No
 
 def test_tried_stack_runs_alone_and_never_beside_another_program(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     runs.run()
     run.works("c")
     first = runs._runner
@@ -303,10 +303,10 @@ def test_tried_stack_runs_alone_and_never_beside_another_program(run: Run) -> No
     tick_until(run.session, lambda: runs.active)
     assert runs._runner is not first
     view = runs.view()
-    assert (view.title, view.run_word, view.can_restart) == ("Trying “change by”", "Run", True)
-    run.session.document.edited(workspace())
+    assert (view.title, view.run_label, view.can_restart) == ("Trying “change by”", "Run", True)
+    run.session.document.apply_edit(workspace())
     runs.tick()
-    assert not runs.view().edited, "edits are no matter of a try"
+    assert not runs.view().is_edited, "edits are no matter of a try"
     run.ends()
     tick_until(run.session, lambda: runs.view().state == "ready")
     view = runs.view()
@@ -315,13 +315,13 @@ def test_tried_stack_runs_alone_and_never_beside_another_program(run: Run) -> No
 
 def test_tried_variable_has_the_value_of_the_run_and_stops_nothing(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     tried = Stack("toolbox", "value", block("variables_get", VAR={"id": "n"}))
 
     def words() -> str:
         runs.try_stack(tried)
         assert runs.tried_value is not None
-        return runs.tried_value.words
+        return runs.tried_value.text
 
     assert words() == "no value yet"
     assert not runs.active
@@ -336,7 +336,7 @@ def test_tried_variable_has_the_value_of_the_run_and_stops_nothing(run: Run) -> 
 
 def test_stop_ends_a_tried_stack(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     runs.try_stack(Stack("loop"))
     run.works("c")
     runs.stop()
@@ -347,7 +347,7 @@ def test_stop_ends_a_tried_stack(run: Run) -> None:
 
 def test_empty_slot_of_a_tried_stack_is_reported_on_its_block(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(workspace(started(block("control_wait_until", "gap"))))
+    run.session.document.apply_edit(workspace(started(block("control_wait_until", "gap"))))
     runs.try_stack(Stack("gap"))
     assert not runs.active
     assert "needs a condition" in runs.block_errors["gap"]
@@ -361,7 +361,7 @@ def test_runner_reports_program_events_and_state(run: Run) -> None:
         """Wait until this is the newest kind of what was told, and forget what was before."""
         until(lambda: bool(told) and told[-1].kind == kind)
         assert {event.run for event in told} == {runner.run}
-        assert all(event.ok for event in told)
+        assert all(event.is_ok for event in told)
         told.clear()
 
     program = compile_behaviour(endless(), [])
@@ -374,12 +374,12 @@ def test_runner_reports_program_events_and_state(run: Run) -> None:
         assert runner.state == "paused"
     with pytest.raises(RunnerError, match="create a new one"):
         runner.start(program, [], run.session.address)
-    runner.go_on()
+    runner.resume()
     assert runner.state == "running"
     come("running")
     runner.stop()
     until(lambda: bool(told) and told[-1].kind == "ended")
-    assert (told[-1].ok, told[-1].text, runner.state) == (True, "", "ended")
+    assert (told[-1].is_ok, told[-1].text, runner.state) == (True, "", "ended")
     seen = len(told)
     runner.stop()  # it has ended already
     assert len(told) == seen
@@ -388,7 +388,7 @@ def test_runner_reports_program_events_and_state(run: Run) -> None:
 
 def test_step_starts_a_program_at_its_first_block(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(workspace(started(write(text("Hi")) | {"id": "w"})))
+    run.session.document.apply_edit(workspace(started(write(text("Hi")) | {"id": "w"})))
     runs.step()
     assert runs.active
     tick_until(run.session, lambda: runs.view().state == "paused")
@@ -400,7 +400,7 @@ def test_step_starts_a_program_at_its_first_block(run: Run) -> None:
 
 def test_program_that_ends_is_finished_and_another_can_run(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(workspace(started(write(text("Hi")))))
+    run.session.document.apply_edit(workspace(started(write(text("Hi")))))
     for _ in range(2):
         runs.run()
         run.ends()
@@ -414,7 +414,7 @@ def test_program_that_ends_is_finished_and_another_can_run(run: Run) -> None:
 def test_failing_block_ends_the_program_and_is_marked(run: Run) -> None:
     runs = run.session.runs
     half = block("values_arithmetic", "v", A=number(1), SIGN="/", B=number(0))
-    run.session.document.edited(workspace(started(write(half))))
+    run.session.document.apply_edit(workspace(started(write(half))))
     runs.run()
     run.fails("v")
     tick_until(run.session, lambda: runs.view().state == "ready")
@@ -426,7 +426,7 @@ def test_failing_block_ends_the_program_and_is_marked(run: Run) -> None:
 
 def test_killed_program_process_is_reported(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     runs.run()
     run.works("c")
     run.is_killed()
@@ -439,7 +439,7 @@ def test_killed_program_process_is_reported(run: Run) -> None:
 
 def test_late_events_of_an_earlier_run_are_ignored(run: Run) -> None:
     runs = run.session.runs
-    run.session.document.edited(endless())
+    run.session.document.apply_edit(endless())
     runs.run()
     earlier = runs._runner
     assert earlier is not None

@@ -58,7 +58,7 @@ def test_recent_files_are_newest_first(settings: Settings, tmp_path: Path) -> No
     settings.add_recent(files[5], "Five")  # it is called as its file
     files[-1].unlink()
     assert [each.name for each in settings.recent][:2] == ["5", files[-2].stem]
-    assert len(settings.recent_known) == RECENT_LIMIT
+    assert len(settings.all_recent) == RECENT_LIMIT
     settings.set_recent([])
     assert settings.recent == []
 
@@ -77,7 +77,7 @@ class Kept:
     def blocks(self) -> object:
         """The blocks in the journal, None when it keeps none."""
         if self._folder is not None:
-            file = self._folder / self.document.journal
+            file = self._folder / self.document.journal_name
             return json.loads(file.read_text("utf-8"))["workspace"] if file.exists() else None
         journal = self.document._journal
         assert isinstance(journal, storage.Journal)
@@ -96,10 +96,10 @@ SECOND = workspace(started(write(text("two"))))
 def test_edit_is_in_the_journal_until_it_is_saved(kept: Kept, tmp_path: Path) -> None:
     document = kept.document
     assert (kept.blocks, document.dirty, document.edits) == (None, False, 0)
-    document.edited(FIRST)
-    document.edited(FIRST)  # the same once more is no edit
+    document.apply_edit(FIRST)
+    document.apply_edit(FIRST)  # the same once more is no edit
     assert (kept.blocks, document.dirty, document.edits) == (FIRST, True, 1)
-    document.edited(SECOND)
+    document.apply_edit(SECOND)
     assert (kept.blocks, document.edits) == (SECOND, 2)
     document.save(tmp_path / "mine.nepb")
     assert (kept.blocks, document.dirty, document.name) == (None, False, "mine")
@@ -107,11 +107,11 @@ def test_edit_is_in_the_journal_until_it_is_saved(kept: Kept, tmp_path: Path) ->
 
 def test_each_behaviour_has_its_own_journal(kept: Kept) -> None:
     document = kept.document
-    document.edited(FIRST)
-    before = document.journal
-    assert document.journal == before
+    document.apply_edit(FIRST)
+    before = document.journal_name
+    assert document.journal_name == before
     document.new("Other")
-    assert document.journal != before
+    assert document.journal_name != before
     assert kept.blocks is None
     document.close()
     document.close()  # there is nothing to give up
@@ -120,21 +120,21 @@ def test_each_behaviour_has_its_own_journal(kept: Kept) -> None:
 
 def test_document_compiles_its_blocks_once_per_edit(kept: Kept) -> None:
     document = kept.document
-    document.edited(FIRST)
+    document.apply_edit(FIRST)
     program = document.program()
     assert type(program) is Program
     assert "one" in program.source
-    assert document.newest() is document.program() is program
-    document.edited(workspace(started(block("control_wait", "w"))))
+    assert document.newest_program() is document.program() is program
+    document.apply_edit(workspace(started(block("control_wait", "w"))))
     assert [problem.block_id for problem in document.problems() if problem.severity == "error"] == ["w"]
     assert document.definitions() is document.definitions()
     document.set_topics(["/a"])
-    assert document.newest() is not program
+    assert document.newest_program() is not program
 
 
 def test_fake_document_returns_the_given_compiler_results() -> None:
     document = storage.Document()
-    document.edited(FIRST)
+    document.apply_edit(FIRST)
     told = (Problem("info", "b", None, "x", "x is slow."),)
     document.found, document.source, document.sensors, document.absent_blocks = (
         told,
@@ -162,7 +162,7 @@ def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
         else:
             made = session.Doctor()
             made.found = findings  # type: ignore[assignment]
-        assert (made.looking, made.looked_s, tuple(made.findings), made.revision) == (False, None, (), 0)
+        assert (made.is_running, made.finished_s, tuple(made.findings), made.revision) == (False, None, (), 0)
         made.start()
         made.close()
         return made
@@ -173,8 +173,8 @@ def look(is_real: bool) -> Callable[[list[Finding]], Doctor]:
 def test_doctor_keeps_its_findings(look: Callable[[object], Doctor]) -> None:
     fine = Finding("master", "ok", "A master runs.")
     doctor = look([fine])
-    assert (tuple(doctor.findings), doctor.looking) == ((fine,), False)
-    assert doctor.looked_s is not None
+    assert (tuple(doctor.findings), doctor.is_running) == ((fine,), False)
+    assert doctor.finished_s is not None
     seen = doctor.revision
     assert seen > 0
     doctor.start()

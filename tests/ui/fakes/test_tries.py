@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.blocks.compiler.stack import Stack
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.robots.turtle import ROBOT
 from tests.blocks.samples import block, number
 from tests.core.waiting import tick_until
@@ -13,7 +13,7 @@ from tests.ui import fakes
 
 TURN = Stack("toolbox", "stack", block("robot_diffdrive_do_turn", ROBOT="Rover", ANGLE=number(20)))
 LIGHT = Stack("toolbox", "stack", block("robot_diffdrive_do_light", ROBOT="Rover"))
-ROVER = parse(td_for(ROBOT.thing_model, "Rover"))
+ROVER = parse(thing_description(ROBOT.thing_model, "Rover"))
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def ends(session: fakes.Session) -> None:
     assert session.runner is not None
     session.runner.ends()
     tick_until(session, lambda: session.runs.view().state == "unanswered")
-    session.runs.confirm_still()  # the robot of the test does not answer a stop
+    session.runs.confirm_stopped()  # the robot of the test does not answer a stop
 
 
 def test_real_robot_asks_once_for_permission_and_then_runs_the_tried_block(session: fakes.Session) -> None:

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Action, DataField
 from app.ui.panels.robots.action_card import ActionCard
-from app.ui.panels.robots.tries import field_words, progress_of
+from app.ui.panels.robots.tries import fields_text, progress_of
 from app.ui.theme.theme import Theme
 from tests.ui.sample_data import Invocation
 
@@ -107,7 +107,7 @@ def test_feedback_as_a_fraction_of_the_input_is_a_progress_bar(card, feedback, s
 def test_feedback_in_per_cent_is_a_progress_bar(field) -> None:
     action = Action("load", "load", "x", "X", (), "load", None, "/c", "/a", feedback=(field,))
     assert progress_of(action, {}, {field.name: 40}) == 0.4
-    assert field_words((DataField("open", "open", "boolean"),), {"open": True}) == "open yes"
+    assert fields_text((DataField("open", "open", "boolean"),), {"open": True}) == "open yes"
 
 
 def show(card: ActionCard, tries: Sequence[Invocation]) -> list[str]:
@@ -138,9 +138,9 @@ def test_last_tries_are_listed_and_restore_their_input_values(card) -> None:
 
 
 def test_ctrl_enter_tries_the_action(card, qtbot) -> None:
-    with qtbot.waitSignal(card.tried) as told:
+    with qtbot.waitSignal(card.try_requested) as told:
         QTest.keyClick(card, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     assert told.args == [{"distance": 0.5}]
     card.show_invocation(tried())
-    with qtbot.assertNotEmitted(card.tried):
+    with qtbot.assertNotEmitted(card.try_requested):
         QTest.keyClick(card, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)

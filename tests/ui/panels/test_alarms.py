@@ -15,17 +15,17 @@ from app.ui.panels.alarms.columns import csv_text
 from app.ui.panels.alarms.panel import AlarmsPanel
 from app.ui.panels.alarms.phrases import (
     PhrasePart,
+    initial_text,
+    parse_limit,
+    parse_time,
     parts_of,
-    read_limit,
-    read_time,
-    taken,
-    typed_now,
     with_kind,
+    with_slot_text,
 )
 from app.ui.panels.nodes import panel as nodes
 from app.ui.panels.topics import panel as topics
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
-from nep.programs.alarms.history import AlarmDeed, AlarmRecord
+from nep.programs.alarms.history import ActionResult, AlarmRecord
 from nep.programs.alarms.rule import KINDS, problem_of
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, has_keys, press, ticks
@@ -84,10 +84,10 @@ def type_in(panel: AlarmsPanel, text: str, key: Qt.Key = Qt.Key.Key_Return) -> N
 
 def test_empty_panel_explains_how_to_create_an_alarm(panel, window) -> None:
     assert panel.pages.currentIndex() == 0
-    panel.begin()
+    panel.add_alarm()
     assert panel.pages.currentIndex() == 1
     assert panel.field is not None
-    assert "/robot/camera" in panel._existing(slot(panel, "subject").part, panel.rows[0])
+    assert "/robot/camera" in panel._completions_for(slot(panel, "subject").part, panel.rows[0])
     type_in(panel, "/robot/camera")
     assert panel.field is None
     assert said(panel) == "When /robot/camera is silent for 2 s , show a banner"
@@ -95,7 +95,7 @@ def test_empty_panel_explains_how_to_create_an_alarm(panel, window) -> None:
 
 
 def test_words_of_an_alarm_sentence_are_chosen_by_keyboard(panel) -> None:
-    panel.alarms.put(BELOW)
+    panel.alarms.set_rule(BELOW)
     panel.refresh()
     press(slot(panel, "kind"))
     choose("A value is above a limit a limit")
@@ -116,18 +116,20 @@ def test_words_of_an_alarm_sentence_are_chosen_by_keyboard(panel) -> None:
 
 
 def test_values_of_a_topic_are_suggested(panel, window) -> None:
-    panel.alarms.put(replace(BELOW, condition=replace(BELOW.condition, path="")))
+    panel.alarms.set_rule(replace(BELOW, condition=replace(BELOW.condition, path="")))
     panel.refresh()
     press(slot(panel, "value"))
     window.session.send("/blackboard", {"pose": {"x": 1.0, "y": [2]}})
     ticks(window, panel, 1)
     window.session.send("/blackboard", {"pose": {"x": 1.0, "y": [2]}})
-    panel.field.offer(panel._existing(slot(panel, "value").part, panel.rows[0]))
+    panel.field.set_completions(panel._completions_for(slot(panel, "value").part, panel.rows[0]))
     assert panel.field.completer().model().stringList() == ["pose.x", "pose.y[0]"]
 
 
 def test_every_control_in_a_row_has_an_accessible_name(panel) -> None:
-    panel.alarms.put(replace(BELOW, actions=(AlarmAction("call", payload={"n": 1}), AlarmAction("stop"))))
+    panel.alarms.set_rule(
+        replace(BELOW, actions=(AlarmAction("call", payload={"n": 1}), AlarmAction("stop")))
+    )
     panel.refresh()
     assert unsaid(panel) == []
     assert slot(panel, "add").accessibleName() == "Add an action"
@@ -135,7 +137,7 @@ def test_every_control_in_a_row_has_an_accessible_name(panel) -> None:
 
 
 def test_suggestion_is_accepted_as_soon_as_it_is_chosen(panel, qtbot) -> None:
-    panel.begin()
+    panel.add_alarm()
     field = panel.field
     assert field is not None
     QTest.keyClicks(field, "odom")
@@ -150,7 +152,7 @@ def test_suggestion_is_accepted_as_soon_as_it_is_chosen(panel, qtbot) -> None:
 
 def test_banner_shows_the_value_that_triggered_the_alarm(panel, window) -> None:
     session = window.session
-    session.alarms.put(BELOW)
+    session.alarms.set_rule(BELOW)
     ticks(window, panel, 1)
     for battery in (12, 84):
         session.send("/blackboard", {"robots": {"Pepper": {"battery": battery}}})
@@ -161,7 +163,7 @@ def test_banner_shows_the_value_that_triggered_the_alarm(panel, window) -> None:
 
 
 def test_actions_are_added_renamed_and_removed(panel) -> None:
-    panel.alarms.put(BELOW)
+    panel.alarms.set_rule(BELOW)
     panel.refresh()
     press(slot(panel, "add"))
     choose("Call a service")
@@ -180,7 +182,7 @@ def test_actions_are_added_renamed_and_removed(panel) -> None:
 
 def test_active_alarm_is_shown_in_row_title_alerts_and_history(panel, window) -> None:
     session = window.session
-    session.alarms.put(BELOW)
+    session.alarms.set_rule(BELOW)
     ticks(window, panel, 2)
     assert panel.rows[0].chip.text == "waits for /blackboard"
     session.send("/blackboard", {"robots": {"Pepper": {"battery": 84}}})
@@ -197,17 +199,17 @@ def test_active_alarm_is_shown_in_row_title_alerts_and_history(panel, window) ->
     press(panel.rows[0].snooze)
     panel._show_states()
     assert "snoozed until" in panel.rows[0].chip.text
-    assert session.alerts.dismissed("alarm:d")
+    assert session.alerts.is_dismissed("alarm:d")
     press(panel.rows[0].snooze)
     panel._show_states()
     assert "snoozed" not in panel.rows[0].chip.text
 
 
 def test_alarm_is_disabled_deleted_and_restored(panel, window) -> None:
-    panel.alarms.put(BELOW)
+    panel.alarms.set_rule(BELOW)
     panel.refresh()
     press(panel.rows[0].switch)
-    assert not panel.alarms.rules[0].is_on
+    assert not panel.alarms.rules[0].is_enabled
     assert panel.alarms.alarms.evaluator.topics == frozenset()
     press(panel.rows[0].more)
     choose("Delete")
@@ -224,16 +226,16 @@ def test_alarm_is_disabled_deleted_and_restored(panel, window) -> None:
 
 
 def test_entering_a_limit_enables_the_alarm(panel) -> None:
-    panel.alarms.put(replace(BELOW, is_on=False))
+    panel.alarms.set_rule(replace(BELOW, is_enabled=False))
     panel.edit("d", "limit")
     type_in(panel, "15")
-    assert panel.alarms.rules[0].is_on
+    assert panel.alarms.rules[0].is_enabled
     assert panel.alarms.rules[0].condition.limit == 15
 
 
 def test_history_is_filtered_and_saved(panel, tmp_path) -> None:
     record = AlarmRecord("x", "=cmd|' /C calc'!A0", panel.now_s() - 60, 4.0, count=2)
-    record.add(AlarmDeed("call", "restart replied"))
+    record.add(ActionResult("call", "restart replied"))
     panel.alarms.history.add(record)
     panel.alarms.history.add(AlarmRecord("y", "/cam is silent", panel.now_s()))
     panel.refresh()
@@ -258,7 +260,7 @@ def test_every_alarm_kind_has_a_sentence_and_each_slot_accepts_what_it_shows(kin
     assert problem_of(rule) is None
     for part in parts_of(rule):
         if part.kind != "word" and part.role not in {"kind", "add"}:
-            assert taken(rule, part, typed_now(rule, part)) == rule, part
+            assert with_slot_text(rule, part, initial_text(rule, part)) == rule, part
 
 
 @pytest.mark.parametrize(
@@ -268,17 +270,17 @@ def test_every_alarm_kind_has_a_sentence_and_each_slot_accepts_what_it_shows(kin
      ("1.234,5 s", None), ("1 234 s", None)],
 )  # fmt: skip
 def test_durations_are_parsed_in_common_notations(text: str, seconds: float | None) -> None:
-    assert read_time(text) == seconds
+    assert parse_time(text) == seconds
 
 
 def test_limits_are_parsed_as_numbers_for_comparisons_and_otherwise_as_json() -> None:
     number, text = AlarmCondition("below"), AlarmCondition("equals")
-    assert read_limit(number, "20 %") == 20
-    assert read_limit(number, "0,4") == 0.4
+    assert parse_limit(number, "20 %") == 20
+    assert parse_limit(number, "0,4") == 0.4
     for wrong in ("", "x", "nan", "inf", "1.234,5", "1 234"):
         part = PhrasePart("limit", "")
-        assert taken(AlarmRule("r", number), part, wrong) is None
-    assert [read_limit(text, each) for each in ("true", "null", "idle", '"5"', "5", "{}", "")] == [
+        assert with_slot_text(AlarmRule("r", number), part, wrong) is None
+    assert [parse_limit(text, each) for each in ("true", "null", "idle", '"5"', "5", "{}", "")] == [
         True, None, "idle", "5", 5, "{}", "",
     ]  # fmt: skip
 

@@ -31,7 +31,7 @@ def test_each_alert_is_shown_with_its_next_step(panel, window) -> None:
 
 def test_alerts_are_sorted_by_severity_and_disappear_when_resolved(panel, window) -> None:
     alerts = window.session.alerts
-    alerts.put("silent:/cam", "warn", "The camera has been silent for 4 s.")
+    alerts.raise_alert("silent:/cam", "warn", "The camera has been silent for 4 s.")
     panel.refresh()
     assert [alert.severity for alert in panel.shown] == ["error", "warn"]
     assert not panel.rows[1].button.isVisibleTo(panel)

@@ -33,7 +33,7 @@ def topics(qtbot, window: MainWindow, commands: object) -> Dock:
     """The Topics panel of an open window."""
     window.show()
     dock = window.show_layout("developer").docks["topics"]
-    qtbot.waitUntil(dock.shown)
+    qtbot.waitUntil(dock.is_displayed)
     return dock
 
 
@@ -66,7 +66,7 @@ def test_repeated_panel_failure_is_logged_each_time(window: MainWindow, topics: 
     topics.panel.explode = True
     for _ in range(3):
         window.tick()
-        topics.try_again()
+        topics.retry()
     texts = [record.text for record in window.session.console.records]
     assert texts.count("ValueError: no such luck") == 3
 
@@ -155,7 +155,7 @@ def seen(qtbot, window: MainWindow, name: str = "bad") -> Dock:
     bench = window.show_layout("developer")
     dock = bench.open(name)
     assert dock is not None
-    qtbot.waitUntil(dock.shown)
+    qtbot.waitUntil(dock.is_displayed)
     window.tick()
     return dock
 
@@ -175,12 +175,12 @@ def test_panel_that_cannot_be_created_shows_the_error_until_a_retry_succeeds(
         window.tick()
     assert dock.failed
     assert told(window).count("RuntimeError: no such luck") == 1
-    dock.try_again()
+    dock.retry()
     window.tick()
     assert dock.failed
     assert told(window).count("RuntimeError: no such luck") == 2
     bad.clear()
-    dock.try_again()
+    dock.retry()
     window.tick()
     window.tick()
     assert not dock.failed
@@ -226,7 +226,7 @@ def test_panel_created_by_a_later_retry_restores_its_saved_state(
     again = with_bad(qtbot, theme, home)
     dock = seen(qtbot, again)
     bad.clear()
-    dock.try_again()
+    dock.retry()
     again.tick()
     assert isinstance(dock.panel, Bad)
     assert dock.panel.state == {"kept": "yes"}

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from app.core.documents.workspace_json import WorkspaceJson
 from app.core.reports.not_installed import ALERT
 from app.ui.panels.base import Panel
-from app.ui.panels.behaviour.carried_blocks import BESIDE, CarriedPicture, brought_words
+from app.ui.panels.behaviour.carried_blocks import POINTER_OFFSET, DragImage, transfer_text
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.theme.theme import Theme
@@ -76,7 +76,7 @@ def panel(qtbot, window) -> BehaviourPanel:
     made = window.make(PANEL, (1032, 600))
     qtbot.addWidget(made)
     assert isinstance(made, BehaviourPanel)
-    qtbot.addWidget(made.replaces_title())
+    qtbot.addWidget(made.title_widget())
     return made
 
 
@@ -136,7 +136,7 @@ def test_warning_stays_on_its_block_until_the_blocks_change(panel, window) -> No
     session.take_over()
     panel.refresh()
     assert editor(panel).last("set_warnings") == {"b2": said}, "it stays"
-    session.document.edited({"blocks": {"blocks": [{"type": "x", "id": "b2"}]}})
+    session.document.apply_edit({"blocks": {"blocks": [{"type": "x", "id": "b2"}]}})
     session.tick()
     panel.refresh()
     assert editor(panel).last("set_warnings") == {}
@@ -210,12 +210,12 @@ def test_robot_that_connects_while_its_sensors_are_shown_is_watched(panel, windo
 
 def test_python_view_shows_the_newest_program_and_copies_it(panel, window) -> None:
     editor(panel).late = {"blocks": {"blocks": [{"type": "late"}]}}
-    panel.replaces_title().show()
-    press(button(panel.replaces_title(), "Python"))
+    panel.title_widget().show()
+    press(button(panel.title_widget(), "Python"))
     assert window.session.document.workspace == editor(panel).late  # the last 150 ms are not missing
     assert panel.program.toPlainText() == PROGRAM
     assert panel.program.isReadOnly()
-    press(button(panel.replaces_title(), "Copy the program"))
+    press(button(panel.title_widget(), "Copy the program"))
     assert QGuiApplication.clipboard().text() == PROGRAM
     assert window.toasts == ["Copied the program"]
     window.session.document.source, window.session.document.edits = "pass\n", 99
@@ -224,7 +224,7 @@ def test_python_view_shows_the_newest_program_and_copies_it(panel, window) -> No
 
 
 def test_undo_and_redo_are_enabled_when_available(panel, window) -> None:
-    title = panel.replaces_title()
+    title = panel.title_widget()
     title.show()
     undo, redo = button(title, "Undo"), button(title, "Redo")
     assert not undo.isEnabled()
@@ -258,7 +258,7 @@ def test_empty_canvas_shows_the_first_step_and_its_buttons_run_commands(qtbot, q
     panel = window.make(PANEL, (1032, 600))
     qtbot.addWidget(panel)
     assert isinstance(panel, BehaviourPanel)
-    qtbot.addWidget(panel.replaces_title())
+    qtbot.addWidget(panel.title_widget())
     assert editor(panel).told[-1] == ("set_first_step", "when started", False)
     editor(panel).wanted.emit("robot")
     editor(panel).wanted.emit("examples")
@@ -296,10 +296,10 @@ def test_python_program_has_syntax_highlighting(qtbot, qapp) -> None:
     view = ProgramView(Theme("light"))
     qtbot.addWidget(view)
     view.show_program(PROGRAM)
-    block = view.document().findBlockByNumber(view.line_with("# Say hello") - 1)
+    block = view.document().findBlockByNumber(view.line_containing("# Say hello") - 1)
     colours = [one.format.foreground().color().name() for one in block.layout().formats()]
     assert colours == [Theme("light").colour("textTertiary").name()]  # nothing inside a comment
-    block = view.document().findBlockByNumber(view.line_with("for _ in range(3)") - 1)
+    block = view.document().findBlockByNumber(view.line_containing("for _ in range(3)") - 1)
     assert len(block.layout().formats()) == 3  # for, in, 3
 
 
@@ -310,7 +310,7 @@ def test_toolbox_pinned_setting_is_saved(qtbot, panel, window) -> None:
     again = window.make(PANEL, (1032, 600))
     qtbot.addWidget(again)
     assert isinstance(again, BehaviourPanel)
-    qtbot.addWidget(again.replaces_title())
+    qtbot.addWidget(again.title_widget())
     assert editor(again).last("set_toolbox_pinned") is False
 
 
@@ -336,11 +336,11 @@ def test_deleted_blocks_are_restored_from_the_toast(panel, window, count, words)
     ],
 )
 def test_toast_describes_the_result_of_dropping_blocks_on_a_tab(count: int, how: str, words: str) -> None:
-    assert brought_words(count, how, "Quiz") == words
+    assert transfer_text(count, how, "Quiz") == words
 
 
 def test_block_dropped_on_its_own_tab_or_outside_tabs_is_not_moved(panel, window) -> None:
-    title = panel.replaces_title()
+    title = panel.title_widget()
     title.resize(900, 34)
     title.show()
     tabs = title.tabs
@@ -356,7 +356,7 @@ def test_block_dropped_on_its_own_tab_or_outside_tabs_is_not_moved(panel, window
 def test_dragging_a_block_to_the_end_of_the_tab_bar_scrolls_to_hidden_tabs(
     qtbot, panel, window, monkeypatch
 ) -> None:
-    title = panel.replaces_title()
+    title = panel.title_widget()
     title.show()
     asked: list[QPoint] = []
     place = title.tabs.mapToGlobal(QPoint(4, 4))
@@ -380,10 +380,10 @@ def test_dragging_a_block_to_the_end_of_the_tab_bar_scrolls_to_hidden_tabs(
 def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel, window) -> None:
     session = window.session
     home = session.document
-    home.edited(WorkspaceJson.of({"blocks": {"blocks": [{"type": "events_started"}]}}))
+    home.apply_edit(WorkspaceJson.from_blocks({"blocks": {"blocks": [{"type": "events_started"}]}}))
     other = session.documents.new()
     session.documents.show(home)
-    title = panel.replaces_title()
+    title = panel.title_widget()
     title.resize(900, 34)
     title.show()
     panel.refresh()
@@ -402,11 +402,11 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
     data.open(QIODevice.OpenModeFlag.WriteOnly)
     picture.save(data, "PNG")
     editor(panel).carried_seen.emit(bytes(data.data()), 2.0)
-    shown = title.window().findChild(CarriedPicture)
+    shown = title.window().findChild(DragImage)
     assert shown is not None
     assert shown.isVisible()
     assert (shown.width(), shown.height()) == (30, 20)
-    assert shown.pos() == title.window().mapFromGlobal(place) + BESIDE
+    assert shown.pos() == title.window().mapFromGlobal(place) + POINTER_OFFSET
     qtbot.waitUntil(lambda: window.commands == [f"tab:{other.key}"])
     editor(panel).block_carried.emit(None, home.key)
     assert not shown.isVisible()
@@ -417,9 +417,9 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
 def test_block_dropped_on_a_tab_opened_during_the_drag_goes_to_that_tab(panel, window) -> None:
     session = window.session
     home = session.document
-    home.edited(WorkspaceJson.of({"blocks": {"blocks": [{"type": "events_started"}]}}))
+    home.apply_edit(WorkspaceJson.from_blocks({"blocks": {"blocks": [{"type": "events_started"}]}}))
     other = session.documents.new()
-    title = panel.replaces_title()
+    title = panel.title_widget()
     title.resize(900, 34)
     title.show()
     panel.refresh()
@@ -434,7 +434,7 @@ def test_block_dropped_on_a_tab_opened_during_the_drag_goes_to_that_tab(panel, w
 
 
 def test_plus_button_is_highlighted_under_a_dragged_block_and_creates_a_behaviour(panel, window) -> None:
-    title = panel.replaces_title()
+    title = panel.title_widget()
     title.resize(900, 34)
     title.show()
     tabs = title.tabs
@@ -459,7 +459,7 @@ def test_missing_system_libraries_replace_the_blocks_by_a_message_and_python_sti
 
     panel = BehaviourPanel(window.context(), fail)
     qtbot.addWidget(panel)
-    qtbot.addWidget(panel.replaces_title())
+    qtbot.addWidget(panel.title_widget())
     for _ in range(10):
         panel.refresh()
     assert len(tries) == 1

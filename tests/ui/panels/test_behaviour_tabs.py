@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QToolTip
 
 from app.ui.panels.behaviour.tab import TabFacts
-from app.ui.panels.behaviour.tabs import NEW, BehaviourTabs
+from app.ui.panels.behaviour.tabs import NEW_TAB, BehaviourTabs
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 
@@ -42,7 +42,7 @@ def press(tab, place=None, button=Qt.MouseButton.LeftButton) -> None:
 
 
 def test_tab_shows_name_unsaved_state_and_running_state(tabs) -> None:
-    tabs.show_tabs([A, TabFacts("b", "Tour guide", dirty=True, runs=True)], "a")
+    tabs.show_tabs([A, TabFacts("b", "Tour guide", is_dirty=True, is_running=True)], "a")
     assert [tab.accessibleName() for tab in tabs.tabs.values()] == [
         "Greeting",
         "Tour guide, not saved, running",
@@ -51,7 +51,7 @@ def test_tab_shows_name_unsaved_state_and_running_state(tabs) -> None:
 
 
 def test_tab_is_selected_and_closed_by_mouse(tabs) -> None:
-    chosen, closed = heard(tabs.chosen), heard(tabs.closed)
+    chosen, closed = heard(tabs.selected), heard(tabs.close_requested)
     press(tabs.tabs["b"])
     press(tabs.tabs["c"], button=Qt.MouseButton.MiddleButton)
     press(tabs.tabs["b"], tabs.tabs["b"].close_rect().center().toPoint())
@@ -60,7 +60,7 @@ def test_tab_is_selected_and_closed_by_mouse(tabs) -> None:
 
 
 def test_press_on_close_button_released_outside_does_nothing(tabs) -> None:
-    closed, chosen = heard(tabs.closed), heard(tabs.chosen)
+    closed, chosen = heard(tabs.close_requested), heard(tabs.selected)
     tab = tabs.tabs["b"]
     QTest.mousePress(tab, Qt.MouseButton.LeftButton, pos=tab.close_rect().center().toPoint())
     QTest.mouseRelease(tab, Qt.MouseButton.LeftButton, pos=QPoint(5, 5))
@@ -79,7 +79,7 @@ def test_tab_dragged_past_the_middle_of_its_neighbour_swaps_places(tabs) -> None
 
 
 def test_tabs_are_navigated_and_closed_by_keyboard(tabs) -> None:
-    chosen, closed = heard(tabs.chosen), heard(tabs.closed)
+    chosen, closed = heard(tabs.selected), heard(tabs.close_requested)
     tab = tabs.tabs["a"]
     for key in (Qt.Key.Key_Right, Qt.Key.Key_Left, Qt.Key.Key_Return, Qt.Key.Key_Delete):
         QTest.keyClick(tab, key)
@@ -124,7 +124,7 @@ def test_hidden_tabs_are_listed_in_a_menu(tabs) -> None:
     assert not tabs.list.isHidden()
     assert tabs.add.geometry().right() < tabs.list.geometry().left() <= tabs.width()
     chosen = []
-    tabs.chosen.connect(chosen.append)
+    tabs.selected.connect(chosen.append)
     tabs.list.click()
     (menu,) = tabs.findChildren(Menu)
     assert [entry.text() for entry in menu.actions()] == [each.name for each in many]
@@ -165,7 +165,7 @@ def test_nothing_is_clipped_at_200_per_cent_text_size(tabs, theme) -> None:
 
 @pytest.mark.qt_log_ignore("does not support", extend=True)
 def test_tab_menu_lists_the_available_commands(qtbot, tabs) -> None:
-    asked = heard(tabs.asked)
+    asked = heard(tabs.command_requested)
     place = tabs.tabs["b"].geometry().center()
     QApplication.sendEvent(
         tabs, QContextMenuEvent(QContextMenuEvent.Reason.Mouse, place, tabs.mapToGlobal(place))
@@ -254,7 +254,7 @@ def test_folder_suffix_of_a_tab_is_not_editable(tabs) -> None:
 def test_drop_target_at_a_position_is_a_tab_or_plus_button_or_none(qtbot, tabs) -> None:
     tab = tabs.tabs["b"]
     assert tabs.target_at(tab.mapToGlobal(tab.rect().center())) == "b"
-    assert tabs.target_at(tabs.add.mapToGlobal(tabs.add.rect().center())) == NEW
+    assert tabs.target_at(tabs.add.mapToGlobal(tabs.add.rect().center())) == NEW_TAB
     assert tabs.target_at(tab.mapToGlobal(QPoint(10, 90))) == ""
     beyond = tabs.mapToGlobal(QPoint(tabs.width() - 2, 10))
     assert tabs.target_at(beyond) == ""
@@ -266,7 +266,7 @@ def test_scrolled_out_tab_is_no_drop_target(qtbot, tabs) -> None:
     tabs.resize(150, 30)
     tabs.show_tabs([A, B, C], "a")
     hidden = tabs.tabs["c"]
-    assert tabs.target_at(hidden.mapToGlobal(hidden.rect().center())) in {"", NEW}
+    assert tabs.target_at(hidden.mapToGlobal(hidden.rect().center())) in {"", NEW_TAB}
 
 
 def test_dragging_near_an_end_of_the_tab_bar_scrolls_to_hidden_tabs(qtbot, tabs) -> None:
@@ -289,13 +289,13 @@ def test_dragging_near_an_end_of_the_tab_bar_scrolls_to_hidden_tabs(qtbot, tabs)
 
 def test_only_one_drop_target_is_highlighted(tabs) -> None:
     def ringed() -> list[bool]:
-        return [tabs.tabs["a"].is_aimed, tabs.tabs["b"].is_aimed, tabs.add.is_aimed]
+        return [tabs.tabs["a"].is_drop_target, tabs.tabs["b"].is_drop_target, tabs.add.is_drop_target]
 
     tab = tabs.tabs["b"]
     before = tab.grab().toImage()
-    for key, expected in (("b", [False, True, False]), (NEW, [False, False, True])):
-        tabs.aim(key)
+    for key, expected in (("b", [False, True, False]), (NEW_TAB, [False, False, True])):
+        tabs.highlight_target(key)
         assert ringed() == expected
         assert (tab.grab().toImage() == before) == (key != "b")
-    tabs.aim("")
+    tabs.highlight_target("")
     assert ringed() == [False, False, False]

@@ -8,7 +8,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QSignalSpy
 
 from app.core.console import Console
-from app.ui.panels.console.list import MESSAGE, LineDelegate, first_line, tip_of
+from app.ui.panels.console.list import MIN_TEXT_CHARS, LineDelegate, first_line, tip_of
 from app.ui.panels.console.panel import PANEL, ConsolePanel
 from app.ui.widgets import paint
 from nep.messages.message import Message
@@ -144,7 +144,7 @@ def test_large_text_leaves_room_for_the_message(panel, window, percent: int, wid
     assert {"icon", "origin"} <= shown.keys()
     letter = paint.width_of(panel.text_font(), "n")
     if len(shown) > 2:  # nothing more could go
-        assert width - sum(shown.values()) >= MESSAGE * letter
+        assert width - sum(shown.values()) >= MIN_TEXT_CHARS * letter
     if percent == 100 or width == 1200:
         assert {"time", "level"} <= shown.keys()
 
@@ -172,7 +172,7 @@ def test_lines_are_filtered_by_node_and_text(qtbot, panel, window) -> None:
     qtbot.keyClicks(panel.words, " nowhere")
     assert lines(panel) == []
     assert panel.empty.isVisible()
-    panel.show_all()
+    panel.clear_filters()
     assert len(lines(panel)) == 8
     panel.focus_filter()
     qtbot.keyClicks(panel.words, "x")

@@ -20,8 +20,8 @@ from app.robots.description.inputs import Parameter, parameter_of
 from app.robots.description.model import Action
 from app.ui.panels.robots.controls.angle import AngleDial
 from app.ui.panels.robots.controls.colour import ColourChoice, ColourSwatches, HueStrip
-from app.ui.panels.robots.controls.picture import NoPictures, PictureChoice
-from app.ui.panels.robots.controls.picture_file import MAX_FILE_BYTES, encoded, read_picture
+from app.ui.panels.robots.controls.picture import EmptyImageSource, PictureChoice
+from app.ui.panels.robots.controls.picture_file import MAX_FILE_BYTES, encode_image, read_picture
 from app.ui.panels.robots.form import ActionForm
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SliderWithUnit
@@ -343,8 +343,8 @@ def test_decompression_bomb_is_rejected_as_file_and_as_url(qtbot, theme, tmp_pat
 def test_image_button_opens_the_file_dialog_in_the_last_folder(theme, qtbot, tmp_path) -> None:
     folders: list[str] = []
 
-    class Asked(NoPictures):
-        def ask_file(self, folder, take) -> None:
+    class Asked(EmptyImageSource):
+        def prompt_file(self, folder, take) -> None:
             folders.append(folder)
             take(tmp_path / "no.png")
 
@@ -387,7 +387,7 @@ def test_photo_is_rotated_by_its_exif_orientation(qapp, tmp_path, kind, orientat
 def test_cameras_are_offered_in_a_menu(qtbot, theme, monkeypatch) -> None:
     dropped: list[Menu] = []
     monkeypatch.setattr(
-        "app.ui.panels.robots.controls.picture.drop_below", lambda menu, _below: dropped.append(menu)
+        "app.ui.panels.robots.controls.picture.open_below", lambda menu, _below: dropped.append(menu)
     )
     form = form_of(qtbot, theme, Parameter("p", "picture", "image"), pictures=Cameras())
     choice = child(form, PictureChoice)
@@ -424,11 +424,11 @@ def test_url_is_sent_unchanged_and_bare_base64_where_the_robot_expects_it(qtbot,
     assert form.input() == {"p": "http://robot/cat.png"}
     schema = {"type": "string", "contentEncoding": "base64", "contentMediaType": "image/jpeg"}
     bare = parameter_of("p", schema)
-    assert (bare.kind, bare.bare) == ("image", True)
+    assert (bare.kind, bare.is_bare_base64) == ("image", True)
     image = QImage(str(drawn(tmp_path / "red.png", 32, 24)))
-    assert QImage.fromData(base64.b64decode(encoded(image, bare=True))).width() == 32
+    assert QImage.fromData(base64.b64decode(encode_image(image, bare=True))).width() == 32
     linked = parameter_of("p", {"type": "string", "format": "uri-reference", "rb:widget": "image"})
-    assert (linked.kind, linked.bare) == ("image", False)
+    assert (linked.kind, linked.is_bare_base64) == ("image", False)
 
 
 # ---- lists and objects -----------------------------------------------------------------------------

@@ -9,9 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 
 from app.core.network.master import MasterState
-from app.core.reports.not_installed import MissingLibraries, tell_missing
+from app.core.reports.not_installed import MissingLibraries, alert_missing
 from app.ui.panels import console
-from app.ui.panels.base import Hindrance, PanelWidget, paused_hindrance
+from app.ui.panels.base import Blocker, PanelWidget, paused_blocker
 from app.ui.panels.doctor import PANEL, DoctorPanel
 from app.ui.panels.inspector.panel import PANEL as INSPECTOR
 from app.ui.widgets import Button
@@ -59,13 +59,13 @@ def test_findings_are_shown_as_they_are_found(qtbot, window) -> None:
     def look() -> None:
         """As the other thread: two steps, and a refresh of the panel after each."""
         doctor.looked += 1
-        doctor.looking = True
+        doctor.is_running = True
         for done, found in enumerate(((FINE,), (FULL, FINE))):
             doctor._report(found, done + 1, 4)
             panel.refresh()
             told.append(([each.id for each in panel.shown], panel.looked.text(), panel.chip.accessibleName()))
         doctor._run()
-        doctor.looking = False
+        doctor.is_running = False
 
     panel = PANEL.make(window.context())
     qtbot.addWidget(panel)
@@ -153,11 +153,11 @@ def test_report_is_copied_as_text(panel, window) -> None:
 
 
 def test_button_is_disabled_and_last_findings_are_kept_during_a_check(panel, window) -> None:
-    window.session.doctor.looking = True
+    window.session.doctor.is_running = True
     panel.refresh()
     assert not panel.again.isEnabled()
     assert len(panel.rows) == len(FOUND)
-    window.session.doctor.looking = False
+    window.session.doctor.is_running = False
     panel.refresh()
     assert panel.again.isEnabled()
 
@@ -182,8 +182,8 @@ class Asker(PanelWidget):
     def show_topic(self, name: str) -> None:
         self.asked.append(name)
 
-    def hindrances(self) -> list[Hindrance]:
-        return [paused_hindrance(self.title(), self.go_on)] if self.paused else []
+    def blockers(self) -> list[Blocker]:
+        return [paused_blocker(self.title(), self.go_on)] if self.paused else []
 
     def go_on(self) -> None:
         self.paused = False
@@ -204,23 +204,23 @@ def test_suggested_topic_name_is_applied_to_the_panel_that_opened_the_doctor(
     qtbot, panel, window, asker
 ) -> None:
     window.session.doctor.found = (NEAR,)
-    window.session.doctor.miss("/robot/deph")
+    window.session.doctor.expect_topic("/robot/deph")
     asker.paused = False
-    panel.begin_for(asker)
+    panel.check_panel(asker)
     assert panel.missed.value == "/robot/deph"
     assert panel.terminal.text() == "In a terminal: nep doctor /robot/deph"
     assert names(panel) == ["Use /robot/depth"]
     window.session.doctor.found = (Finding("topic", "ok", "Messages of /robot/depth come here."),)
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
     panel.refresh()
-    assert (asker.asked, window.session.doctor.missed) == (["/robot/depth"], "/robot/depth")
+    assert (asker.asked, window.session.doctor.expected_topic) == (["/robot/depth"], "/robot/depth")
     assert window.toasts == ["Opened /robot/depth. Checking again"]
     assert panel.chip.accessibleName() == "no problems"
 
 
 def test_without_an_originating_panel_the_topic_opens_in_a_matching_panel(qtbot, panel, window) -> None:
     window.session.doctor.found = (NEAR,)
-    window.session.doctor.miss("/robot/deph")
+    window.session.doctor.expect_topic("/robot/deph")
     panel.refresh()
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
     assert window.opened == ["/robot/depth"]
@@ -228,8 +228,8 @@ def test_without_an_originating_panel_the_topic_opens_in_a_matching_panel(qtbot,
 
 def test_paused_panel_is_the_first_finding_and_is_resumed(qtbot, panel, window, asker) -> None:
     window.session.doctor.found = (NEAR,)
-    window.session.doctor.miss("/robot/deph")
-    panel.begin_for(asker)
+    window.session.doctor.expect_topic("/robot/deph")
+    panel.check_panel(asker)
     assert panel.rows[0].accessibleName().startswith("error: Depth is paused")
     assert names(panel) == ["Resume", "Use /robot/depth"]
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
@@ -241,7 +241,7 @@ def test_paused_panel_is_the_first_finding_and_is_resumed(qtbot, panel, window, 
 
 def test_closed_panel_is_not_queried(qtbot, panel, window) -> None:
     asker = Asker(window.context())
-    panel.begin_for(asker)
+    panel.check_panel(asker)
     assert "paused" in panel.rows[0].accessibleName()
     shiboken6.delete(asker)
     panel.refresh()
@@ -253,14 +253,14 @@ def test_open_recording_is_reported_as_hiding_the_live_topic(qtbot, panel, windo
     try:
         panel.refresh()
         assert "recording" not in panel.rows[0].accessibleName()  # nobody misses a topic
-        window.session.doctor.miss("/robot/camera")
+        window.session.doctor.expect_topic("/robot/camera")
         panel.refresh()
         said = panel.rows[0].accessibleName()
         assert said.startswith("error: A recording is open and /robot/camera is not in it.")
         qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
         assert window.commands == ["replay.live"]
     finally:
-        window.session.back_to_live()
+        window.session.return_to_live()
     panel.refresh()
     assert "recording" not in panel.rows[0].accessibleName()
 
@@ -285,7 +285,7 @@ def test_open_recording_is_reported_as_hiding_the_live_topic(qtbot, panel, windo
 )
 def test_each_finding_has_one_button(qtbot, panel, window, finding, button, command) -> None:
     window.session.doctor.found = (finding,)
-    window.session.doctor.miss("/x")
+    window.session.doctor.expect_topic("/x")
     panel.refresh()
     assert names(panel) == [button]
     qtbot.mouseClick(panel.rows[0].button, Qt.MouseButton.LeftButton)
@@ -293,10 +293,10 @@ def test_each_finding_has_one_button(qtbot, panel, window, finding, button, comm
 
 
 def test_missing_topic_is_entered_by_the_user(panel, window, asker) -> None:
-    panel.begin_for(asker)
+    panel.check_panel(asker)
     panel.missed.set_value("/odom")
     panel.missed.activated.emit(panel.missed.currentIndex())
-    assert window.session.doctor.missed == "/odom"
+    assert window.session.doctor.expected_topic == "/odom"
     assert "paused" not in panel.rows[0].accessibleName()
     panel.copy.click()
     assert QGuiApplication.clipboard().text().startswith("Missing: /odom\n")
@@ -305,7 +305,7 @@ def test_missing_topic_is_entered_by_the_user(panel, window, asker) -> None:
 def test_topic_of_an_unresponsive_network_is_reported(panel, window) -> None:
     network = window.session.networks.get("ros2")
     network.state, network.sentence = "lost", "no daemon answers"
-    window.session.doctor.miss("ros2 /camera")
+    window.session.doctor.expect_topic("ros2 /camera")
     panel.refresh()
     assert panel.rows[0].accessibleName().startswith("error: ROS 2: no daemon answers.")
     assert names(panel)[0] == "Other networks"
@@ -331,10 +331,10 @@ def test_panels_report_that_they_are_paused(qtbot, window) -> None:
     for name in ("inspector", "image", "plot"):
         made = window.make(importlib.import_module(f"app.ui.panels.{name}").PANEL)
         qtbot.addWidget(made)
-        assert list(made.hindrances()) == []
+        assert list(made.blockers()) == []
         made.freeze.setChecked(True)
-        (hindrance,) = made.hindrances()
-        assert "paused" in hindrance.sentence
+        (hindrance,) = made.blockers()
+        assert "paused" in hindrance.message
         hindrance.run()
         assert not made.freeze.isChecked()
         made.dispose()
@@ -343,10 +343,10 @@ def test_panels_report_that_they_are_paused(qtbot, window) -> None:
 def test_console_reports_its_filters(qtbot, window) -> None:
     made = window.make(console.PANEL)
     qtbot.addWidget(made)
-    assert list(made.hindrances()) == []
+    assert list(made.blockers()) == []
     made.set_level("error")
-    (hindrance,) = made.hindrances()
-    assert hindrance.sentence == "Console only shows entries with “Errors only”."
+    (hindrance,) = made.blockers()
+    assert hindrance.message == "Console only shows entries with “Errors only”."
     hindrance.run()
     assert made.level == "all"
 
@@ -374,7 +374,7 @@ def test_doctor_shows_that_it_is_checking_before_the_first_result(qtbot, qapp) -
 
 
 def test_missing_system_libraries_of_the_block_editor_are_a_finding(panel, window) -> None:
-    tell_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
+    alert_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
     panel.refresh()
     (found,) = [each for each in panel.shown if "libnss3.so" in each.sentence]
     assert found.severity == "error"

@@ -10,8 +10,16 @@ import pytest
 from app import resources
 from app.core.documents.file_format import read_file
 from app.ui.panels.base import Panel
-from app.ui.panels.first_steps.panel import HINT_AFTER_S, KEPT, FirstStepsPanel
-from app.ui.panels.first_steps.steps import SAY, STEPS, TURN, Built, Now, built_in, shown_by
+from app.ui.panels.first_steps.panel import HINT_AFTER_S, PROGRESS_SETTING, FirstStepsPanel
+from app.ui.panels.first_steps.steps import (
+    SAY,
+    STEPS,
+    TURN,
+    TutorialBlocks,
+    TutorialState,
+    completed_steps,
+    find_tutorial_blocks,
+)
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, has_keys, press
 from tests.ui.sample_data import pepper
@@ -34,35 +42,37 @@ SAYS, TURNS = "robot_pepper_do_say", "robot_pepper_do_turn"
 
 
 def test_blocks_nested_below_when_started_count_and_loose_blocks_do_not() -> None:
-    assert built_in({}) == Built()
-    assert built_in(page(block("events_started"))) == Built(started=True)
+    assert find_tutorial_blocks({}) == TutorialBlocks()
+    assert find_tutorial_blocks(page(block("events_started"))) == TutorialBlocks(started=True)
     inside = block("events_started", block("control_repeat", block(TURNS), BODY=block(SAYS)))
-    assert built_in(page(inside)) == Built(True, frozenset({SAYS}), True)
+    assert find_tutorial_blocks(page(inside)) == TutorialBlocks(True, frozenset({SAYS}), True)
     loose = page(block("events_started"), block(SAYS))
-    assert built_in(loose) == Built(True, loose=frozenset({SAY})), "it stands on the page, and does not run"
-
-
-def test_malformed_files_complete_no_steps() -> None:
-    assert built_in({"blocks": 3}) == Built()
-    assert built_in({"blocks": {"blocks": [3, {"type": "events_started", "next": 3, "inputs": 4}]}}) == Built(
-        True
+    assert find_tutorial_blocks(loose) == TutorialBlocks(True, detached_suffixes=frozenset({SAY})), (
+        "it stands on the page, and does not run"
     )
 
 
+def test_malformed_files_complete_no_steps() -> None:
+    assert find_tutorial_blocks({"blocks": 3}) == TutorialBlocks()
+    assert find_tutorial_blocks(
+        {"blocks": {"blocks": [3, {"type": "events_started", "next": 3, "inputs": 4}]}}
+    ) == TutorialBlocks(True)
+
+
 def test_each_step_is_completed_by_its_evidence_and_stays_completed() -> None:
-    now, done = Now(), frozenset[str]()
+    now, done = TutorialState(), frozenset[str]()
     for change, step in (
         ({"can_speak": True}, "robot"),
-        ({"built": Built(started=True)}, "start"),
-        ({"built": Built(True, frozenset({"a"}))}, "say"),
+        ({"built": TutorialBlocks(started=True)}, "start"),
+        ({"built": TutorialBlocks(True, frozenset({"a"}))}, "say"),
         ({"ran": ("a",)}, "run"),
-        ({"built": Built(True, frozenset({"a"}), True), "ran": ()}, "turn"),
+        ({"built": TutorialBlocks(True, frozenset({"a"}), True), "ran": ()}, "turn"),
         ({"stopped": True}, "stop"),
     ):
         now = replace(now, **change)
-        done, before = shown_by(now, done), done
+        done, before = completed_steps(now, done), done
         assert done - before == {step}
-    assert shown_by(Now(), done) == done == {step.id for step in STEPS}
+    assert completed_steps(TutorialState(), done) == done == {step.id for step in STEPS}
 
 
 def test_blocks_of_an_example_complete_no_step(panel, window) -> None:
@@ -77,12 +87,12 @@ def test_blocks_of_an_example_complete_no_step(panel, window) -> None:
 
 def test_stopping_other_blocks_does_not_complete_the_last_step() -> None:
     done = {"robot", "start", "say", "run", "turn"}
-    assert shown_by(Now(True, Built(), stopped=True), done) == done
+    assert completed_steps(TutorialState(True, TutorialBlocks(), was_stopped=True), done) == done
 
 
 def test_stop_before_any_run_completes_no_step() -> None:
-    built = Built(True, frozenset({"a"}), True)
-    assert "stop" not in shown_by(Now(True, built, stopped=True), ())
+    built = TutorialBlocks(True, frozenset({"a"}), True)
+    assert "stop" not in completed_steps(TutorialState(True, built, was_stopped=True), ())
 
 
 def test_block_types_of_the_steps_match_the_shipped_robot() -> None:
@@ -124,7 +134,7 @@ def names(panel: FirstStepsPanel) -> list[str]:
 
 
 def build(panel: FirstStepsPanel, *tops: dict) -> None:
-    panel.session.document.edited(page(*tops))
+    panel.session.document.apply_edit(page(*tops))
     panel.refresh()
 
 
@@ -176,14 +186,14 @@ def test_loose_block_gets_a_hint_where_to_attach_it(panel, window) -> None:
 def test_completed_steps_are_restored_after_restart(panel, window, qtbot) -> None:
     window.session.join(pepper())
     build(panel, block("events_started"))
-    assert window.session.settings.get(KEPT, []) == ["robot", "start"]
+    assert window.session.settings.get(PROGRESS_SETTING, []) == ["robot", "start"]
     again = window.make(Panel("first_steps", "", "", (), FirstStepsPanel))
     qtbot.addWidget(again)
     for widget in again.header_widgets():
         qtbot.addWidget(widget)
     assert isinstance(again, FirstStepsPanel)
     assert again.done == {"robot", "start"}
-    window.session.settings.set(KEPT, "nonsense")
+    window.session.settings.set(PROGRESS_SETTING, "nonsense")
     assert FirstStepsPanel(window.context()).done == frozenset()
 
 

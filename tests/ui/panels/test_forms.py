@@ -12,7 +12,7 @@ from app.robots.description.model import Action
 from app.ui.panels.robots.controls.chooser import control_for
 from app.ui.panels.robots.controls.colour import ColourSwatches
 from app.ui.panels.robots.form import ActionForm
-from app.ui.panels.robots.input_text import input_words
+from app.ui.panels.robots.input_text import input_summary
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox, Segments, SliderWithUnit, Switch
 from nep.i18n import _, translate
@@ -174,4 +174,4 @@ def test_problems_are_matched_to_rows_in_every_language(qtbot, theme, pseudo) ->
 
 def test_duration_is_formatted_briefly_in_every_language(pseudo) -> None:
     waits = action(Parameter("s", translate("robot", "seconds"), "number", unit="s"))
-    assert input_words(waits, {"s": 2.0}) == _("for {duration}").format(duration="2 s")
+    assert input_summary(waits, {"s": 2.0}) == _("for {duration}").format(duration="2 s")

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QApplication, QMenu, QWidget
 from app.core.graph.activity import QUIET_S
 from app.core.graph.layout import GraphLayout, LayoutSizes
 from app.core.graph.node_graph import NodeGraph
-from app.core.graph.walk import GraphChoice
+from app.core.graph.walk import GraphSelection
 from app.core.network.master import MasterState
 from app.ui.panels.graph.panel import DOT, PANEL, SVG, GraphPanel
 from app.ui.panels.graph.scene import GraphScene
@@ -134,7 +134,7 @@ def names(panel: GraphPanel) -> set[str]:
 def at(panel: GraphPanel, place: QPointF) -> QPoint:
     """Where a place of the drawing is on the canvas."""
     canvas = panel.canvas
-    return ((place - canvas.visible().topLeft()) * canvas.scale).toPoint()
+    return ((place - canvas.visible_rect().topLeft()) * canvas.scale).toPoint()
 
 
 def middle(panel: GraphPanel, name: str) -> QPoint:
@@ -148,7 +148,7 @@ def click(widget: QWidget, place: QPoint) -> None:
 
 def words_at(panel: GraphPanel) -> set[str]:
     assert panel.canvas.scene is not None
-    return {item.figures.words for item in panel.canvas.scene.lines}
+    return {item.stats.label for item in panel.canvas.scene.lines}
 
 
 def test_graph_shows_nodes_edges_and_figures(panel: GraphPanel) -> None:
@@ -168,8 +168,8 @@ def test_graph_shows_nodes_edges_and_figures(panel: GraphPanel) -> None:
 
 def test_only_changed_items_are_repainted(panel: GraphPanel, window: Window, qtbot) -> None:
     def renewed() -> int:
-        panel.canvas.renew_soon()
-        return panel.canvas.renew(panel._figures_of)
+        panel.canvas.schedule_update()
+        return panel.canvas.update_stats(panel._stats_of)
 
     qtbot.wait(1)
     painted = panel.canvas.painted
@@ -207,11 +207,11 @@ def test_click_on_an_edge_shows_its_topic_and_inspect_opens_it(panel: GraphPanel
     item = next(each for each in scene.lines if each.line.topics == ("/blackboard",))
     assert item.label is not None
     click(panel.canvas, at(panel, item.label.center()))
-    assert panel.canvas.choice == GraphChoice("topic", "/blackboard", key_of(panel, "blackboard"))
+    assert panel.canvas.choice == GraphSelection("topic", "/blackboard", key_of(panel, "blackboard"))
     content = panel.card.content
     assert content is not None
     assert (content.title, content.kind) == ("/blackboard", "json")
-    assert [figure.value for figure in content.figures] == ["10.0 /s", "5.0 kB/s", "2.0 %", ""]
+    assert [figure.value for figure in content.stats] == ["10.0 /s", "5.0 kB/s", "2.0 %", ""]
     assert [[row[1:] for row in table.rows] for table in content.tables] == [
         [("blackboard", ("10.0", "100"))],
         [("greeting", ("100", "2")), ("studio", ("100", "2"))],
@@ -234,7 +234,7 @@ def test_double_click_on_an_edge_opens_its_topic(panel: GraphPanel, window: Wind
     scene = panel.canvas.scene
     assert scene is not None
     item = next(each for each in scene.lines if each.line.topics == ("/touch",))
-    points = next(iter(item.ways.values()))
+    points = next(iter(item.routes.values()))
     half = QPointF((points[0][0] + points[1][0]) / 2, (points[0][1] + points[1][1]) / 2)
     QTest.mouseDClick(panel.canvas, Qt.MouseButton.LeftButton, pos=at(panel, half))
     assert window.opened == ["/touch"]
@@ -254,17 +254,17 @@ def test_node_card_links_to_its_topics(panel: GraphPanel, window: Window) -> Non
     press(panel.card.alarm)
     assert window.commands == ["alarm.node:blackboard"]
     press(button(panel.card, "/touch"))
-    assert panel.canvas.choice == GraphChoice("topic", "/touch")
+    assert panel.canvas.choice == GraphSelection("topic", "/touch")
     press(button(panel.card, "pepper_driver"))
-    assert panel.canvas.choice == GraphChoice("node", key_of(panel, "pepper_driver"))
+    assert panel.canvas.choice == GraphSelection("node", key_of(panel, "pepper_driver"))
     assert window.opened == []
 
 
 def test_service_card_shows_its_details(panel: GraphPanel) -> None:
-    panel.canvas.choose(GraphChoice("topic", "remember"))
+    panel.canvas.select(GraphSelection("topic", "remember"))
     content = panel.card.content
     assert content is not None
-    assert [(figure.title, figure.value) for figure in content.figures] == [("Calls", "7"), ("Errors", "1")]
+    assert [(figure.title, figure.value) for figure in content.stats] == [("Calls", "7"), ("Errors", "1")]
     assert not panel.card.steps.isVisible()
     panel.canvas.opened.emit("remember")  # Enter: there is nothing to inspect
 
@@ -300,20 +300,20 @@ def test_context_menu_of_an_edge_lists_the_commands_of_its_topic(panel: GraphPan
         "Show messages", "Open in another panel", "Plot a field", "Publish to this topic",
         "New alarm", "Record topic", "Copy name",
     ]  # fmt: skip
-    assert panel.canvas.choice == GraphChoice("topic", "/blackboard", key_of(panel, "blackboard"))
+    assert panel.canvas.choice == GraphSelection("topic", "/blackboard", key_of(panel, "blackboard"))
     assert (window.opened, window.beside, window.plotted) == (
         ["/blackboard"], ["/blackboard"], [("/blackboard", "")],
     )  # fmt: skip
     about = ("publish.topic", "alarm.topic", "record.topic")
     assert window.commands == [f"{command}:/blackboard" for command in about]
     assert QGuiApplication.clipboard().text() == "/blackboard"
-    assert run_all(panel.menu_of(GraphChoice("topic", "remember"))) == ["Call service", "Copy name"]
+    assert run_all(panel.menu_of(GraphSelection("topic", "remember"))) == ["Call service", "Copy name"]
     assert window.commands[-1] == "service.call:remember"
 
 
 @pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
 def test_menu_key_opens_the_menu_of_the_selected_node(panel: GraphPanel, window: Window) -> None:
-    panel.canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))
+    panel.canvas.select(GraphSelection("node", key_of(panel, "pepper_driver")))
     assert run_all(menu_at(panel, QPoint(1, 1), by_keys=True)) == ["New alarm", "Copy name"]
     assert window.commands == ["alarm.node:pepper_driver"]
 
@@ -327,7 +327,7 @@ def test_edge_with_several_topics_has_a_submenu_for_each(qtbot, panel: GraphPane
     line = panel.canvas.scene.graph.line_of(twin.name)
     assert line is not None
     assert set(line.topics) == {"/touch", "/touch&go"}
-    menu = panel.menu_of(GraphChoice("topic", twin.name))
+    menu = panel.menu_of(GraphSelection("topic", twin.name))
     assert [action.text() for action in menu.actions()] == ["/touch&&go", "/touch"]
     part = menu.actions()[0].menu()
     assert isinstance(part, QMenu)
@@ -344,7 +344,7 @@ def test_invalid_figures_do_not_break_the_graph(panel: GraphPanel, window: Windo
         odd, publishers=tuple(replace(each, rate_hz=rate, last_seq=2**64 - 1) for each in odd.publishers)
     )
     show(window, replace(more, topics={**more.topics, "/touch": odd}))
-    panel.canvas.choose(GraphChoice("topic", "/touch"))
+    panel.canvas.select(GraphSelection("topic", "/touch"))
     panel.refresh()
     panel.canvas.grab()
     assert panel.card.content is not None
@@ -367,7 +367,7 @@ def test_theme_change_keeps_the_layout_and_larger_text_recomputes_it(
 
 def test_arrow_keys_move_along_edges_and_announce_the_selection(panel: GraphPanel, window: Window) -> None:
     canvas = panel.canvas
-    canvas.choose(GraphChoice("node", key_of(panel, "pepper_driver")))
+    canvas.select(GraphSelection("node", key_of(panel, "pepper_driver")))
     QTest.keyClick(canvas, Qt.Key.Key_Right)
     assert canvas.choice is not None
     assert canvas.choice.key == "/touch"
@@ -383,11 +383,11 @@ def test_arrow_keys_move_along_edges_and_announce_the_selection(panel: GraphPane
 
 
 def test_enter_on_a_node_moves_focus_into_its_card(panel: GraphPanel) -> None:
-    panel.canvas.choose(GraphChoice("node", key_of(panel, "studio")))
+    panel.canvas.select(GraphSelection("node", key_of(panel, "studio")))
     panel.activateWindow()
     panel.canvas.setFocus()
     QTest.keyClick(panel.canvas, Qt.Key.Key_Return)
-    assert panel.card.first_stop().accessibleName() == "/blackboard"
+    assert panel.card.first_focus_widget().accessibleName() == "/blackboard"
 
 
 def test_filter_fades_items_that_do_not_match(panel: GraphPanel) -> None:
@@ -400,7 +400,7 @@ def test_filter_fades_items_that_do_not_match(panel: GraphPanel) -> None:
     assert faded == {"greeting", "studio", "RIZE"}
     assert {item.line.topics[0] for item in scene.lines if not item.is_dim} >= {"/touch"}
     panel.tools.filter.clear()
-    assert scene.dimmed == 0
+    assert scene.dimmed_count == 0
 
 
 def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
@@ -408,18 +408,18 @@ def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
 ) -> None:
     now = [time.monotonic()]
     monkeypatch.setattr("app.ui.panels.graph.panel.time.monotonic", lambda: now[0])
-    panel._look_who_is_quiet()
+    panel._update_quiet_nodes()
     now[0] += QUIET_S + 1
     more = graph(count=200)
     show(window, replace(more, topics={**more.topics, "robot_action": graph().topics["robot_action"]}))
-    panel._look_who_is_quiet()
+    panel._update_quiet_nodes()
     settle(qtbot, panel)
     assert panel.tools.quiet.text() == "1 quiet node hidden"
     assert names(panel) == {"pepper_driver", "blackboard", "greeting", "studio"}
     assert panel.count.text() == "4 of 5 nodes, 3 topics, 1 service"
     scene = panel.canvas.scene
     assert scene is not None
-    chip = next(item.quiet for item in scene.groups if item.quiet is not None)
+    chip = next(item.quiet_rect for item in scene.groups if item.quiet_rect is not None)
     click(panel.canvas, at(panel, chip.center()))
     settle(qtbot, panel)
     assert "RIZE" in names(panel)
@@ -435,7 +435,7 @@ def test_idle_nodes_are_hidden_after_a_minute_and_shown_by_a_button(
 def test_large_scene_is_built_in_one_tick_and_painted_in_the_next(
     panel: GraphPanel, window: Window, qtbot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.ui.panels.graph.panel.MAX_AT_ONCE", 0)
+    monkeypatch.setattr("app.ui.panels.graph.panel.MAX_LINES_PER_TICK", 0)
     before = panel.canvas.scene
     show(window, graph(revision=2, nodes=NODES[:-1]))
 
@@ -505,8 +505,8 @@ def test_positions_are_stable_when_nodes_leave_and_join(panel: GraphPanel, windo
 def test_graph_with_many_nodes_starts_with_collapsed_groups(qtbot, window: Window) -> None:
     many = tuple(NodeInfo(f"{n:x}", f"n{n}", f"host{n % 3}", 1, "", "native", n) for n in range(1, 202))
     show(window, GraphView(1, 2, {node.id: node for node in many}))
-    window.session.nodes.age(window.session.clock() + 100)
-    window.session.topics.age(window.session.clock() + 100, 0)
+    window.session.nodes.update_ages(window.session.clock() + 100)
+    window.session.topics.update_ages(window.session.clock() + 100, 0)
     made = window.make(PANEL, (900, 600))
     qtbot.addWidget(made)
     assert isinstance(made, GraphPanel)
@@ -520,7 +520,7 @@ def test_graph_with_many_nodes_starts_with_collapsed_groups(qtbot, window: Windo
 def test_graph_is_panned_and_zoomed(panel: GraphPanel) -> None:
     canvas = panel.canvas
     fits = canvas.scale
-    assert canvas.visible().contains(canvas.scene.bounds)  # type: ignore[union-attr]
+    assert canvas.visible_rect().contains(canvas.scene.bounds)  # type: ignore[union-attr]
     QTest.keyClick(canvas, Qt.Key.Key_Plus)
     assert canvas.scale == pytest.approx(fits * 1.2)
     for _ in range(40):
@@ -528,9 +528,9 @@ def test_graph_is_panned_and_zoomed(panel: GraphPanel) -> None:
     assert canvas.scale == 3.0
     assert panel.tools.scale.text() == "300 %"
     assert panel.overview.isVisible()
-    left = canvas.visible().left()
+    left = canvas.visible_rect().left()
     QTest.keyClick(canvas, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
-    assert canvas.visible().left() == pytest.approx(left + 20)
+    assert canvas.visible_rect().left() == pytest.approx(left + 20)
     QTest.mousePress(canvas, Qt.MouseButton.LeftButton, pos=QPoint(100, 100))
     QTest.mouseMove(canvas, QPoint(160, 130))
     QTest.mouseRelease(canvas, Qt.MouseButton.LeftButton, pos=QPoint(160, 130))
@@ -550,7 +550,7 @@ def test_click_in_the_overview_moves_the_viewport(panel: GraphPanel) -> None:
     scale, offset = panel.overview._fit(scene)
     wanted = scene.nodes[key_of(panel, "pepper_driver")].rect.center()
     click(panel.overview, (wanted * scale + offset).toPoint())
-    assert panel.canvas.visible().contains(wanted)
+    assert panel.canvas.visible_rect().contains(wanted)
 
 
 def test_card_is_placed_below_when_space_is_narrow(panel: GraphPanel, qtbot) -> None:

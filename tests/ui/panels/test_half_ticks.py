@@ -13,8 +13,8 @@ def test_image_panels_are_refreshed_twice_per_tick(qtbot, window: MainWindow, co
     bench = window.bench
     assert bench is not None
     image, topics = bench.docks["image"], bench.docks["topics"]
-    qtbot.waitUntil(lambda: image.shown() and topics.shown())
-    image.panel.shows_pictures = True
+    qtbot.waitUntil(lambda: image.is_displayed() and topics.is_displayed())
+    image.panel.shows_video = True
     before = image.panel.refreshed, topics.panel.refreshed  # type: ignore[attr-defined]
     for _ in range(10):
         window.timer.timeout.emit()

@@ -55,7 +55,7 @@ def test_problems_are_counted_and_listed_first(panel, asked) -> None:
     panel.refresh()
     assert (panel.chip.text, panel.chip.status) == ("1 warning", "warn")
     assert panel.rows[0].title.text() == "Battery"
-    asked.session.fleet.links[0].mute = True
+    asked.session.fleet.links[0].is_unresponsive = True
     panel.refresh()
     assert (panel.chip.text, panel.chip.status) == ("2 warnings", "error")
 
@@ -63,7 +63,7 @@ def test_problems_are_counted_and_listed_first(panel, asked) -> None:
 @pytest.mark.parametrize(("virtual", "does"), [(True, "connect:Pepper"), (False, "help.doctor")])
 def test_unresponsive_robot_shows_a_next_step(panel, asked, virtual: bool, does: str) -> None:
     link = asked.session.fleet.links[0]
-    link.robot, link.mute = replace(link.robot, virtual=virtual), True
+    link.robot, link.is_unresponsive = replace(link.robot, virtual=virtual), True
     panel.refresh()
     assert panel.step.isVisible()
     assert panel.rows[0].y() < panel.step.parentWidget().y() < panel.rows[1].y()
@@ -88,7 +88,7 @@ def test_panel_follows_the_shown_robot_and_names_it_when_there_are_two(panel, as
     assert asked.session.looked_at == ["Pepper"]
     assert panel.subtitle() == ""
     asked.session.join(pepper("Turtle"))
-    asked.session.fleet.choose("Turtle")
+    asked.session.fleet.select("Turtle")
     panel.refresh()
     assert asked.session.looked_at == ["Turtle"]
     assert panel.subtitle() == "Turtle"

@@ -13,13 +13,13 @@ from PySide6.QtWidgets import QApplication, QMainWindow
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.ui.panels.camera import CameraPanel
 from app.ui.panels.image.panel import ImagePanel
 from app.ui.panels.inspector.panel import InspectorPanel
 from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.robot.panel import RobotPanel
-from app.ui.shell.docking.dock import SUSPEND_DELAY_S, Dock, on_screen
+from app.ui.shell.docking.dock import SUSPEND_DELAY_S, Dock, is_on_screen
 from app.ui.shell.main_window import TICK_MS, MainWindow
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
@@ -54,7 +54,9 @@ class Case:
         )
         assert isinstance(self.session.source, Network)
         self.source = self.session.source
-        self.session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
+        self.session.fleet.connect(
+            parse(thing_description(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description"
+        )
         self.source.tell(graph())
         panels = {**PanelRegistry(), "behaviour": PANELS["behaviour"]}
         clock = {"clock": lambda: self.now} if own_clock else {}
@@ -87,13 +89,13 @@ def case(qtbot, theme: Theme, home: Path) -> Iterator[Case]:
     theme.apply()
     made.window.resize(1440, 900)
     made.window.show()
-    qtbot.waitUntil(lambda: on_screen(made.window))
+    qtbot.waitUntil(lambda: is_on_screen(made.window))
     yield made
     made.window.close()
 
 
 def settle(qtbot, case: Case, dock: Dock) -> None:
-    qtbot.waitUntil(dock.shown)
+    qtbot.waitUntil(dock.is_displayed)
     case.tick()
 
 
@@ -150,14 +152,14 @@ def test_panel_behind_another_tab_watches_nothing(qtbot, case: Case) -> None:
     settle(qtbot, case, image)
     assert case.source.wanted >= {OTHER}
     camera = case.dock("camera")  # shares the place of the pictures
-    qtbot.waitUntil(lambda: camera.shown() and not image.shown())
+    qtbot.waitUntil(lambda: camera.is_displayed() and not image.is_displayed())
     case.hide_for_long()
     assert OTHER not in case.source.wanted
     assert CAMERA in case.source.wanted
     image.raise_()
     settle(qtbot, case, image)
     assert OTHER in case.source.wanted
-    assert inspector.shown()
+    assert inspector.is_displayed()
 
 
 def test_quick_tab_switch_does_not_resubscribe(qtbot, case: Case) -> None:
@@ -198,7 +200,7 @@ def test_minimised_window_watches_nothing_and_slows_its_timer(qtbot, case: Case)
     assert case.window.timer.interval() == TICK_MS // 2
     with_panels = set(case.source.wanted)
     case.window.showMinimized()
-    qtbot.waitUntil(lambda: not camera.shown())
+    qtbot.waitUntil(lambda: not camera.is_displayed())
     case.hide_for_long()
     assert case.source.wanted == {"/Pepper/answer"}, "answers of robots do not depend on what is seen"
     assert case.window.timer.interval() == TICK_MS
@@ -233,7 +235,7 @@ def test_frozen_image_and_message_are_kept_while_hidden(qtbot, case: Case) -> No
     settle(qtbot, case, case.dock("image"))
     assert case.source.wanted >= {OTHER, "/words"}
     assert (image._stream, image.freeze.isChecked()) == (stream, True)
-    assert inspector.frozen
+    assert inspector.is_frozen
     assert inspector.model.value() == {"a": 1}
 
 
@@ -298,7 +300,7 @@ def test_failed_panel_watches_nothing_until_it_is_retried(qtbot, case: Case) -> 
     assert camera.failed
     assert CAMERA not in case.source.wanted
     camera.panel.view = view
-    camera.try_again()
+    camera.retry()
     case.tick()
     assert not camera.failed
     assert CAMERA in case.source.wanted

@@ -20,8 +20,8 @@ from app.ui.panels.image.actions import ROWS
 from app.ui.panels.image.panel import PANEL, ImagePanel
 from app.ui.panels.image.snapshot import SnapshotJob
 from app.ui.pictures.boxes import boxes_of
-from app.ui.pictures.placement import PicturePlace
-from app.ui.pictures.view import PictureView, RateWords, pixel_words, rate_sentence
+from app.ui.pictures.placement import PicturePlacement
+from app.ui.pictures.view import PictureView, RateText, pixel_text, rate_text
 from app.ui.pictures.zoom import ZoomablePicture
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
@@ -77,32 +77,32 @@ def test_image_keeps_its_aspect_ratio_on_black(view) -> None:
 
 def test_caption_shows_frame_rate_and_image_size(view) -> None:
     view.show_image(stream_of(picture(320, 240)))  # type: ignore[arg-type]
-    assert view.words.startswith("60 fps (30 shown)  320\u00d7240  ")
-    assert view.words.endswith(" ms")  # its age
-    assert rate_sentence(None, None) == ""
-    assert rate_sentence(17.2, 15.0) == "15 fps (15 shown)"  # two windows of time: never more than arrive
+    assert view.label_text.startswith("60 fps (30 shown)  320\u00d7240  ")
+    assert view.label_text.endswith(" ms")  # its age
+    assert rate_text(None, None) == ""
+    assert rate_text(17.2, 15.0) == "15 fps (15 shown)"  # two windows of time: never more than arrive
 
 
 def test_fluctuating_frame_rate_is_updated_once_per_second() -> None:
     now, rates = [100.0], SimpleNamespace(shown_hz=15.4, arriving_hz=15.4)
-    words = RateWords(lambda: now[0])
-    assert words.of(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
+    words = RateText(lambda: now[0])
+    assert words.for_stream(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
     rates.shown_hz = rates.arriving_hz = 15.6
     now[0] += 0.9
-    assert words.of(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
+    assert words.for_stream(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
     now[0] += 0.2
-    assert words.of(rates) == "16 fps (16 shown)"  # type: ignore[arg-type]
+    assert words.for_stream(rates) == "16 fps (16 shown)"  # type: ignore[arg-type]
     rates.arriving_hz = None
-    assert words.of(rates) == ""  # type: ignore[arg-type]
+    assert words.for_stream(rates) == ""  # type: ignore[arg-type]
 
 
 def test_detection_boxes_of_a_frozen_image_are_frozen_too(view) -> None:
     stream, boxes = stream_of(picture()), boxes_of(FACES)
     view.show_image(stream, boxes)  # type: ignore[arg-type]
-    stream.hold(True)
+    stream.set_frozen(True)
     view.show_image(stream, ())  # type: ignore[arg-type]
     assert view.boxes == boxes
-    stream.hold(False)
+    stream.set_frozen(False)
     view.show_image(stream, ())  # type: ignore[arg-type]
     assert view.boxes == ()
 
@@ -121,7 +121,7 @@ def test_silent_stream_is_grey_and_shows_the_age_of_its_image(view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     before = view.grab().toImage().pixelColor(20, 80)
     view.show_image(stream_of(view._picture, silent_s=4.2))  # type: ignore[arg-type]
-    assert view.words == "Last image 4 s ago"
+    assert view.label_text == "Last image 4 s ago"
     assert view.grab().toImage().pixelColor(20, 80) != before
 
 
@@ -170,11 +170,11 @@ def test_image_age_is_updated_once_per_second_and_repaints_only_its_text(
     for n in range(30):
         clock.now += 0.03
         takes(60.0 + n)
-    words = view.words
+    words = view.label_text
     assert asked == []
     clock.now += 0.2
     takes(600.0)
-    assert (words != view.words, "10 min" in view.words) == (True, True)
+    assert (words != view.label_text, "10 min" in view.label_text) == (True, True)
     assert len(asked) == labelled
     assert all(where[1] > 200 for where in asked), "not the picture above its words"
 
@@ -189,7 +189,7 @@ def test_camera_image_has_no_black_margins(camera_view) -> None:
 def test_last_image_of_a_lost_camera_is_grey_with_a_message_in_the_middle(camera_view) -> None:
     shown = picture(320, 240)
     camera_view.show_image(stream_of(shown, silent_s=4.2))  # type: ignore[arg-type]
-    assert camera_view.words.startswith("Last image 4 s ago")
+    assert camera_view.label_text.startswith("Last image 4 s ago")
     image = camera_view.grab().toImage()
     found = [image.pixelColor(x, y) for x in range(0, 400, 3) for y in range(0, 160, 3)]
     assert all(max(one.red(), one.green(), one.blue()) - min(one.red(), one.green(), one.blue()) < 3
@@ -203,8 +203,8 @@ def test_last_image_of_a_lost_camera_is_grey_with_a_message_in_the_middle(camera
 
 def test_detection_boxes_are_drawn_at_their_position_with_labels(view) -> None:
     boxes = boxes_of(FACES)
-    assert (boxes[0].words, boxes[0].confidence) == ("face", 0.97)
-    assert boxes[0].place == QRectF(0.5, 0.25, 0.25, 0.25)
+    assert (boxes[0].label, boxes[0].confidence) == ("face", 0.97)
+    assert boxes[0].rect == QRectF(0.5, 0.25, 0.25, 0.25)
     view.show_image(stream_of(picture()), boxes)  # type: ignore[arg-type]
     image = view.grab().toImage()
     assert image.pixelColor(250, 125).name() == "#ffc53d"  # its upper edge
@@ -221,9 +221,9 @@ def test_invalid_detections_draw_no_box(broken: object) -> None:
 def test_pixel_value_under_the_mouse_is_shown(qtbot, view) -> None:
     view.show_image(stream_of(picture()))  # type: ignore[arg-type]
     QTest.mouseMove(view, QPoint(20, 60))
-    qtbot.waitUntil(lambda: "(16, 8)  196 198 190  #C4C6BE" in view.words)
+    qtbot.waitUntil(lambda: "(16, 8)  196 198 190  #C4C6BE" in view.label_text)
     QTest.mouseMove(view, QPoint(20, 20))
-    qtbot.waitUntil(lambda: "#" not in view.words)
+    qtbot.waitUntil(lambda: "#" not in view.label_text)
 
 
 def test_image_panel_shows_the_first_image_topic_and_others_on_demand(qtbot, qapp) -> None:
@@ -233,12 +233,12 @@ def test_image_panel_shows_the_first_image_topic_and_others_on_demand(qtbot, qap
     assert panel.topics() == ["/robot/camera", "/robot/depth"]
     panel.show_topic("/robot/depth")
     panel.refresh()
-    assert [(one.topic, one.closed) for one in window.session.images.streams] == [
+    assert [(one.topic, one.is_closed) for one in window.session.images.streams] == [
         ("/robot/camera", True), ("/robot/depth", False),
     ]  # fmt: skip
     assert panel.view.isVisible()
     panel.dispose()
-    assert all(one.closed for one in window.session.images.streams)
+    assert all(one.is_closed for one in window.session.images.streams)
 
 
 def test_image_panel_marks_detections_of_the_camera_robot(qtbot, qapp) -> None:
@@ -283,15 +283,15 @@ def test_camera_panel_follows_the_first_robot_with_a_camera(qtbot, qapp) -> None
     assert panel.subtitle() == "/Pepper/camera"
     assert panel.rate.text() == "15 fps (15 shown)"
     assert len(panel.view.boxes) == 1
-    link.connected = False
+    link.is_connected = False
     window.session.fleet.revision += 1
     window.session.clock.now += 4.0
     panel.refresh()
-    assert panel.view.words == "Last image 4 s ago"  # the last picture stays, grey
+    assert panel.view.label_text == "Last image 4 s ago"  # the last picture stays, grey
     assert panel.rate.text() == ""
     assert (panel.chip.text, panel.chip.status) == ("silent for 4 s", "error")
     panel.dispose()
-    assert window.session.images.streams[0].closed
+    assert window.session.images.streams[0].is_closed
     assert window.session.looked_at == []
 
 
@@ -308,7 +308,7 @@ def wheel(view: ZoomablePicture, at: QPoint, notches: int) -> None:
 
 def under(view: ZoomablePicture, at: QPoint) -> str:
     view.mouse = QPointF(at)
-    return view._under_mouse()
+    return view._hovered_pixel_text()
 
 
 def test_wheel_zooms_at_the_mouse_position(view) -> None:
@@ -319,7 +319,7 @@ def test_wheel_zooms_at_the_mouse_position(view) -> None:
     wheel(view, at, 9)
     assert view.scale() == pytest.approx(1.25 * 1.25**9)
     assert under(view, at) == before
-    assert f"{round(view.scale() * 100)} %" in view.words
+    assert f"{round(view.scale() * 100)} %" in view.label_text
     assert view.grab().toImage().pixelColor(at).name() == "#d23e3a"
 
 
@@ -343,7 +343,7 @@ def test_pixel_values_and_boxes_follow_rotation_and_flipping(view, turned: int, 
     view.show_image(stream_of(picture()), boxes_of(FACES))  # type: ignore[arg-type]
     if flipped:
         view.place.flip(across=True)
-    view.place.turn(turned)
+    view.place.rotate(turned)
     ball = view.place.to_view(view.area()).map(QPointF(250.5 / 320, 150.5 / 240))
     assert under(view, ball.toPoint()).endswith("210 62 58  #D23E3A")
     image = view.grab().toImage()
@@ -376,17 +376,17 @@ def test_double_click_toggles_between_fit_and_actual_size(view) -> None:
 def test_image_is_decoded_at_display_size_and_in_full_under_the_mouse(view) -> None:
     stream = stream_of(picture(640, 320))
     view.show_image(stream)  # type: ignore[arg-type]
-    assert stream.wish == (400, 200)
-    view.place.turn(90)
+    assert stream.requested_size == (400, 200)
+    view.place.rotate(90)
     view.show_image(stream)  # type: ignore[arg-type]
-    assert stream.wish == (400, 200)
+    assert stream.requested_size == (400, 200)
     view.place.set_zoom(3.0)
     view.show_image(stream)  # type: ignore[arg-type]
-    assert stream.wish == (1920, 960)
+    assert stream.requested_size == (1920, 960)
     view.place.set_zoom(None)
     view.mouse = QPointF(200, 200)
     view.show_image(stream)  # type: ignore[arg-type]
-    assert stream.wish is None
+    assert stream.requested_size is None
 
 
 def test_image_sequence_is_recorded_and_exported_from_a_recording_as_files(qtbot, qapp, tmp_path) -> None:
@@ -408,11 +408,11 @@ def test_image_sequence_is_recorded_and_exported_from_a_recording_as_files(qtbot
 
 
 def test_pixel_is_described_as_colour_or_number_or_left_out() -> None:
-    assert pixel_words(1, 2, (255, 0, 16)) == "(1, 2)  255 0 16  #FF0010"
-    assert pixel_words(1, 2, 820) == "(1, 2)  820"
-    assert pixel_words(1, 2, 0.125) == "(1, 2)  0.125"
-    assert pixel_words(1, 2, float("nan")) == "(1, 2)  nan"
-    assert pixel_words(1, 2, None) == "(1, 2)"
+    assert pixel_text(1, 2, (255, 0, 16)) == "(1, 2)  255 0 16  #FF0010"
+    assert pixel_text(1, 2, 820) == "(1, 2)  820"
+    assert pixel_text(1, 2, 0.125) == "(1, 2)  0.125"
+    assert pixel_text(1, 2, float("nan")) == "(1, 2)  nan"
+    assert pixel_text(1, 2, None) == "(1, 2)"
 
 
 def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> None:
@@ -425,17 +425,17 @@ def test_every_action_has_a_shortcut_while_the_image_has_focus(qtbot, qapp) -> N
     QTest.keyClicks(view, "1")
     assert view.scale() == pytest.approx(1.0)
     QTest.keyClicks(view, "0r")
-    assert (place.zoom, place.turned) == (None, 90)
+    assert (place.zoom, place.rotation_deg) == (None, 90)
     QTest.keyClick(view, Qt.Key.Key_R, Qt.KeyboardModifier.ShiftModifier)
-    assert place.turned == 0
+    assert place.rotation_deg == 0
     QTest.keyClicks(view, "hv")
-    assert (place.flipped_across, place.flipped_down) == (True, True)
+    assert (place.is_flipped_horizontally, place.is_flipped_vertically) == (True, True)
     assert panel.actions_of["across"].isChecked()
     QTest.keyClick(view, Qt.Key.Key_Space)
     assert panel.freeze.isChecked()
-    assert window.session.images.streams[0].held
+    assert window.session.images.streams[0].is_frozen
     words = [action.text().partition("\t")[0] for action in panel.more_actions() if action.text()]
-    assert words == [*(row.words for row in ROWS), "Record a sequence", "Open in the Inspector"]
+    assert words == [*(row.text for row in ROWS), "Record a sequence", "Open in the Inspector"]
 
 
 def test_window_shortcuts_are_disabled_while_the_image_has_focus(qtbot, qapp) -> None:
@@ -450,7 +450,7 @@ def test_frozen_image_is_kept_and_labelled_as_frozen(qtbot, qapp) -> None:
     panel = made(qtbot, window)
     panel.freeze.click()
     panel.refresh()
-    assert panel.view.words.startswith("Frozen ")
+    assert panel.view.label_text.startswith("Frozen ")
     panel.show_topic("/robot/depth")
     assert not panel.freeze.isChecked()
 
@@ -460,7 +460,7 @@ def test_image_is_saved_as_received_and_the_toast_opens_its_folder(qtbot, qapp, 
     panel = made(qtbot, window)
     panel.job = SnapshotJob(panel, lambda: tmp_path / "kept")
     panel.job.saved.connect(panel._saved)
-    panel.view.place.turn(90)
+    panel.view.place.rotate(90)
     QTest.keyClicks(panel.view, "s")
     qtbot.waitUntil(lambda: bool(window.toasts))
     (file,) = (tmp_path / "kept").iterdir()
@@ -484,13 +484,13 @@ def test_image_that_cannot_be_saved_raises_an_alert_with_the_reason(qtbot, qapp,
 
 def test_whole_image_is_copied_and_encoded_in_another_thread(qtbot, qapp, monkeypatch) -> None:
     threads: list[int] = []
-    whole = SnapshotJob._do
+    whole = SnapshotJob._run
 
     def watched(self: SnapshotJob, work: object) -> None:
         threads.append(threading.get_ident())
         whole(self, work)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(SnapshotJob, "_do", watched)
+    monkeypatch.setattr(SnapshotJob, "_run", watched)
     window = Window(Session.full())
     panel = made(qtbot, window)
     QTest.keyClick(panel.view, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
@@ -519,7 +519,7 @@ def test_zoom_rotation_and_flip_are_kept_per_topic(qtbot, qapp) -> None:
     first, place = panel.subtitle(), panel.view.place
     assert place.zoom is not None
     panel.show_topic("/robot/depth")
-    assert panel.view.place == PicturePlace()
+    assert panel.view.place == PicturePlacement()
     assert not panel.actions_of["across"].isChecked()
     panel.show_topic(first)
     assert panel.view.place is place
@@ -536,12 +536,12 @@ def test_job_reports_in_the_gui_thread_and_not_after_closing(qtbot, qapp, tmp_pa
     message = panel._message()
     assert message is not None
     job.save(message)
-    assert job.busy
+    assert job.is_busy
     qtbot.waitUntil(lambda: bool(told))
     job._start(lambda: Path(str(1 / 0)))  # whatever goes wrong is told, and the next one can begin
     qtbot.waitUntil(lambda: len(told) == 2)
     assert set(told) == {threading.get_ident()}
-    assert not job.busy
+    assert not job.is_busy
     job.save(message)
     job.wait()
     qapp.processEvents()
@@ -574,7 +574,7 @@ def test_camera_panel_shows_the_chosen_robot(qtbot, qapp) -> None:
     for widget in (panel, *panel.header_widgets()):
         qtbot.addWidget(widget)
     assert panel.subtitle() == "/Pepper/camera"
-    window.session.fleet.choose("Nao")
+    window.session.fleet.select("Nao")
     panel.refresh()
     assert panel.subtitle() == "/Nao/camera"
     panel.dispose()

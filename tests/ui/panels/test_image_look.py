@@ -9,11 +9,11 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QImage, QPainter, QTransform
 
-from app.core.messages.annotations import MAX_PIXELS, drawn_by
+from app.core.messages.annotations import MAX_PIXELS, shapes_in
 from app.core.messages.picture_look import ColourScale
 from app.ui.panels.image.overlays import MAX_OVERLAYS
 from app.ui.panels.image.panel import PANEL, ImagePanel
-from app.ui.pictures.annotations import bar_image, paint_colour_bar, paint_drawn
+from app.ui.pictures.annotations import bar_image, paint_annotations, paint_colour_bar
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
 from tests.ui.fakes import Session
@@ -104,7 +104,7 @@ def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot,
     panel.show_topic(DEPTH)
     panel.look_bar.contrast.setValue(150)
     panel.tune.setChecked(True)
-    panel.overlays.choose(MARKS, shown=True)
+    panel.overlays.set_visible(MARKS, shown=True)
     look = panel.look_bar.look
     panel.show_topic(CAMERA)
     assert panel.look_bar.look != look
@@ -116,7 +116,7 @@ def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot,
     again.restore_state(panel.save_state())
     assert again.look_bar.look == look
     assert again.tune.isChecked()
-    assert again.overlays.chosen == (MARKS,)
+    assert again.overlays.selected == (MARKS,)
     again.restore_state({"look": {"contrast": "much"}, "layers": [3], "topic": DEPTH})
     again.dispose()
 
@@ -124,24 +124,24 @@ def test_display_settings_are_kept_per_topic_and_restored_with_the_layout(qtbot,
 def test_annotation_topics_are_offered_watched_while_selected_and_drawn(panel, window) -> None:
     panel.show_topic(CAMERA)
     assert panel.overlays.choices() == [MARKS, "/face_positions"]
-    panel.overlays.choose(MARKS, shown=True)
+    panel.overlays.set_visible(MARKS, shown=True)
     assert MARKS in window.session.watched
     sends(window, panel, CAMERA, np.zeros((240, 320, 3), np.uint8), "bgr8")
-    assert panel.view.drawn == ()
+    assert panel.view.annotations == ()
     circle = {"position": {"x": 160, "y": 120}, "diameter": 80, "thickness": 4, "outline_color": RED}
     window.session.send(MARKS, {"circles": [{**circle, "fill_color": RED}]})
     ticks(window, panel)
-    assert [each.kind for each in panel.view.drawn] == ["circle"]
+    assert [each.kind for each in panel.view.annotations] == ["circle"]
     middle = panel.view.grab().toImage().pixelColor(panel.view.rect().center())
     assert (middle.red(), middle.green()) == (255, 0)
     window.session.send(MARKS, {"circles": "none"})
     ticks(window, panel)
-    assert panel.view.drawn == ()
-    panel.overlays.choose(MARKS, shown=False)
+    assert panel.view.annotations == ()
+    panel.overlays.set_visible(MARKS, shown=False)
     assert MARKS not in window.session.watched
     for number in range(MAX_OVERLAYS + 3):
-        panel.overlays.choose(f"/m{number}", shown=True)
-    assert len(panel.overlays.chosen) == MAX_OVERLAYS
+        panel.overlays.set_visible(f"/m{number}", shown=True)
+    assert len(panel.overlays.selected) == MAX_OVERLAYS
 
 
 def painted(payload: object, turned: int = 0) -> QImage:
@@ -151,7 +151,7 @@ def painted(payload: object, turned: int = 0) -> QImage:
     shares = QTransform.fromScale(320, 240)
     if turned:
         shares = QTransform().translate(0.5, 0.5).rotate(turned).translate(-0.5, -0.5) * shares
-    paint_drawn(painter, Theme("light"), shares, 1.0, drawn_by(payload, 320, 240))
+    paint_annotations(painter, Theme("light"), shares, 1.0, shapes_in(payload, 320, 240))
     painter.end()
     return image
 

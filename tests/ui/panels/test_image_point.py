@@ -102,7 +102,7 @@ def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, wind
     assert not panel.view.grab().isNull()
     assert points.strip.counts.text() == "1 point sent, received by 1"
     entry = session.acting.sent.records[-1]
-    assert (entry.asker, entry.name, entry.words) == ("image", POINTS, "Point (16, 8), received by 1")
+    assert (entry.origin, entry.name, entry.result_text) == ("image", POINTS, "Point (16, 8), received by 1")
     qtbot.waitUntil(lambda: panel.view.marked is None, timeout=20_000)
 
     panel.actions_of["right"].trigger()
@@ -115,7 +115,7 @@ def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, wind
     assert heard.listen(timeout_s=20.0)[1]["x"] == 16
     session.runs.stop()
     ticks(window, panel)
-    assert not panel.view.takes_clicks
+    assert not panel.view.accepts_clicks
     assert session.acting.repeat(entry.number).startswith("Not armed for")
 
 
@@ -159,8 +159,10 @@ def test_keys_move_the_pixel_cursor_and_enter_publishes_it(qtbot, window, panel)
         QTest.keyClick(view, Qt.Key.Key_Down, SHIFT)
     view.zoom_by(0.5)
     view.repaint()
-    assert view._under_mouse().startswith(f"({view.pointed[0]}, {view.pointed[1]})"), "its value is told"
-    assert view.rect().contains(view._view_of(view.pointed).toPoint()), "an enlarged picture goes along"
+    assert view._hovered_pixel_text().startswith(f"({view.pointed[0]}, {view.pointed[1]})"), (
+        "its value is told"
+    )
+    assert view.rect().contains(view._view_position(view.pointed).toPoint()), "an enlarged picture goes along"
     QTest.mouseMove(view, QPoint(30, 30))
     qtbot.waitUntil(lambda: view.pointed is None)
     QTest.keyClick(view, Qt.Key.Key_Left)
@@ -209,7 +211,7 @@ def test_drag_double_click_and_click_outside_publish_nothing(qtbot, window, pane
     QTest.mouseClick(view, LEFT, none, at(panel, 100, 100))
     panel.points.topic.setText("/elsewhere")
     panel.points.topic.textEdited.emit("/elsewhere")
-    assert not view.takes_clicks, "what goes elsewhere is armed anew, also what was clicked before"
+    assert not view.accepts_clicks, "what goes elsewhere is armed anew, also what was clicked before"
     assert not window.session.acting.arming.is_on
     panel.points.topic.setText("")
     panel.points.topic.textEdited.emit("")
@@ -240,7 +242,7 @@ def test_arming_elsewhere_does_not_arm_the_image_and_closing_disarms(qtbot, wind
     ticks(window, panel)
     assert points.isVisible()
     assert not points.is_armed
-    assert not panel.view.takes_clicks
+    assert not panel.view.accepts_clicks
     press(button(panel, f"Send the points to {POINTS}"))
     ticks(window, panel)
     assert points.is_armed
@@ -275,7 +277,7 @@ def test_robot_command_topic_asks_again_and_another_source_disarms(qtbot, window
     press(points.strip.cancel)
     ticks(window, panel)
     assert not points.is_armed
-    assert not panel.view.takes_clicks
+    assert not panel.view.accepts_clicks
     press(points.let)
     ticks(window, panel)
     press(points.strip.let)
@@ -287,7 +289,7 @@ def test_robot_command_topic_asks_again_and_another_source_disarms(qtbot, window
     press(points.strip.switch)
     ticks(window, panel)
     assert points.is_armed
-    window.session.sources_shown += 1
+    window.session.source_revision += 1
     ticks(window, panel)
     assert not points.is_armed
 

@@ -15,15 +15,15 @@ from PySide6.QtWidgets import QApplication, QMenu, QWidget
 from app.core.messages import lazy_json
 from app.core.messages.reader import LARGE_BYTES
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TREE
-from app.ui.panels.inspector.diff import OFF, changes_words, count_changes
+from app.ui.panels.inspector.diff import NO_BASE, changes_text, count_changes
 from app.ui.panels.inspector.footer import message_facts
 from app.ui.panels.inspector.panel import PANEL, InspectorPanel
 from app.ui.panels.inspector.tree_model import TreeNode
-from app.ui.panels.inspector.values import image_summary, plain_words
+from app.ui.panels.inspector.values import clipboard_text, image_summary
 from app.ui.shell.commands.view import read_value
 from nep.messages.clocks import SAME_CLOCK, ClockDifference, PublisherClock
 from nep.messages.fields import parse_path
-from nep.messages.message import Message, kind_of
+from nep.messages.message import Message, message_kind
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, has_keys, press, ticks
 from tests.ui.sample_data import blackboard
@@ -81,7 +81,7 @@ def test_newest_message_is_shown_as_a_tree_with_its_metadata(panel, window) -> N
 def test_latched_message_shows_when_it_was_sent(panel, window) -> None:
     now = time.time_ns()
     half_an_hour_ago = Message("/a", b"1", "json", "json")
-    half_an_hour_ago.kind = kind_of("/a", "json", "json", is_latched=True)
+    half_an_hour_ago.kind = message_kind("/a", "json", "json", is_latched=True)
     half_an_hour_ago.stamp_ns = now - 1800 * 10**9
     assert message_facts(half_an_hour_ago, now).endswith("latched, sent 30 min ago")
     half_an_hour_ago.stamp_ns = now - 10**6
@@ -102,14 +102,14 @@ def test_latched_message_shows_when_it_was_sent(panel, window) -> None:
 )
 def test_latency_of_another_computer_is_shown_with_its_uncertainty(took_ns, known, words) -> None:
     message = Message("/a", bytes(412), "bytes", "bytes", stamp_ns=10**18)
-    message.kind = kind_of("/a", "bytes", "bytes", clock=PublisherClock(known))
+    message.kind = message_kind("/a", "bytes", "bytes", clock=PublisherClock(known))
     message.seen_ns = 10**18 + took_ns + (0 if known is None else known.add_ns)
     assert message_facts(message).split("   ")[-1] == words
 
 
 def test_latched_message_shows_no_latency(panel, window) -> None:
     latched = Message("/blackboard", b"1", "json", "json", stamp_ns=time.time_ns() - 1800 * 10**9, seq=1)
-    latched.kind = kind_of("/blackboard", "json", "json", is_latched=True)
+    latched.kind = message_kind("/blackboard", "json", "json", is_latched=True)
     topic = window.session.topics["/blackboard"]
     topic.newest, topic.received = latched, topic.received + 1
     window.session.topics.values_revision += 1
@@ -305,7 +305,7 @@ def test_large_json_message_is_decoded_in_another_thread_and_shown_when_ready(qt
 
 def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, monkeypatch) -> None:
     threads: dict[str, set[int]] = {"looked into": set(), "decoded": set()}
-    scan, decode = lazy_json._structure, Message.payload.fget
+    scan, decode = lazy_json._find_structure, Message.payload.fget
     assert decode is not None
 
     def scanned(data: memoryview) -> object:
@@ -317,12 +317,12 @@ def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, 
             threads["decoded"].add(threading.get_ident())
         return decode(self)
 
-    monkeypatch.setattr(lazy_json, "_structure", scanned)
+    monkeypatch.setattr(lazy_json, "_find_structure", scanned)
     monkeypatch.setattr(Message, "payload", property(decoded))
     panel.show_topic("/blackboard")
     panel.compare.setChecked(True)
     for number in range(3):
-        panel.reader.forget()
+        panel.reader.clear()
         window.session.send("/blackboard", {"n": number, "data": ["x" * 90] * 110_000})
         qtbot.waitUntil(lambda wanted=number: (panel.refresh(), shown_number(panel) == wanted)[1])
     window.session.topics["/speech/words"].newest = Message(
@@ -350,7 +350,7 @@ def test_other_large_messages_are_decoded_only_on_request(qtbot, panel, window) 
     assert panel.body.page == LARGE
     assert panel.body.large._title.text() == "Large message (1.2 MB)"
     press(button(panel.body.large, "Decode the newest message message"))
-    assert panel.frozen  # the next large one would hide it again
+    assert panel.is_frozen  # the next large one would hide it again
     topic.newest = Message("/speech/words", b"y" * 1_200_000, "string", "string", seq=2)
     qtbot.waitUntil(lambda: (ticks(window, panel), panel.body.page == TREE)[1])
     assert panel.model.value() == {"value": "x" * 1_200_000}
@@ -390,7 +390,7 @@ def test_string_is_shown_as_one_value(panel, window) -> None:
     window.session.send("/speech/words", b"hello")
     panel.refresh()
     assert panel.model.value() == {"value": "hello"}
-    assert not window.session.topics["/speech/words"].new
+    assert not window.session.topics["/speech/words"].is_new
 
 
 def test_search_finds_keys_and_values(panel, window) -> None:
@@ -435,7 +435,7 @@ def test_topic_is_restored_with_the_layout(qtbot, panel, window) -> None:
     ("value", "words"), [("a", "a"), (1.5, "1.5"), (None, "null"), (b"\x01\x02", "01 02"), ([1], "[\n  1\n]")]
 )
 def test_values_are_copied_to_the_clipboard_as_plain_text(value: object, words: str) -> None:
-    assert plain_words(value) == words
+    assert clipboard_text(value) == words
 
 
 def test_search_counts_matches_and_steps_both_ways_across_messages(panel, window) -> None:
@@ -530,7 +530,7 @@ def test_comparison_is_restored_with_the_layout(qtbot, panel, window) -> None:
         qtbot.addWidget(widget)
     again.restore_state(panel.save_state())
     assert isinstance(again, InspectorPanel)
-    assert again.comparing
+    assert again.is_comparing
     assert again.strip.only.isChecked()
 
 
@@ -539,13 +539,13 @@ def test_nested_change_counts_only_the_changed_value() -> None:
     counts, whole = count_changes(after, before)
     assert whole
     assert counts == {"changed": 1, "added": 1, "removed": 1}
-    assert changes_words(counts) == "1 changed, 1 added, 1 removed"
-    assert count_changes(after, OFF) == ({"changed": 0, "added": 0, "removed": 0}, True)
+    assert changes_text(counts) == "1 changed, 1 added, 1 removed"
+    assert count_changes(after, NO_BASE) == ({"changed": 0, "added": 0, "removed": 0}, True)
     long = list(range(6000))
     counts, whole = count_changes([*long[:-1], 0], long)
     assert (counts["changed"], whole) == (0, False)
-    assert changes_words(counts, whole) == "no difference at the start of long lists"
-    assert changes_words(*count_changes([1, *long[1:]], long)) == "at least 1 changed"
+    assert changes_text(counts, whole) == "no difference at the start of long lists"
+    assert changes_text(*count_changes([1, *long[1:]], long)) == "at least 1 changed"
 
 
 def test_topic_without_publisher_is_reported_while_waiting(panel, window) -> None:

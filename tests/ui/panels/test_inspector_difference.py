@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import QModelIndex
 
 from app.core.messages.lazy_json import JsonIndex
-from app.ui.panels.inspector.diff import MISSING, OFF, differs, mark_of, parts_of
+from app.ui.panels.inspector.diff import MISSING, NO_BASE, differs, mark_of, parts_of
 from app.ui.panels.inspector.tree_model import TreeModel, TreeNode
 
 
@@ -38,7 +38,7 @@ def test_missing_value_differs_from_null() -> None:
     assert mark_of(None, MISSING) == "added"
     assert mark_of(MISSING, None) == "removed"
     assert mark_of(None, None) == ""
-    assert mark_of(None, OFF) == ""
+    assert mark_of(None, NO_BASE) == ""
 
 
 def test_changed_children_are_marked_and_removed_ones_are_listed_last() -> None:

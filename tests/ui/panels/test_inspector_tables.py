@@ -169,9 +169,9 @@ def test_table_shows_the_first_or_the_chosen_list_and_reports_when_there_is_none
     send(window, panel, seen(7))
     as_table(panel)
     assert table(panel) == [["0", "Ann", "7"]]
-    panel.body.objects._choose(("doors",))
+    panel.body.objects._list_selected(("doors",))
     assert [row[1] for row in table(panel)] == ["true", "false"]
-    panel.body.objects.revealed.emit(("doors", 1))
+    panel.body.objects.reveal_requested.emit(("doors", 1))
     assert panel.body.page == TREE
     assert panel.foot.path.text() == "doors[1]"
     as_table(panel)

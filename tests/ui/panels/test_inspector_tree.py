@@ -6,7 +6,7 @@ from PySide6.QtTest import QSignalSpy, QTest
 
 from app.ui.panels.inspector.tree_model import TreeModel
 from app.ui.panels.inspector.tree_view import TreeView
-from app.ui.panels.inspector.values import search, words_of
+from app.ui.panels.inspector.values import search, value_text
 from app.ui.theme.theme import Theme
 
 FIRST = {"stamp": 1.5, "robots": {"Pepper": {"pose": {"x": 1, "y": 2}, "on": True}}, "list": [1, "two", None]}
@@ -113,13 +113,13 @@ def test_change_mark_fades_and_with_reduced_motion_stays_for_a_second(qtbot, mod
     node = model.node(at(model, "stamp"))
     shares = []
     for now[0] in (7.0, 7.4, 7.9):
-        shares.append(view.share_changed(node))
+        shares.append(view.highlight_opacity(node))
     assert shares == [1.0, pytest.approx(0.5), 0.0]
     theme.reduced_motion = True
     now[0] = 7.9
-    assert view.share_changed(node) == 1.0
+    assert view.highlight_opacity(node) == 1.0
     now[0] = 8.1
-    assert view.share_changed(node) == 0.0
+    assert view.highlight_opacity(node) == 0.0
 
 
 def test_changed_values_are_painted_differently(qtbot, model) -> None:
@@ -168,8 +168,8 @@ def test_search_finds_keys_and_values_in_tree_order() -> None:
     ],
 )  # fmt: skip
 def test_values_are_formatted_as_text(value: object, words: str) -> None:
-    assert words_of(value) == words
+    assert value_text(value) == words
 
 
 def test_very_long_text_is_truncated() -> None:
-    assert len(words_of("x" * 100_000)) < 500
+    assert len(value_text("x" * 100_000)) < 500

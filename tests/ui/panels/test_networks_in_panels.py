@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from PySide6.QtWidgets import QLabel
 
-from app.core.network.source import GraphSeen, MasterLost, WatchFailed
+from app.core.network.source import GraphReceived, MasterLost, WatchFailed
 from app.ui.panels.image.panel import PANEL as IMAGE
 from app.ui.panels.inspector.panel import PANEL as INSPECTOR
 from app.ui.panels.inspector.panel import InspectorPanel
@@ -45,7 +45,7 @@ def look(window: Window) -> Look:
     window.session.networks._make = make  # type: ignore[assignment]
 
     def choose(kind: str) -> Fake:
-        window.session.networks.choose(kind, "")
+        window.session.networks.select(kind, "")
         return made[-1]
 
     return choose
@@ -94,7 +94,7 @@ def test_network_column_is_hidden_without_other_networks(qtbot, window: Window, 
     look("zenoh")
     ticks(window, panel, 2)
     assert not panel.table.isColumnHidden(place)
-    window.session.networks.leave("zenoh")
+    window.session.networks.deselect("zenoh")
     ticks(window, panel, 2)
     assert panel.table.isColumnHidden(place)
 
@@ -106,7 +106,7 @@ def test_ros_topics_are_listed_with_native_ones_and_mark_unknown_values(
     qtbot.addWidget(panel)
     assert isinstance(panel, TopicsPanel)
     ros = look("ros")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     ticks(window, panel, 2)
     assert panel.count.text() == "15 topics, 9 nodes"
     assert cells(panel, "/blackboard")["network"] == "NEP"
@@ -118,7 +118,7 @@ def test_ros_topics_are_listed_with_native_ones_and_mark_unknown_values(
     assert "doesn't count" in told["loss"]
     assert "ROS 1 report neither rates nor losses" in panel.foot.text()
     panel.filter.setText("ros 1 camera")
-    assert [panel.model.key_of(row) for row in panel.model._rows.shown] == ["ros /camera"]
+    assert [panel.model.key_of(row) for row in panel.model._rows.rows] == ["ros /camera"]
     panel.filter.clear()
     panel.table.opened.emit("ros /camera")
     assert window.opened == ["ros /camera"]
@@ -132,7 +132,7 @@ def test_messages_of_watched_topics_on_another_network_are_counted_locally(
     qtbot.addWidget(panel)
     assert isinstance(panel, TopicsPanel)
     ros = look("ros")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     watch = session.watch("ros /blackboard")
     ticks(window, panel, 40)
     for _ in range(60):
@@ -153,7 +153,7 @@ def test_rows_of_a_lost_network_are_grey_and_show_the_reason(qtbot, window: Wind
     assert isinstance(topics, TopicsPanel)
     assert isinstance(nodes, NodesPanel)
     ros = look("ros")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     ros.tell(MasterLost("", REASON))
     ticks(window, topics, 2)
     nodes.refresh()
@@ -164,7 +164,7 @@ def test_rows_of_a_lost_network_are_grey_and_show_the_reason(qtbot, window: Wind
     assert topics.model.cell_at(topics.model.index_of("/odom").row(), 0).role == "text"
     topics.networks.button.click()
     assert window.commands == ["network.look"]
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     ticks(window, topics, 2)
     assert not topics.networks.isVisibleTo(topics)
     assert topics.model.cell_at(topics.model.index_of("ros /camera").row(), 0).role == "text"
@@ -175,7 +175,7 @@ def test_ros_nodes_show_their_network_and_mark_unknown_values(qtbot, window: Win
     qtbot.addWidget(panel)
     assert isinstance(panel, NodesPanel)
     ros = look("ros")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     ticks(window, panel, 2)
     arm = cells(panel, "ros /arm  ")
     assert (arm["node"], arm["generation"], arm["cpu"], arm["publishes"]) == (
@@ -186,8 +186,8 @@ def test_ros_nodes_show_their_network_and_mark_unknown_values(qtbot, window: Win
     )
     assert "doesn't report" in tips(panel, "ros /arm  ")["cpu"]
     panel.table.opened.emit("ros /arm  ")
-    topic = next(row for row in panel.model._rows.shown if row.topic == "/camera")
-    assert topic.way == "publishes"
+    topic = next(row for row in panel.model._rows.rows if row.topic == "/camera")
+    assert topic.direction == "publishes"
     panel.table.opened.emit(topic.key)
     assert window.opened == ["ros /camera"]
 
@@ -197,7 +197,7 @@ def test_inspector_shows_messages_of_another_network(qtbot, window: Window, look
     qtbot.addWidget(panel)
     assert isinstance(panel, InspectorPanel)
     ros = look("ros")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     panel.show_topic("ros /blackboard")
     ticks(window, panel, 2)
     assert panel.subtitle() == "/blackboard on ROS 1"
@@ -225,7 +225,7 @@ def test_inspector_shows_why_a_topic_cannot_be_decoded(qtbot, window: Window, lo
     qtbot.addWidget(panel)
     assert isinstance(panel, InspectorPanel)
     ros = look("ros2")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     panel.show_topic("ros2 /blackboard")
     ros.tell(WatchFailed("/blackboard", "no type 'my/Own' is known here; install its package"))
     ticks(window, panel, 2)
@@ -239,7 +239,7 @@ def test_images_of_another_network_are_shown_in_the_image_panel(qtbot, window: W
     panel = window.make(IMAGE)
     qtbot.addWidget(panel)
     ros = look("ros")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     panel.show_topic("ros /camera")
     ticks(window, panel, 3)
     assert panel.subtitle() == "/camera on ROS 1"
@@ -253,7 +253,7 @@ def test_texts_are_translated_and_fit(qtbot, pseudo, window: Window, look: Look,
     made = window.make(panel)
     qtbot.addWidget(made)
     ros = look("ros")
-    ros.tell(GraphSeen(ros_graph(), 0.0))
+    ros.tell(GraphReceived(ros_graph(), 0.0))
     made.show_topic("ros /blackboard")
     ticks(window, made, 3)
     ros.tell(MasterLost("", "Ñó ŕóš"))

@@ -11,9 +11,9 @@ from PySide6.QtTest import QTest
 import nep
 from app.core.networks.parameters import ShownParameter
 from app.ui.panels.nodes.panel import PANEL, NodesPanel
-from app.ui.panels.nodes.parameters import CHOICE, LINE, allowed_words
+from app.ui.panels.nodes.parameters import CHOICE, LINE, allowed_values_text
 from nep.messages.message import Message
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from nep.protocol.graph_view import GraphView, NodeInfo, PublisherInfo, ServerInfo, ServiceInfo, TopicInfo
 from tests.pseudo import untranslated
 from tests.ui.clipping import clipped
@@ -33,7 +33,7 @@ class World:
 
     def hear(self) -> None:
         """What the robot tells comes to who watches it."""
-        topic = place_of(self.robot.id)
+        topic = parameters_topic(self.robot.id)
         with self.window.session.source.node.new_sub(topic, "json") as kept:
             message = kept.receive(5.0)
         assert message is not None
@@ -63,7 +63,7 @@ class World:
 
 
 def graph(robot: nep.Node, *, may_set: bool = True) -> GraphView:
-    place = place_of(robot.id)
+    place = parameters_topic(robot.id)
     told = PublisherInfo(1, robot.id, (), True, 1, 1, 1, None, None, None)
     nodes = (
         NodeInfo(robot.id, "robot", "", 7, "Python", "native", 5),
@@ -111,13 +111,13 @@ def test_parameters_are_shown_with_their_allowed_values(world: World) -> None:
     ]
     assert world.cells()[4][1].endswith("x… (5000 characters)")
     assert len(world.cells()[4][1]) < 250
-    assert world.window.session.watched == [place_of(world.robot.id)]
+    assert world.window.session.watched == [parameters_topic(world.robot.id)]
     assert world.part.sentence.text() == "Choose a parameter to change its value."
 
 
 def test_value_is_set_with_return_and_rejected_input_is_kept(qtbot, world: World) -> None:
     part = world.part
-    part.table.choose("speed")
+    part.table.select_key("speed")
     assert (part.editors.currentIndex(), part.field.text()) == (LINE, "0.5")
     assert part.sentence.text() == "in m/s; 0 to 2"
     QTest.keyClick(part.table, Qt.Key.Key_Return)
@@ -147,7 +147,7 @@ def test_value_is_set_with_return_and_rejected_input_is_kept(qtbot, world: World
 
 def test_typed_text_is_not_overwritten_by_updates_and_esc_discards_it(world: World) -> None:
     part = world.part
-    part.table.choose("speed")
+    part.table.select_key("speed")
     part.field.selectAll()
     QTest.keyClicks(part.field, "1.")
     world.robot.parameters["speed"] = 0.75
@@ -162,14 +162,14 @@ def test_typed_text_is_not_overwritten_by_updates_and_esc_discards_it(world: Wor
 
 def test_choice_applies_at_once(qtbot, world: World) -> None:
     part = world.part
-    part.table.choose("gait")
+    part.table.select_key("gait")
     assert part.editors.currentIndex() == CHOICE
     assert not part.button.isVisibleTo(part)
     part.choice.set_value("run")
     part.choice.activated.emit(1)
     world.settle(qtbot)
     assert world.robot.parameters["gait"] == "run"
-    part.table.choose("lights")
+    part.table.select_key("lights")
     assert [part.choice.itemData(place) for place in range(part.choice.count())] == ["false", "true"]
     part.choice.set_value("false")
     part.choice.activated.emit(0)
@@ -179,13 +179,13 @@ def test_choice_applies_at_once(qtbot, world: World) -> None:
 
 def test_disabled_field_explains_why_a_parameter_cannot_be_set(world: World) -> None:
     part = world.part
-    part.table.choose("serial")
+    part.table.select_key("serial")
     assert not part.field.isEnabled()
     assert not part.button.isEnabled()
     assert part.sentence.text() == "Only its own node can set it."
     world.window.session.source.tell(GraphView(1, 2, {}))
     ticks(world.window, world.panel, 2)
-    part.table.choose("speed")
+    part.table.select_key("speed")
     assert (part.field.isEnabled(), part.sentence.text()) == (False, "Its node has disappeared.")
     assert part.model.cell_at(0, 0).role == "textDisabled"
 
@@ -206,7 +206,7 @@ def test_hidden_panel_does_not_watch_the_parameters(world: World) -> None:
     world.panel.suspend()
     assert world.window.session.watched == []
     world.panel.resume()
-    assert world.window.session.watched == [place_of(world.robot.id)]
+    assert world.window.session.watched == [parameters_topic(world.robot.id)]
     world.panel.dispose()
     assert world.window.session.watched == []
 
@@ -222,7 +222,7 @@ def test_hidden_panel_does_not_watch_the_parameters(world: World) -> None:
     ],
 )
 def test_allowed_values_of_a_parameter_are_described(parameter: ShownParameter, words: str) -> None:
-    assert allowed_words(parameter) == words
+    assert allowed_values_text(parameter) == words
 
 
 @pytest.mark.parametrize("size", [(430, 340), (900, 700)])
@@ -237,7 +237,7 @@ def test_texts_are_translated_and_fit(
     names = ("speed", "gait", "lights", "serial", "<b>long</b>")
     data = (*names, "robot", "bare", "walk", "run", "true", "false", "in m/s", "x" * 5000, "Python", "native")
     for name in names:
-        made.part.table.choose(name)
+        made.part.table.select_key(name)
         ticks(made.window, made.panel, 2)
         if name == "speed":
             QTest.keyClicks(made.part.field, "fast")

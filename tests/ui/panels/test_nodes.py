@@ -13,7 +13,7 @@ from app.ui.panels.nodes.panel import PANEL, NodesPanel
 from app.ui.panels.nodes.rows import (
     NodeRow,
     _name_tip,
-    cpu_words,
+    cpu_text,
     facts_of,
     generation_cell,
     limits_of,
@@ -87,14 +87,14 @@ def test_every_node_is_listed_with_its_facts(panel) -> None:
 
 
 def test_expanded_node_shows_its_topics_and_a_click_opens_one(panel, window) -> None:
-    panel.table.choose(NodeRow(next(iter(window.session.nodes))).key)
+    panel.table.select_key(NodeRow(next(iter(window.session.nodes))).key)
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert [line[:2] for line in shown(panel)][:3] == [
         ["camera_driver", "native"],
         ["/odom", "publishes 50.0/s"],
         ["/robot/camera", "publishes 30.0/s"],
     ]
-    assert name_cell(NodeRow(window.session.nodes.get("1"), opened=True)).icon == "chevron-down"
+    assert name_cell(NodeRow(window.session.nodes.get("1"), is_expanded=True)).icon == "chevron-down"
     row = panel.table.rowViewportPosition(2)
     QTest.mouseClick(panel.table.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(60, row + 8))
     assert window.opened == ["/robot/camera"]
@@ -113,7 +113,7 @@ def test_arrow_keys_expand_and_collapse(panel, window) -> None:
     assert window.opened == ["/odom"]
     QTest.keyClick(panel.table, Qt.Key.Key_Left)
     assert len(shown(panel)) == 3
-    assert panel.table.chosen_key() == NodeRow(window.session.nodes.get("1")).key
+    assert panel.table.selected_key() == NodeRow(window.session.nodes.get("1")).key
 
 
 def test_node_without_topics_expands_too(panel, window) -> None:
@@ -146,23 +146,23 @@ def test_new_nodes_are_bold_until_expanded_except_studio(panel, window) -> None:
 def test_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> None:
     nodes = window.session.nodes
     nodes.update(graph(2, NODES[1:]), 1.0)
-    nodes.age(5.2)
+    nodes.update_ages(5.2)
     panel.refresh()
     line = shown(panel)[0]
     assert (line[0], line[5]) == ("camera_driver", "gone 4 s")
     cell = panel.model.data(panel.model.index(0, 0), CELL_ROLE)
     assert (cell.struck, cell.role) == (True, "textDisabled")
-    nodes.age(11.1)
+    nodes.update_ages(11.1)
     panel.refresh()
     assert [line[0] for line in shown(panel)] == ["rize", "studio"]
 
 
 def test_limitations_of_a_selected_original_nep_node_are_shown(panel, window) -> None:
-    panel.table.choose(NodeRow(window.session.nodes.get("2")).key)
+    panel.table.select_key(NodeRow(window.session.nodes.get("2")).key)
     assert panel.foot.text().startswith("rize, on this computer, pid 512, JavaScript, connected since ")
     assert "up to 0.5.4.5" in panel.foot.text()
     assert "no sequence numbers or time stamps" in panel.foot.text()
-    panel.table.choose(NodeRow(window.session.nodes.get("1")).key)
+    panel.table.select_key(NodeRow(window.session.nodes.get("1")).key)
     assert "no numbers" not in panel.foot.text()
     assert "on lab-pc" in panel.foot.text()
 
@@ -192,8 +192,8 @@ def test_unsupported_version_is_flagged_with_the_fix() -> None:
 
 def test_unknown_facts_are_left_out() -> None:
     assert facts_of(NodeEntry("1", "bare")) == "bare"
-    assert cpu_words(None) == ""
-    assert (cpu_words(0.0), cpu_words(0.099), cpu_words(0.0999)) == ("0.0 %", "9.9 %", "10 %")
+    assert cpu_text(None) == ""
+    assert (cpu_text(0.0), cpu_text(0.099), cpu_text(0.0999)) == ("0.0 %", "9.9 %", "10 %")
 
 
 def test_filter_finds_names_topics_and_languages(panel, window) -> None:
@@ -254,7 +254,7 @@ def test_bridge_is_labelled_and_refers_to_its_counters(panel, window) -> None:
     panel.refresh()
     assert [line[:2] for line in shown(panel) if line[0] == bridge.name] == [["bridge-lab-to-ros", "bridge"]]
     assert generation_cell(NodeRow(window.session.nodes.get("7"))).icon == "arrow-left-right"
-    panel.table.choose(NodeRow(window.session.nodes.get("7")).key)
+    panel.table.select_key(NodeRow(window.session.nodes.get("7")).key)
     assert "A bridge that forwards topics between this network and others." in panel.foot.text()
     assert BRIDGES_TOPIC in panel.foot.text()
     assert [each.is_bridge for each in window.session.nodes] == [False, False, False, True]
@@ -270,7 +270,7 @@ def test_wildcard_subscription_is_listed_at_its_node_and_not_as_a_topic(panel, w
     window.session.topics.update(replace(graph(2), patterns={wide.name: wide}), 1.0)
     ticks(window, panel, 2)
     panel.table.opened.emit("3  ")
-    row = next(row for row in panel.model._rows.shown if row.topic == wide.name)
+    row = next(row for row in panel.model._rows.rows if row.topic == wide.name)
     assert generation_cell(row).text == "all matching topics"
     assert _name_tip(row) == "studio subscribes to all topics that match /robot/*/camera"
     panel.table.opened.emit(row.key)

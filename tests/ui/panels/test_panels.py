@@ -59,7 +59,7 @@ def test_each_panel_survives_its_whole_life_cycle(qtbot, qapp, name, session) ->
     window = Window(session())
     panel = window.make(description(name), (500, 400))
     qtbot.addWidget(panel)
-    for widget in [*panel.header_widgets(), *([panel.replaces_title()] if panel.replaces_title() else [])]:
+    for widget in [*panel.header_widgets(), *([panel.title_widget()] if panel.title_widget() else [])]:
         qtbot.addWidget(widget)
     for density in ("compact", "comfortable"):
         panel.set_density(density)  # type: ignore[arg-type]
@@ -72,7 +72,7 @@ def test_each_panel_survives_its_whole_life_cycle(qtbot, qapp, name, session) ->
         ticks(window, panel, 2)
         window.session.remove(topic.name)
     for link in window.session.fleet.links:
-        link.connected = False
+        link.is_connected = False
     window.session.fleet.revision += 1
     ticks(window, panel, 3)
     panel.restore_state(panel.save_state())
@@ -80,7 +80,7 @@ def test_each_panel_survives_its_whole_life_cycle(qtbot, qapp, name, session) ->
     panel.dispose()
     assert window.session.watched == []
     assert window.session.looked_at == []
-    assert all(stream.closed for stream in window.session.images.streams)
+    assert all(stream.is_closed for stream in window.session.images.streams)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -88,7 +88,7 @@ def test_every_control_has_an_accessible_name(qtbot, qapp, name) -> None:
     window = Window(Session.full())
     panel = window.make(description(name), (1000, 700))
     qtbot.addWidget(panel)
-    outside = [*panel.header_widgets(), *([panel.replaces_title()] if panel.replaces_title() else [])]
+    outside = [*panel.header_widgets(), *([panel.title_widget()] if panel.title_widget() else [])]
     for widget in outside:
         qtbot.addWidget(widget)
     assert panel.accessibleName()
@@ -110,7 +110,7 @@ def test_empty_panel_explains_what_to_do_next(qtbot, qapp, name) -> None:
     window = Window(Session())
     panel = window.make(description(name))
     qtbot.addWidget(panel)
-    for widget in [*panel.header_widgets(), *([panel.replaces_title()] if panel.replaces_title() else [])]:
+    for widget in [*panel.header_widgets(), *([panel.title_widget()] if panel.title_widget() else [])]:
         qtbot.addWidget(widget)
     said = " ".join(shown.text() for shown in panel.findChildren(QLabel) if shown.isVisible())
     assert len(said.split()) >= 5

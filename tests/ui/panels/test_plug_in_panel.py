@@ -83,7 +83,7 @@ def test_plug_in_panel_is_listed_docked_refreshed_and_restored(
     entries["Counter"].trigger()
     dock = window.bench.docks["counter"]
     assert dock is not None
-    qtbot.waitUntil(dock.shown)
+    qtbot.waitUntil(dock.is_displayed)
     window.tick()
     assert dock.panel.count >= 1
     window.close()

@@ -5,7 +5,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from app.blocks import Problem
-from app.core.reports.not_installed import MissingLibraries, tell_missing
+from app.core.reports.not_installed import MissingLibraries, alert_missing
 from app.ui.panels.problems import PANEL, ProblemsPanel
 from app.ui.widgets.keyboard import tab_stops
 from tests.ui.fakes import Session
@@ -120,7 +120,7 @@ def test_tab_moves_through_the_problems_including_later_ones(qtbot, panel, windo
 
 def test_old_problems_are_kept_while_a_long_behaviour_is_checked(panel, window, monkeypatch) -> None:
     rows = list(panel.rows)
-    monkeypatch.setattr(window.session.document, "newest", lambda: None)
+    monkeypatch.setattr(window.session.document, "newest_program", lambda: None)
     panel.refresh()
     assert panel.rows == rows
     assert panel.checked.text() == "Checking"
@@ -158,7 +158,7 @@ def test_hundreds_of_problems_are_counted_and_only_the_first_are_listed(panel, w
 
 def test_unavailable_block_editor_is_a_problem_regardless_of_the_blocks(panel, window) -> None:
     before = len(panel.rows)
-    tell_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
+    alert_missing(window.session.alerts, MissingLibraries(("libnss3.so",), ("libnss3",)))
     panel.refresh()
     assert len(panel.rows) == before + 1
     assert "sudo apt install libnss3" in panel.rows[0].accessibleName()

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
-from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.shelf import SavedMessage
 from app.ui.panels.publish import PANEL
 from app.ui.panels.publish.panel import PublishPanel
 from app.ui.panels.topics import panel as topics
@@ -19,10 +19,10 @@ from tests.ui.panel_case import Window, button, press, ticks
 from tests.ui.test_accessible import unsaid
 
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-LOOK = KeptMessage(
+LOOK = SavedMessage(
     "a", "Look at Aiko", "/look", "json", '{\n  "yaw": {yaw},\n  "pitch": 4.0\n  "speed": 0.3\n}', (), 10.0
 )
-STILL = KeptMessage("b", "Stand still", "/cmd_vel", "json", '{"x": 0}', (), 50.0)
+STILL = SavedMessage("b", "Stand still", "/cmd_vel", "json", '{"x": 0}', (), 50.0)
 
 
 @pytest.fixture
@@ -33,8 +33,8 @@ def window(qapp) -> Window:
 @pytest.fixture
 def panel(qtbot, window) -> PublishPanel:
     acting = window.session.acting
-    acting.shelf.put(LOOK)
-    acting.shelf.put(STILL)
+    acting.shelf.set_message(LOOK)
+    acting.shelf.set_message(STILL)
     made = window.make(PANEL, (760, 640))
     qtbot.addWidget(made)
     for widget in made.header_widgets():
@@ -74,7 +74,7 @@ def test_syntax_error_is_located_and_fixed_by_a_button(window, panel) -> None:
 
 
 def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
-    panel.list.choose("b")
+    panel.list.select_key("b")
     edit = panel.form.edit.edit
     edit.selectAll()
     QTest.keyClicks(edit, "{")
@@ -91,7 +91,7 @@ def test_auto_indent_keeps_the_indentation_of_the_line(panel) -> None:
 def test_sending_arms_only_this_topic_and_the_switch_disarms_it(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     heard = session.source.listen("/cmd_vel", "json")
-    panel.list.choose("b")
+    panel.list.select_key("b")
     assert panel.form.send.text() == "Arm and send"
     QTest.keyClick(panel.form.edit.edit, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
     assert heard.listen(timeout_s=20.0) == (True, {"x": 0})
@@ -123,7 +123,7 @@ def test_stop_source_change_and_closing_disarm(window, panel) -> None:
         assert not acting.arming.is_on
     acting.arm()
     acting.allow(Target("topic", "/cmd_vel"))
-    window.session.sources_shown += 1
+    window.session.source_revision += 1
     ticks(window, panel)
     assert not acting.arming.is_on
 
@@ -142,8 +142,8 @@ def test_robot_command_topic_asks_for_confirmation_again(window, panel) -> None:
     session, acting = window.session, acting_of(window)
     topic = session.fleet.connected[0].robot.topics.command
     heard = session.source.listen(topic, "json")
-    acting.shelf.put(replace(STILL, topic=topic))
-    panel.list.choose("b")
+    acting.shelf.set_message(replace(STILL, topic=topic))
+    panel.list.select_key("b")
     ticks(window, panel)
     press(panel.form.send)
     ticks(window, panel)
@@ -183,7 +183,7 @@ def test_real_robot_is_not_moved_without_permission(window, panel) -> None:
 
 
 def test_last_message_is_the_template(window, panel) -> None:
-    panel.begin("/blackboard")
+    panel.open_for("/blackboard")
     assert panel.message is not None
     assert (panel.message.topic, panel.message.msg_type) == ("/blackboard", "json")
     assert panel.form.template.text() == "Waiting for per message"
@@ -194,12 +194,12 @@ def test_last_message_is_the_template(window, panel) -> None:
     assert kept.payload() == {"mood": "happy", "n": [1, 2]}
     assert panel.form.template.text() == "Use the last message"
     assert window.session.watched == []
-    panel.begin("/blackboard")
+    panel.open_for("/blackboard")
     assert panel.message == kept, "one that is kept is shown again"
 
 
 def test_without_a_publisher_the_message_type_is_the_template(window, panel) -> None:
-    panel.list.choose("b")
+    panel.list.select_key("b")
     panel.form.topic.setText("/nowhere")
     panel.form.kind.clear()
     QTest.keyClicks(panel.form.kind, "geometry_msgs/Point")
@@ -219,7 +219,7 @@ def test_topic_names_are_suggested_and_their_type_is_adopted(panel) -> None:
 
 
 def test_messages_are_copied_deleted_and_restored_by_undo(window, panel) -> None:
-    panel.list.choose("b")
+    panel.list.select_key("b")
     QTest.keyClick(panel.list, Qt.Key.Key_D, Qt.KeyboardModifier.ControlModifier)
     names = [each.name for each in acting_of(window).shelf.messages]
     assert names == ["Look at Aiko", "Stand still", "Stand still 2"]

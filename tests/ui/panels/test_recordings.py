@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QMenu
 
 from app.core.recording.client import RecorderState
-from app.core.recording.replay.scale import clock_words
+from app.core.recording.replay.scale import clock_text
 from app.ui.panels.alarms import panel as alarms
 from app.ui.panels.recordings import PANEL
 from app.ui.panels.recordings import panel as panel_module
@@ -18,9 +18,9 @@ from app.ui.panels.recordings.columns import badge_of
 from app.ui.panels.recordings.panel import RecordingsPanel
 from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.topics import panel as topics
-from app.ui.text.numbers import grouped, size_words
+from app.ui.text.numbers import group_digits, size_text
 from app.ui.widgets import Button
-from nep.programs.alarms.history import AlarmDeed, AlarmRecord
+from nep.programs.alarms.history import ActionResult, AlarmRecord
 from nep.recordings.writer import RecordingWriter
 from tests.nep.recordings.messages import TestClock, json_message, limits, picture, record
 from tests.ui.fakes import Session
@@ -75,7 +75,7 @@ def seen(qtbot, panel: RecordingsPanel, *wanted: str) -> None:
 def choose(panel: RecordingsPanel, folder: Path, name: str) -> RecordingTable:
     table = panel.table
     assert isinstance(table, RecordingTable)
-    table.choose(str(folder / f"{name}.mcap"))
+    table.select_key(str(folder / f"{name}.mcap"))
     table.setFocus()
     return table
 
@@ -91,7 +91,7 @@ def test_each_recording_is_listed_with_its_facts_and_badges(qtbot, panel, window
     cells = [panel.model.cell_at(row.row(), place) for place in range(panel.model.columnCount())]
     assert cells[0].said == "arm, first try"
     assert [cell.text for cell in cells[4:]] == ["5", "0"]
-    qtbot.waitUntil(lambda: panel._take_pictures() or bool(panel._pictures))
+    qtbot.waitUntil(lambda: panel._collect_thumbnails() or bool(panel._pictures))
     choose(panel, folder, "arm")
     assert panel.details.counts.text() == "1 topic, 5 messages"
     assert not list(unsaid(panel))
@@ -102,7 +102,7 @@ def test_thumbnails_are_decoded_in_another_thread(qtbot, panel, folder):
     (facts,) = (each for each in panel._look.files if each.path.stem == "camera")
 
     def is_drawn() -> bool:
-        panel._take_pictures()
+        panel._collect_thumbnails()
         return panel._picture(facts) is not None
 
     qtbot.waitUntil(is_drawn)
@@ -138,7 +138,7 @@ def test_f2_renames_in_place_and_never_overwrites(qtbot, panel, window, folder):
         "Arm second try.mcap", "Arm second try.mcap.bookmarks.json", "camera.mcap", "cut.mcap",
     ]  # fmt: skip
     seen(qtbot, panel, "Arm second try", "camera", "cut")
-    assert table.chosen_key() == str(folder / "Arm second try.mcap")
+    assert table.selected_key() == str(folder / "Arm second try.mcap")
     QTest.keyClick(table, Qt.Key.Key_F2)
     QTest.keyClick(table.field, Qt.Key.Key_Escape)
     assert table.field is None
@@ -220,11 +220,13 @@ def test_time_range_and_topics_to_export_are_chosen_by_mouse_and_keys(qtbot, pan
     qtbot.waitUntil(is_there)
     assert details.part_words.text() == "3 of 3 topics"
     sizes = [sum(each.size_bytes for each in messages[first::2]) for first in range(2)]
-    whole, shown = picture(1).size_bytes, size_words(sum(sizes))
-    assert details.about.text() == f"{grouped(1000)} messages, about {shown}"  # a picture can be no table
+    whole, shown = picture(1).size_bytes, size_text(sum(sizes))
+    assert (
+        details.about.text() == f"{group_digits(1000)} messages, about {shown}"
+    )  # a picture can be no table
     details.format.set_value("mcap")
     details.format.changed.emit("mcap")
-    assert details.about.text() == f"{grouped(1001)} messages, about {size_words(sum(sizes) + whole)}"
+    assert details.about.text() == f"{group_digits(1001)} messages, about {size_text(sum(sizes) + whole)}"
     details.format.set_value("csv")
     details.format.changed.emit("csv")
     qtbot.waitUntil(lambda: strip.height() == strip.sizeHint().height())
@@ -233,13 +235,13 @@ def test_time_range_and_topics_to_export_are_chosen_by_mouse_and_keys(qtbot, pan
     assert strip._images.count(None) < len(strip._images)
     QTest.keyClick(strip.begin, Qt.Key.Key_Right)
     QTest.keyClick(strip.begin, Qt.Key.Key_Right)
-    place = QPoint(round(strip._x(strip.look.start_ns + 6 * 10**9)), 30)
+    place = QPoint(round(strip._x_of(strip.look.start_ns + 6 * 10**9)), 30)
     QTest.mouseClick(strip, Qt.MouseButton.LeftButton, pos=place)
     assert abs(strip.end_ns - strip.look.start_ns - 6 * 10**9) < 10**8
     strip.set_part(strip.begin_ns, strip.look.start_ns + 6 * 10**9)
     QTest.keyClicks(details.topics.edit, "/a ")
     assert details.part_words.text() == "0:02.0 to 0:06.0, 1 of 3 topics"
-    assert details.about.text() == f"about 200 messages, {size_words(sizes[0] * 200 / 500)}"
+    assert details.about.text() == f"about 200 messages, {size_text(sizes[0] * 200 / 500)}"
     assert details.into.text() == f"{folder.name}/long, 0.02.0 to 0.06.0, CSV"
     assert details.files.text() == "1 file"
     window.answers.path = tmp_path
@@ -263,9 +265,13 @@ def test_time_range_and_topics_to_export_are_chosen_by_mouse_and_keys(qtbot, pan
     details.topics.show_patterns((), ())
     details.topics.changed.emit()
     details.pick.setChecked(True)  # the same from a list
-    assert [details.list.model.key_of(topic) for topic in details.list._shown()] == ["/a", "/b", "/camera"]
+    assert [details.list.model.key_of(topic) for topic in details.list._matching_topics()] == [
+        "/a",
+        "/b",
+        "/camera",
+    ]
     rows = [details.list.model.index(row, 4).data() for row in range(details.list.model.rowCount())]
-    assert rows == [size_words(each) for each in (*sizes, whole)]
+    assert rows == [size_text(each) for each in (*sizes, whole)]
     details.list.table.opened.emit("/a")
     assert details.topics.patterns() == ((), ("/a",))
     assert details.part_words.text().endswith("2 of 3 topics")
@@ -284,13 +290,13 @@ def test_time_range_and_topics_to_export_are_chosen_by_mouse_and_keys(qtbot, pan
     assert details.list._names == {"/a"}
     details.times.set_value("clock")
     details.times.changed.emit("clock")
-    begin, end = (clock_words(at_ns, digits=1) for at_ns in (strip.begin_ns, strip.end_ns))
+    begin, end = (clock_text(at_ns, digits=1) for at_ns in (strip.begin_ns, strip.end_ns))
     assert details.part_words.text() == f"{begin} to {end}, 1 of 3 topics"
     assert strip.begin.accessibleDescription() == begin
     QTest.keyClick(strip.end, Qt.Key.Key_Home)  # a handle stops at the other one
     assert strip.begin_ns == strip.end_ns
     QTest.mouseDClick(strip.begin, Qt.MouseButton.LeftButton)
-    assert strip.is_whole
+    assert strip.is_all_selected
     assert not list(unsaid(panel))
 
 
@@ -325,11 +331,11 @@ def test_recording_saved_by_an_alarm_is_opened_from_its_history(qtbot, window, f
     for widget in panel.header_widgets():
         qtbot.addWidget(widget)
     assert isinstance(panel, alarms.AlarmsPanel)
-    kept = AlarmDeed("keep", "kept alarm-2026-11-26-22-01-05.mcap")
-    panel.alarms.history.add(AlarmRecord("r", "/camera is silent", panel.now_s(), deeds=[kept]))
+    kept = ActionResult("keep", "kept alarm-2026-11-26-22-01-05.mcap")
+    panel.alarms.history.add(AlarmRecord("r", "/camera is silent", panel.now_s(), action_results=[kept]))
     panel.refresh()
     index = panel.model.index(0, 0)
-    panel.table.menu_wanted.emit(
+    panel.table.menu_requested.emit(
         panel.model.key_of(panel.model.row_at(index)), panel.table.mapToGlobal(QPoint())
     )
     menu = QApplication.activePopupWidget()

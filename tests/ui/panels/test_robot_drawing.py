@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter
 
-from app.ui.robot_drawing.bubble import paint_bubble, scrolled, wrapped
+from app.ui.robot_drawing.bubble import paint_bubble, scroll_to_spoken, wrap_text
 from app.ui.robot_drawing.pepper import EMOTIONS
 from app.ui.robot_drawing.room import Spot, Stage
 from app.ui.robot_drawing.scene import PREVIEW, RobotDrawing
@@ -99,32 +99,32 @@ def test_robot_turns_to_its_left_which_is_right_for_the_viewer(qapp) -> None:
 def test_hit_test_finds_parts_where_they_are_drawn(qapp, part, size) -> None:
     area, pen = QRectF(0, 0, *size), RobotDrawing()
     state = replace(PREVIEW, arm_left_deg=100.0)
-    place = pen.place_of(part, area, state)
+    place = pen.point_of(part, area, state)
     assert place is not None
     assert pen.part_at(place, area, state) == part
     assert pen.part_at(QPointF(2, 2), area, state) is None
-    assert pen.place_of("nobody", area, state) is None
+    assert pen.point_of("nobody", area, state) is None
 
 
 @pytest.mark.parametrize("place", [(0.0, 0.0), (-2.0, 1.5), (2.4, -2.0), (1.2, 0.3)])
 def test_floor_position_is_mapped_back_from_the_screen(place) -> None:
     stage = Stage(AREA, RoomBounds())
-    spot = stage.spot(*place)
-    x, y = stage.floor(stage.origin + QPointF(spot.u, spot.v) * stage.scale)
+    spot = stage.spot_at(*place)
+    x, y = stage.floor_at(stage.origin + QPointF(spot.u, spot.v) * stage.scale)
     assert (x, y) == (pytest.approx(place[0]), pytest.approx(place[1]))
 
 
 def test_nearer_objects_are_lower_and_larger() -> None:
     stage = Stage(AREA, RoomBounds())
-    far, near = stage.spot(-2, 0), stage.spot(2, 0)
+    far, near = stage.spot_at(-2, 0), stage.spot_at(2, 0)
     assert near.v > far.v
     assert near.scale > far.scale
-    assert stage.spot(0, 2).u > stage.spot(0, -2).u
+    assert stage.spot_at(0, 2).u > stage.spot_at(0, -2).u
 
 
 def test_message_is_parsed_into_a_state_and_invalid_fields_keep_their_defaults() -> None:
     state = RobotState.parse(drawing(x=1.5, touched=["head"], speech="  "))
-    assert (state.x, state.touched, state.speech) == (1.5, ("head",), None)
+    assert (state.x, state.touched_parts, state.speech) == (1.5, ("head",), None)
     assert state.objects[0].kind == "ball"
     assert state.room == RoomBounds(-3, 3, -2.5, 2.5)
     broken = RobotState.parse(
@@ -142,7 +142,7 @@ LONG = "Once upon a time there was a small robot. " * 11 + "end"
 @pytest.mark.parametrize("words", ["Hello", LONG, "x" * 300, "a " * 200, f"{'y' * 80} and {'z' * 3}"])
 def test_wrapped_speech_keeps_all_words_within_the_bubble(qapp, words, width) -> None:
     metrics = QFontMetricsF(QFont())
-    lines = wrapped(words, metrics, width)
+    lines = wrap_text(words, metrics, width)
     assert "".join(lines).replace(" ", "") == words.replace(" ", "")
     assert all(metrics.horizontalAdvance(line) <= width for line in lines)
 
@@ -151,15 +151,15 @@ def test_long_speech_scrolls_with_the_spoken_line() -> None:
     lines = [f"line {number:02}" for number in range(20)]
     seen: dict[str, None] = {}
     for step in range(101):
-        text = scrolled(lines, 6, step / 100)
+        text = scroll_to_spoken(lines, 6, step / 100)
         spoken = lines[min(19, int(step / 100 * 20))]
-        assert spoken in text.visible
-        assert len(text.visible) == 6
-        seen.update(dict.fromkeys(text.visible))
+        assert spoken in text.visible_lines
+        assert len(text.visible_lines) == 6
+        seen.update(dict.fromkeys(text.visible_lines))
     assert list(seen) == lines
-    assert scrolled(lines, 6, 0.0).first == 0
-    assert scrolled(["one"], 6, 0.5).visible == ["one"]
-    assert len(scrolled(lines, 0, 0.5).visible) == 1
+    assert scroll_to_spoken(lines, 6, 0.0).first == 0
+    assert scroll_to_spoken(["one"], 6, 0.5).visible_lines == ["one"]
+    assert len(scroll_to_spoken(lines, 0, 0.5).visible_lines) == 1
 
 
 @pytest.mark.parametrize("size", [(382, 286), (900, 300), (200, 150)])
@@ -167,7 +167,7 @@ def test_long_speech_scrolls_with_the_spoken_line() -> None:
 def test_long_bubble_stays_inside_the_drawing_and_scrolls(qapp, size, place) -> None:
     area = QRectF(0, 0, *size)
     told = RobotState(x=place[0], y=place[1], speech=LONG)
-    begun, ended = (painted(replace(told, spoken=spoken), area) for spoken in (0.0, 1.0))
+    begun, ended = (painted(replace(told, spoken_fraction=spoken), area) for spoken in (0.0, 1.0))
     assert differing(begun, ended) > 0
     edges = [(x, y) for x in (0, size[0] - 1) for y in range(size[1])]
     silent = painted(replace(told, speech=None), area)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.robots.voices import SOUND, Utterance
+from app.core.robots.voices import SOUND_SETTING, Utterance
 from app.robots.virtual.body import Body
-from app.robots.virtual.simulation import drawable
+from app.robots.virtual.simulation import drawing_state
 from app.ui.panels.robot.panel import PANEL, RobotPanel
 from app.ui.robot_drawing.state import RobotState
 from tests.core.robots.test_voices import FakeSpeaker
@@ -30,10 +30,10 @@ def panel(qtbot, window) -> RobotPanel:
 def test_mute_setting_is_saved(panel, window) -> None:
     assert panel.sound.accessibleName() == "Mute the robots"
     press(panel.sound)
-    heard = window.session.settings.get(SOUND, True)
+    heard = window.session.settings.get(SOUND_SETTING, True)
     assert (heard, panel.sound.accessibleName()) == (False, "Unmute the robots")
     press(panel.sound)
-    assert window.session.settings.get(SOUND, False)
+    assert window.session.settings.get(SOUND_SETTING, False)
 
 
 def test_mute_button_shows_why_robots_are_silent(panel, window) -> None:
@@ -58,11 +58,11 @@ def test_sound_is_shown_in_a_bubble_beside_its_name() -> None:
 def test_sound_bubble_is_painted(panel, window) -> None:
     body = Body()
     link = window.session.fleet.links[0]
-    link.drawing = drawable(body)
+    link.drawing = drawing_state(body)
     panel.refresh()
     silent = panel.view.grab().toImage()
     body.play("bell", ((880, 0.3),))
-    link.drawing = drawable(body)
+    link.drawing = drawing_state(body)
     panel.refresh()
     assert panel.view.grab().toImage() != silent
     assert panel.view.accessibleDescription() == "♪\N{NO-BREAK SPACE}bell"

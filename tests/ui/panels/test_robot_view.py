@@ -33,7 +33,7 @@ def panel(qtbot, window) -> RobotPanel:
 
 
 def point(panel: RobotPanel, part: str):
-    place = panel.view.place_of(part)
+    place = panel.view.position_of(part)
     assert place is not None
     return place.toPoint()
 
@@ -73,9 +73,9 @@ def test_silent_robot_is_grey_and_its_speech_bubble_disappears(panel, window, mo
     if how == "old":
         monkeypatch.setattr(time, "monotonic", lambda: now + STALE_AFTER_S + 0.1)
     elif how == "mute":
-        link.mute = True
+        link.is_unresponsive = True
     else:
-        link.connected = False
+        link.is_connected = False
     panel.refresh()
     assert panel.view.stale
     assert panel.view.accessibleDescription() == ""
@@ -84,7 +84,7 @@ def test_silent_robot_is_grey_and_its_speech_bubble_disappears(panel, window, mo
     panel.view.show_state(link.drawing)
     assert panel.view.grab().toImage() == grey  # there is no bubble
     monkeypatch.undo()
-    link.connected, link.mute, link.drawing = True, False, drawing(speech="Hello!")
+    link.is_connected, link.is_unresponsive, link.drawing = True, False, drawing(speech="Hello!")
     panel.refresh()
     assert panel.view.grab().toImage() == speaking
     assert panel.view.accessibleDescription() == "Hello!"
@@ -188,7 +188,7 @@ def test_robot_without_a_drawing_lists_only_its_capabilities(qtbot, kept, words)
 def test_run_resets_to_the_start_position_and_a_tried_block_does_not(qapp, is_tried: bool) -> None:
     session = Session.full()
     turn = block("robot_virtual_pepper_do_turn", "t", ROBOT="Pepper", DIRECTION="left", ANGLE=number(90))
-    session.document.edited(workspace(started(turn)))
+    session.document.apply_edit(workspace(started(turn)))
     if is_tried:
         session.runs.try_stack(Stack("t"))
     else:

@@ -10,9 +10,9 @@ from PySide6.QtTest import QTest
 
 from app.core.robots.known import KEY
 from app.robots.description.model import DataField
-from app.ui.panels.robots.list import seen_words
+from app.ui.panels.robots.list import seen_text
 from app.ui.panels.robots.panel import PANEL, RobotsPanel
-from app.ui.panels.robots.tries import feedback_words, progress_of
+from app.ui.panels.robots.tries import feedback_text, progress_of
 from app.ui.widgets.inputs.fields import LongText
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, press
@@ -103,8 +103,8 @@ def test_feedback_is_labelled_by_the_robot_description() -> None:
     walk = next(action for action in ACTIONS if action.name == "walk")
     fields = DataField("to_go", "to go", "number", "m"), DataField("word", "word", "text")
     walk = replace(walk, feedback=fields)
-    assert feedback_words(walk, {"to_go": 0.301, "progress": 0.5, "other": 1}) == "0.30 m to go"
-    assert feedback_words(walk, {"word": "hello"}) == "“hello”"
+    assert feedback_text(walk, {"to_go": 0.301, "progress": 0.5, "other": 1}) == "0.30 m to go"
+    assert feedback_text(walk, {"word": "hello"}) == "“hello”"
     assert progress_of(walk, {"distance": 0.5}, {"progress": 0.25}) == 0.25
     assert progress_of(walk, {"distance": -0.5}, {"to_go": -0.2}) == pytest.approx(0.6)
     assert progress_of(walk, {}, {"to_go": 0.2}) is None
@@ -138,7 +138,7 @@ def test_later_cards_are_collapsed_and_summarise_their_values(panel) -> None:
 def test_stop_stops_the_selected_robot(panel, window) -> None:
     assert panel.stop.text() == "Stop Pepper"
     press(panel.stop)
-    assert window.session.fleet.stopping == ("Pepper",)
+    assert window.session.fleet.stopping_robots == ("Pepper",)
 
 
 def test_another_robot_can_be_selected_and_only_that_one_is_watched(panel, window) -> None:
@@ -201,12 +201,12 @@ def test_without_connected_robots_known_ones_are_listed_in_the_empty_state(qtbot
 def test_disconnected_robot_shows_when_it_was_seen_and_is_removed_when_forgotten(panel, window) -> None:
     fleet = window.session.fleet
     link = window.session.join(pepper("Rover"), virtual=False)
-    fleet.known.saw([link.robot])
-    link.connected = False
+    fleet.known.record([link.robot])
+    link.is_connected = False
     fleet.revision += 1
     panel.refresh()
     assert panel.items["Rover"].where.startswith("seen today")
-    panel.choose("Rover")
+    panel.select_robot("Rover")
     panel.list.menu_of(panel.items["Rover"]).actions()[1].trigger()
     assert list(panel.items) == ["Pepper"]
     assert panel.name.text() == "Pepper"
@@ -226,4 +226,4 @@ def test_connected_robot_has_no_menu(panel) -> None:
 )
 def test_last_seen_time_is_formatted_in_plain_words(now, words) -> None:
     seen = dt.datetime(2026, 11, 20, 16, 20, tzinfo=dt.timezone.utc)
-    assert seen_words(seen.timestamp(), dt.datetime(*now, tzinfo=dt.timezone.utc)) == words
+    assert seen_text(seen.timestamp(), dt.datetime(*now, tzinfo=dt.timezone.utc)) == words

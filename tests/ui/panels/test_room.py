@@ -8,14 +8,14 @@ from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QMainWindow, QMenu
 
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT as PEPPER
 from app.robots.turtle import ROBOT as TURTLE
 from app.robots.virtual.body import Body
 from app.robots.virtual.room import Room
-from app.robots.virtual.simulation import drawable, surroundings
+from app.robots.virtual.simulation import drawing_state, room_state
 from app.ui.panels.robot.large_room import LargeRoom
-from app.ui.panels.robot.panel import ADDED, PANEL, RobotPanel
+from app.ui.panels.robot.panel import ADDABLE_THINGS, PANEL, RobotPanel
 from app.ui.widgets import IconButton
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, has_keys, press
@@ -27,7 +27,7 @@ LEFT = Qt.MouseButton.LeftButton
 def of_turtle(**more: object) -> dict[str, object]:
     return {
         "figure": "turtle", "x": 0.9, "y": -1.2, "theta_deg": 35.0, "moving": False, "held": False,
-        **surroundings(Room()), **more,
+        **room_state(Room()), **more,
     }  # fmt: skip
 
 
@@ -35,8 +35,8 @@ def of_turtle(**more: object) -> dict[str, object]:
 def window(qapp) -> Window:
     made = Window(Session())
     for kind, name in ((PEPPER, "Pepper"), (TURTLE, "Turtle")):
-        made.session.join(parse(td_for(kind.thing_model, name)))
-    made.session.fleet.links[0].drawing = drawable(Body())
+        made.session.join(parse(thing_description(kind.thing_model, name)))
+    made.session.fleet.links[0].drawing = drawing_state(Body())
     made.session.fleet.links[1].drawing = of_turtle()
     return made
 
@@ -52,7 +52,7 @@ def panel(qtbot, window) -> RobotPanel:
 
 
 def point(panel: RobotPanel, part: str) -> QPoint:
-    place = panel.view.place_of(part)
+    place = panel.view.position_of(part)
     assert place is not None
     return place.toPoint()
 
@@ -74,7 +74,7 @@ def thing(window: Window, name: str) -> tuple[float, float]:
 
 def test_both_robots_are_in_one_drawing(panel, window) -> None:
     both = panel.view.grab().toImage()
-    assert panel.view.place_of("Turtle/body") is not None
+    assert panel.view.position_of("Turtle/body") is not None
     window.session.fleet.links[1].drawing = of_turtle(x=0.2, y=1.5)
     panel.refresh()
     assert panel.view.grab().toImage() != both
@@ -209,7 +209,7 @@ def test_objects_are_added_removed_and_restored(panel, window) -> None:
     )
     choose(panel, "Remove ball 2")
     assert window.session.room.room.thing("ball 2") is None
-    for words, _icon in ADDED.values():
+    for words, _icon in ADDABLE_THINGS.values():
         press(panel.add)
         choose(panel, words)
     room = window.session.room.room

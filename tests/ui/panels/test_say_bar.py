@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu
 
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.robots.simulated import ROBOT
 from app.ui.panels.robot.panel import PANEL, RobotPanel
 from tests.ui.fakes import Session
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|
 @pytest.fixture
 def window(qapp) -> Window:
     made = Window(Session())
-    made.session.join(parse(td_for(ROBOT.thing_model, "Pepper")))
+    made.session.join(parse(thing_description(ROBOT.thing_model, "Pepper")))
     made.session.fleet.links[0].drawing = drawing()
     return made
 

@@ -6,7 +6,7 @@ from app.robots.description.inputs import Choice
 from app.robots.description.model import DataField, Sensor
 from app.ui.panels import sensors
 from app.ui.panels.sensors import PANEL, SensorsPanel
-from app.ui.text.sensor_values import ReadingWords, number_words, reading_of
+from app.ui.text.sensor_values import ReadingText, quantity_text, reading_text
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window
 from tests.ui.sample_data import pepper
@@ -19,39 +19,39 @@ POSE = Sensor("pose", "position", "object", "/p", fields=(
 @pytest.mark.parametrize(
     ("sensor", "value", "reading"),
     [
-        (Sensor("t", "touch", "boolean", "/t"), True, ReadingWords("yes")),
-        (Sensor("t", "touch", "boolean", "/t"), False, ReadingWords("no")),
-        (Sensor("t", "touch", "boolean", "/t"), None, ReadingWords()),
-        (Sensor("d", "d", "number", "/d", "m", 0, 2), 0.82, ReadingWords("0.82 m", share=0.41)),
-        (Sensor("d", "d", "number", "/d", "m", 0, 2), 7.0, ReadingWords("7 m", share=1.0)),
-        (Sensor("d", "d", "number", "/d", "dB"), 34.04, ReadingWords("34.0 dB")),
-        (Sensor("b", "b", "integer", "/b", "%", 0, 100), 84, ReadingWords("84 %", share=0.84)),
-        (Sensor("w", "word", "text", "/w"), "hello", ReadingWords("“hello”")),
-        (Sensor("w", "word", "text", "/w"), "", ReadingWords("")),
-        (Sensor("c", "c", "choice", "/c", choices=(Choice("en", "English"),)), "en", ReadingWords("English")),
-        (POSE, {"x": 1.284, "y": -0.307, "theta": 31.2}, ReadingWords("1.3, \u22120.3 m", "facing 31°")),
-        (POSE, {}, ReadingWords("", "")),
+        (Sensor("t", "touch", "boolean", "/t"), True, ReadingText("yes")),
+        (Sensor("t", "touch", "boolean", "/t"), False, ReadingText("no")),
+        (Sensor("t", "touch", "boolean", "/t"), None, ReadingText()),
+        (Sensor("d", "d", "number", "/d", "m", 0, 2), 0.82, ReadingText("0.82 m", fraction=0.41)),
+        (Sensor("d", "d", "number", "/d", "m", 0, 2), 7.0, ReadingText("7 m", fraction=1.0)),
+        (Sensor("d", "d", "number", "/d", "dB"), 34.04, ReadingText("34.0 dB")),
+        (Sensor("b", "b", "integer", "/b", "%", 0, 100), 84, ReadingText("84 %", fraction=0.84)),
+        (Sensor("w", "word", "text", "/w"), "hello", ReadingText("“hello”")),
+        (Sensor("w", "word", "text", "/w"), "", ReadingText("")),
+        (Sensor("c", "c", "choice", "/c", choices=(Choice("en", "English"),)), "en", ReadingText("English")),
+        (POSE, {"x": 1.284, "y": -0.307, "theta": 31.2}, ReadingText("1.3, \u22120.3 m", "facing 31°")),
+        (POSE, {}, ReadingText("", "")),
         (Sensor("f", "faces", "detections", "/f"), {"count": 1, "name": "Aiko", "items": []},
-        ReadingWords("1", "Aiko")),
+        ReadingText("1", "Aiko")),
         (Sensor("f", "faces", "detections", "/f"), {"items": [{"name": "a"}, {"name": "b"}]},
-        ReadingWords("2", "a, b")),
-        (Sensor("l", "list", "list", "/l"), ["x", "y"], ReadingWords("2", "x, y")),
+        ReadingText("2", "a, b")),
+        (Sensor("l", "list", "list", "/l"), ["x", "y"], ReadingText("2", "x, y")),
     ],
 )  # fmt: skip
-def test_sensor_value_is_formatted_in_words(sensor: Sensor, value: object, reading: ReadingWords) -> None:
-    found = reading_of(sensor, value)
-    assert (found.value, found.beside) == (reading.value, reading.beside)
-    assert found.share == (pytest.approx(reading.share) if reading.share is not None else None)
+def test_sensor_value_is_formatted_in_words(sensor: Sensor, value: object, reading: ReadingText) -> None:
+    found = reading_text(sensor, value)
+    assert (found.value, found.details) == (reading.value, reading.details)
+    assert found.fraction == (pytest.approx(reading.fraction) if reading.fraction is not None else None)
 
 
 def test_numbers_have_significant_decimals() -> None:
-    assert [number_words(value, "m") for value in (1.0, -0.3, 12.34, 123.4)] == [
+    assert [quantity_text(value, "m") for value in (1.0, -0.3, 12.34, 123.4)] == [
         "1 m",
         "\u22120.30 m",
         "12.3 m",
         "123 m",
     ]
-    assert number_words(31, "°") == "31°"
+    assert quantity_text(31, "°") == "31°"
 
 
 @pytest.fixture
@@ -97,11 +97,11 @@ def test_values_are_updated_and_the_last_true_is_remembered(qtbot, window, monke
     touch = panel.rows[0]
     values["head_touched"] = True
     panel.refresh()
-    assert touch.reading == ReadingWords("yes")
+    assert touch.reading == ReadingText("yes")
     values["head_touched"] = False
     now[0] = 114.3
     panel.refresh()
-    assert touch.reading == ReadingWords("no", "14 s ago")
+    assert touch.reading == ReadingText("no", "14 s ago")
     assert touch.accessibleDescription() == "no 14 s ago"
 
 
@@ -109,9 +109,9 @@ def test_disconnected_robot_shows_no_sensor_values(qtbot, window) -> None:
     panel = window.make(PANEL, (384, 300))
     qtbot.addWidget(panel)
     assert isinstance(panel, SensorsPanel)
-    window.session.fleet.links[0].connected = False
+    window.session.fleet.links[0].is_connected = False
     panel.refresh()
-    assert {row.reading for row in panel.rows} == {ReadingWords()}
+    assert {row.reading for row in panel.rows} == {ReadingText()}
 
 
 def test_rows_with_different_values_are_painted_differently(qtbot, window) -> None:

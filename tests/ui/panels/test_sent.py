@@ -9,7 +9,7 @@ from PySide6.QtGui import QGuiApplication
 
 from app.core.run.acting.arming import Target
 from app.core.run.acting.sent_log import SentRecord
-from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.shelf import SavedMessage
 from app.ui.panels.sent import PANEL, SentPanel
 from tests.pseudo import untranslated_in
 from tests.ui.clipping import clipped
@@ -18,7 +18,7 @@ from tests.ui.panel_case import OUT_OF_SIGHT, Window, button, press, ticks
 from tests.ui.test_accessible import unsaid
 
 pytestmark = pytest.mark.qt_log_ignore("does not support (grabbing the keyboard|raise)", extend=True)
-WORD = KeptMessage("a", "Word", "/words", "json", '{"word": "yes"}')
+WORD = SavedMessage("a", "Word", "/words", "json", '{"word": "yes"}')
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def rows(panel: SentPanel) -> list[list[str]]:
 
 
 def sign(panel: SentPanel, row: int) -> str:
-    return panel.table.cell_at(row, 1).said
+    return panel.table.cell_at(row, 1).accessible_text
 
 
 def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -> None:
@@ -62,14 +62,14 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     assert unsaid(panel) == []
     key = panel.model.key_of(panel.model.row_at(panel.model.index(0, 0)))
     assert not panel.again.isEnabled()
-    panel.table.choose(key)
+    panel.table.select_key(key)
     panel.refresh()
     assert panel.again.isEnabled()
     press(panel.again)
     assert heard.listen(timeout_s=20.0) == (True, {"word": "yes"})
     ticks(window, panel)
     assert rows(panel)[0] == ["/words", "Word, received by 1", "\u00d7 2", "Publish"]
-    assert panel.chosen() is not None, "what is chosen stays chosen"
+    assert panel.selected() is not None, "what is chosen stays chosen"
 
     panel.copy()
     line = QGuiApplication.clipboard().text()
@@ -91,7 +91,7 @@ def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -
     assert menu is not None
     again = menu.actions()[0]
     assert (again.text(), again.isEnabled()) == ("Send again (not armed)", False)
-    panel.table.choose(key)
+    panel.table.select_key(key)
     panel.repeat()
     assert window.toasts[-1] == "Sending to /words is not armed. Arm it first."
     assert heard.receive(0.0) is None
@@ -111,7 +111,7 @@ def put_all(session: Session) -> None:
     ):
         text = '{"n": 1}' if asker != "replay" else ""
         again = str if asker != "replay" else None
-        sent.put(SentRecord(float(number), asker, name, "1", number % 2 > 0, text, text, again), 1)  # type: ignore[arg-type]
+        sent.add(SentRecord(float(number), asker, name, "1", number % 2 > 0, text, text, again), 1)  # type: ignore[arg-type]
     session.acting.arm()
 
 

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QLineEdit
 from app.core.run.acting.arming import Target
 from app.ui.panels.row_actions import service_actions
 from app.ui.panels.services import PANEL
-from app.ui.panels.services.answer import MAX_ROWS, TEXT_LETTERS, answer_rows
+from app.ui.panels.services.answer import MAX_ROWS, MAX_TEXT_CHARS, reply_rows
 from app.ui.panels.services.panel import ServicesPanel
 from app.ui.widgets import Switch
 from nep.protocol.graph_view import ServerInfo, ServiceInfo
@@ -43,7 +43,7 @@ def offer(session: Session, **services: str) -> None:
 def window(qapp) -> Window:
     session = Session.full()
     offer(session, remember_face="1", forget_face="1", set_language="2")
-    session.acting.shelf.remember("remember_face", REQUEST)
+    session.acting.shelf.set_request("remember_face", REQUEST)
     return Window(session)
 
 
@@ -54,7 +54,7 @@ def panel(qtbot, window) -> ServicesPanel:
     for widget in made.header_widgets():
         qtbot.addWidget(widget)
     assert isinstance(made, ServicesPanel)
-    made.list.choose("remember_face")
+    made.list.select_key("remember_face")
     return made
 
 
@@ -63,13 +63,13 @@ def answered(window: Window, panel: ServicesPanel, qtbot) -> None:
 
     def is_over() -> bool:
         ticks(window, panel)
-        return window.session.acting.calls.waiting is None
+        return window.session.acting.calls.in_flight is None
 
     qtbot.waitUntil(is_over, timeout=30_000)
 
 
 def test_services_are_listed_with_their_nodes_and_without_parameter_services(panel) -> None:
-    names = [panel.list.cell_at(row, 0).said for row in range(panel.list.model().rowCount())]
+    names = [panel.list.cell_at(row, 0).accessible_text for row in range(panel.list.model().rowCount())]
     assert names == [
         "forget_face, camera_driver",
         "remember_face, camera_driver",
@@ -92,13 +92,13 @@ def test_form_is_built_from_the_last_request_and_edits_its_json(panel) -> None:
         QTest.keyClicks(field, text)
         assert panel.form.fields[name] is field, "the keyboard stays"
     press(fields["replace"])
-    assert panel._read().filled({}) == {
+    assert panel._parse_text().fill({}) == {
         "name": "Grey Ada", "pictures": 30, "quality": 1, "replace": False, "box": {"x": 1},
     }  # fmt: skip
-    press(panel.way.findChildren(type(panel.way.chosen_button()))[1])
+    press(panel.way.findChildren(type(panel.way.selected_button()))[1])
     assert panel.edit.isVisible()
     panel.edit.set_text('{"name": "Bo"}')
-    panel._turn("form")
+    panel._set_mode("form")
     assert list(panel.form.fields) == ["name"]
 
 
@@ -113,13 +113,13 @@ def test_invalid_field_is_reported_and_disables_the_call(panel) -> None:
     QTest.keyClicks(field, "3")
     assert panel.sentence.text() == ""
     assert panel.call_button.isEnabled()
-    panel._turn("json")
+    panel._set_mode("json")
     panel.edit.set_text("{'name': 1}")
     assert panel.sentence.text().startswith("Line 1, column 2: ")
     press(panel.fix)
     assert panel.edit.text() == '{"name": 1}'
     panel.edit.set_text("[1]")
-    panel._turn("form")
+    panel._set_mode("form")
     assert panel.way.value == "json", "a list has no fields"
 
 
@@ -135,7 +135,7 @@ def test_call_shows_reply_duration_and_history(window, panel, qtbot) -> None:
     assert panel.call_button.text() == "Arm and call"
     press(panel.call_button)
     answered(window, panel, qtbot)
-    assert asked == [panel._read().filled({})]
+    assert asked == [panel._parse_text().fill({})]
     assert session.acting.arming.targets == (Target("service", "remember_face"),)
     rows = panel.answer.model
     shown = [(rows.cell_at(row, 0).text, rows.cell_at(row, 1).text) for row in range(rows.rowCount())]
@@ -143,7 +143,7 @@ def test_call_shows_reply_duration_and_history(window, panel, qtbot) -> None:
     assert panel.answer.chip.text.startswith("replied in ")
     assert panel.answer.facts.text().endswith("B")
     panel.answer.way.set_value("json")
-    panel.answer._turn("json")
+    panel.answer._set_mode("json")
     assert '"quality": 0.93' in panel.answer.text.text()
     press(panel.answer.copy)
     assert '"ok": true' in QGuiApplication.clipboard().text()
@@ -194,7 +194,7 @@ def test_closing_disarms_and_empty_panel_explains_what_to_do(window, panel) -> N
 
 
 def test_service_from_a_menu_command_is_selected(window, panel) -> None:
-    panel.begin("set_language")
+    panel.open_for("set_language")
     assert panel.service == "set_language"
     assert panel.form.nothing.isVisible()
     assert panel.text == "{}"
@@ -204,13 +204,13 @@ def test_service_from_a_menu_command_is_selected(window, panel) -> None:
 
 
 def test_replies_of_any_shape_are_shown_in_a_bounded_number_of_rows() -> None:
-    assert [row.words for row in answer_rows(None)] == ["null"]
-    assert all(len(row.words) < 2 * TEXT_LETTERS for row in answer_rows("x" * 1000))
-    assert len(answer_rows(list(range(10_000)))) == MAX_ROWS + 1
+    assert [row.text for row in reply_rows(None)] == ["null"]
+    assert all(len(row.text) < 2 * MAX_TEXT_CHARS for row in reply_rows("x" * 1000))
+    assert len(reply_rows(list(range(10_000)))) == MAX_ROWS + 1
     deep: object = 1
     for _each in range(2000):
         deep = [deep]
-    assert len(answer_rows(deep)) < 20
+    assert len(reply_rows(deep)) < 20
 
 
 def test_controls_have_accessible_names_and_fit_a_narrow_panel(panel, qtbot) -> None:

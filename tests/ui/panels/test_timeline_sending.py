@@ -68,7 +68,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     QTest.keyClick(panel.transport.armed, Qt.Key.Key_Space)
     assert not panel.transport.armed.isChecked()
     chooser = panel.chooser
-    until(qtbot, window, panel, lambda: sending.is_known)
+    until(qtbot, window, panel, lambda: sending.is_analyzed)
     assert chooser.isVisible()
     assert has_keys(chooser.table)
     assert unsaid(panel) == []
@@ -85,7 +85,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     assert chooser.name.placeholderText() == "/base/cmd_vel"
     QTest.keyClick(chooser.table, Qt.Key.Key_Return)
     assert chosen(panel) == ["/test/a", "/base/cmd_vel"]
-    assert [chooser.table.cell_at(row, 2).said for row in (0, 1)] == ["", "moves a robot"]
+    assert [chooser.table.cell_at(row, 2).accessible_text for row in (0, 1)] == ["", "moves a robot"]
     assert not session.acting.arming.is_on
     QTest.mouseClick(chooser.arm, Qt.MouseButton.LeftButton)
 
@@ -98,7 +98,7 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     QTest.mouseClick(panel.strip.let, Qt.MouseButton.LeftButton)
     session.tick(), panel.refresh()
     assert [token.text() for token in panel.strip.tokens] == ["/a as /test/a", "/base/cmd_vel"]
-    going = sending.outbox.going
+    going = sending.outbox.active_topics
     until(qtbot, window, panel, lambda: all(each.is_ready for each in going))
     until(qtbot, window, panel, lambda: going[0].subscriber_count)
     replay.play()
@@ -108,12 +108,12 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     sent = sum(each.count for each in going)
     assert panel.strip.counts.text().startswith(f"{sent} sent")
     assert panel.strip.counts.text().endswith("received by 1")
-    assert "Sending 2 topics of the recording" in StatusFacts(session).armed()[1]
+    assert "Sending 2 topics of the recording" in StatusFacts(session).arming()[1]
     assert unsaid(panel) == []
 
     QTest.mouseClick(panel.strip.tokens[1], Qt.MouseButton.LeftButton)
     session.tick(), panel.refresh()
-    assert [each.route.recorded for each in sending.outbox.going] == ["/a"]
+    assert [each.route.recorded for each in sending.outbox.active_topics] == ["/a"]
     assert session.acting.arming.targets == (Target("topic", "/test/a"),)
     QTest.mouseClick(panel.strip.change, Qt.MouseButton.LeftButton)
     assert chooser.isVisible()
@@ -121,6 +121,6 @@ def test_recorded_topics_are_selected_renamed_armed_confirmed_sent_and_counted(q
     assert not chooser.isVisible()
     session.runs.stop()
     session.tick(), panel.refresh()
-    assert sending.outbox.going == ()
+    assert sending.outbox.active_topics == ()
     assert not panel.strip.isVisible()
     assert panel.transport.armed.isVisible()

@@ -130,7 +130,7 @@ def test_sorting_keeps_the_selection_and_changing_figures_are_sorted_once_per_se
     panel.show_topic("/odom")
     panel.table.horizontalHeader().sectionClicked.emit(place_of(panel, "rate"))  #: the largest first
     assert panel.model.data(panel.model.index(0, 0)) == "/robot/depth"
-    assert panel.table.chosen_key() == "/odom"
+    assert panel.table.selected_key() == "/odom"
     moved = QSignalSpy(panel.model.layoutChanged)
     window.session.topics["/touch"].rate_hz = 500.0
     ticks(window, panel, 28)
@@ -160,7 +160,7 @@ def test_ten_thousand_topics_emit_one_signal_for_visible_rows_every_sixth_tick(q
 
 def test_enter_opens_a_topic_and_arrow_keys_move(panel, window) -> None:
     panel.table.setFocus(Qt.FocusReason.TabFocusReason)
-    panel.table.choose("/joint_states")
+    panel.table.select_key("/joint_states")
     QTest.keyClick(panel.table, Qt.Key.Key_Down)
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert window.opened == ["/lidar/scan"]  # the next by name, the order at first
@@ -270,10 +270,10 @@ def test_filter_for_a_missing_topic_links_to_the_connection_doctor_too(panel, wi
     panel.filter.setText("/robot/deph")
     press(button(panel, "Why is nothing shown?"))
     assert window.asked_why == [(panel, "/robot/deph")]
-    (hidden,) = panel.hindrances()
-    assert hidden.sentence == "Topics only shows entries with “/robot/deph”."
+    (hidden,) = panel.blockers()
+    assert hidden.message == "Topics only shows entries with “/robot/deph”."
     hidden.run()
-    assert (panel.filter.text(), list(panel.hindrances())) == ("", [])
+    assert (panel.filter.text(), list(panel.blockers())) == ("", [])
 
 
 def test_requested_topic_is_selected_as_soon_as_it_is_listed(panel, window) -> None:
@@ -341,9 +341,9 @@ def test_folders_are_expanded_and_collapsed_by_keyboard_and_left_goes_to_the_par
     as_tree(panel, window)
     whole = panel.model.rowCount()
     panel.table.setFocus(Qt.FocusReason.TabFocusReason)
-    panel.table.choose("/robot/depth")
+    panel.table.select_key("/robot/depth")
     QTest.keyClick(panel.table, Qt.Key.Key_Left)
-    assert panel.table.chosen_key() == "/robot/*"
+    assert panel.table.selected_key() == "/robot/*"
     QTest.keyClick(panel.table, Qt.Key.Key_Left)
     assert "depth" not in shown(panel)
     QTest.keyClick(panel.table, Qt.Key.Key_Right)
@@ -352,7 +352,7 @@ def test_folders_are_expanded_and_collapsed_by_keyboard_and_left_goes_to_the_par
     assert panel.model.rowCount() < whole
     assert window.opened == []
     panel.show_topic("/robot/depth")  # what is asked for is never in a closed folder
-    assert panel.table.chosen_key() == "/robot/depth"
+    assert panel.table.selected_key() == "/robot/depth"
     QTest.keyClick(panel.table, Qt.Key.Key_Return)
     assert window.opened == ["/robot/depth"]
 

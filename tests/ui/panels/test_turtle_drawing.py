@@ -49,9 +49,9 @@ def test_body_and_ball_are_hit_testable_and_there_are_no_hands(qapp) -> None:
     ball = {"kind": "ball", "name": "ball", "x": 1.5, "y": -1.0}
     state = RobotState.parse({"figure": "turtle", "objects": [ball]})
     drawing = RobotDrawing()
-    assert drawing.place_of("left_hand", AREA, state) is None
-    body = drawing.place_of("body", AREA, state)
-    place = drawing.place_of("ball", AREA, state)
+    assert drawing.point_of("left_hand", AREA, state) is None
+    body = drawing.point_of("body", AREA, state)
+    place = drawing.point_of("ball", AREA, state)
     assert body is not None
     assert place is not None
     assert drawing.part_at(place, AREA, state) == "ball"

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.blocks.model.program import Variable
-from app.blocks.runtime.variables import VariableValue, brief
+from app.blocks.runtime.variables import VariableValue, display_value
 from app.core.run.runner import RunnerEvent
 from app.ui.panels.variables import PANEL, VariablesPanel, rows_of, value_cell
 from app.ui.widgets.table.model import Order
@@ -28,7 +28,7 @@ SAVED = workspace(
 @pytest.fixture
 def window(qapp) -> Window:
     made = Window(Session.full())
-    made.session.document.edited(SAVED)
+    made.session.document.apply_edit(SAVED)
     return made
 
 
@@ -51,7 +51,7 @@ def tells(window: Window, panel: VariablesPanel, **values: object) -> None:
     """The program says what its variables hold."""
     run = window.session.runs._runner
     assert run is not None
-    told = tuple(brief(id, value) for id, value in values.items())
+    told = tuple(display_value(id, value) for id, value in values.items())
     window.session.runs.on_runner(RunnerEvent("variables", run.run, values=told))
     ticks(window, panel, 1)
 
@@ -98,7 +98,7 @@ def test_list_is_expanded_by_click_and_keyboard(panel, window) -> None:
 
 
 def test_keys_and_menu_trigger_variable_commands(panel, window) -> None:
-    panel.table.choose("score 0")
+    panel.table.select_key("score 0")
     QTest.keyClick(panel.table, Qt.Key.Key_F2)
     QTest.keyClick(panel.table, Qt.Key.Key_Delete)
     menu = panel.menu_of("score 0")
@@ -117,7 +117,7 @@ def test_keys_and_menu_trigger_variable_commands(panel, window) -> None:
 
 
 def test_panel_without_variables_explains_them_and_creates_one(panel, window) -> None:
-    window.session.document.edited(workspace(started()))
+    window.session.document.apply_edit(workspace(started()))
     ticks(window, panel, 1)
     assert panel.pages.currentWidget() is panel.empty
     button(panel.empty, "New variable").click()
@@ -128,7 +128,7 @@ def test_another_behaviour_shows_no_values_of_the_run(panel, window) -> None:
     window.session.runs.run()
     tells(window, panel, score=3)
     window.session.documents.new()
-    window.session.document.edited(workspace(started(), variables=("score",)))
+    window.session.document.apply_edit(workspace(started(), variables=("score",)))
     ticks(window, panel, 1)
     assert shown(panel) == [("score", "")]
 
@@ -138,7 +138,7 @@ def test_another_behaviour_shows_no_values_of_the_run(panel, window) -> None:
     [([], "empty"), (["x"], "1 item: x"), (None, "unknown"), ("", ""), (True, "yes"), ("a\nb", "a b")],
 )
 def test_variable_value_is_formatted_in_one_row(value: object, words: str) -> None:
-    (row,) = rows_of([Variable("v", "v", "v")], {"v": brief("v", value)}, (), Order())
+    (row,) = rows_of([Variable("v", "v", "v")], {"v": display_value("v", value)}, (), Order())
     assert value_cell(row).text == words
 
 

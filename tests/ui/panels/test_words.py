@@ -12,7 +12,7 @@ from PySide6.QtCore import QAbstractItemModel, QAbstractListModel, QModelIndex, 
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QMenu, QWidget
 
-from app.core.run.acting.picture_point import TYPES, topic_of
+from app.core.run.acting.picture_point import TYPES, default_topic
 from app.robots.description.inputs import Parameter
 from app.robots.description.model import Robot
 from app.ui.panels.alarms.phrases import payload_text
@@ -87,7 +87,7 @@ def said_in(panel: PanelWidget) -> Iterator[tuple[str, str]]:
         menu = action.menu()
         if isinstance(menu, QMenu):
             yield from (("more", each.text()) for each in menu.actions())
-    for outside in (panel, *panel.header_widgets(), *filter(None, [panel.replaces_title()])):
+    for outside in (panel, *panel.header_widgets(), *filter(None, [panel.title_widget()])):
         yield from said_by(outside)
 
 
@@ -139,16 +139,22 @@ def data_of(session: Session) -> Iterator[str]:
     """What comes from elsewhere, in whatever language it is."""
     yield from TYPES
     for topic in session.topics:
-        yield topic_of(topic.name)
+        yield default_topic(topic.name)
         yield from (topic.name, topic.msg_type, topic.msg_type.rpartition("/")[2], *topic.publisher_nodes)
     for node in session.nodes:
         yield from (node.name, node.host, node.language)
     for link in session.fleet.links:
         yield from (link.name, *words_of(link.robot), *texts_in((link.values, link.drawing)))
         yield link.last_stop or ""
-        yield from (text for made in link.tried for text in texts_in((made.given, made.output)))
+        yield from (text for made in link.past_invocations for text in texts_in((made.given, made.output)))
     for record in session.console.records:
-        yield from (record.text, record.origin, record.logger, record.place, record.logger.rpartition(".")[2])
+        yield from (
+            record.text,
+            record.origin,
+            record.logger,
+            record.location,
+            record.logger.rpartition(".")[2],
+        )
     for alert in session.alerts.active:
         yield from (alert.title, alert.detail, alert.button or "")
     for finding in session.doctor.findings:
@@ -158,7 +164,7 @@ def data_of(session: Session) -> Iterator[str]:
     for document in session.documents:
         yield from (document.name, "NAO")
         for problem in document.program().problems:
-            yield from (problem.sentence, problem.subject, problem.fix or "")
+            yield from (problem.message, problem.subject, problem.fix or "")
 
 
 @pytest.fixture
@@ -206,11 +212,11 @@ def test_table_columns_are_wide_enough_for_their_headers(pseudo, shown, name) ->
             assert table.model().headerData(place, Qt.Orientation.Horizontal, Qt.ItemDataRole.ToolTipRole)
 
 
-@pytest.mark.parametrize("language", words.languages(words.LOCALE))
+@pytest.mark.parametrize("language", words.languages(words.LOCALE_FOLDER))
 @pytest.mark.parametrize("columns", [topics.COLUMNS, nodes.COLUMNS], ids=["topics", "nodes"])
 def test_headers_of_the_narrowest_tables_are_not_clipped_in_any_language(theme, language, columns) -> None:
     """Else a translator finds a shorter word: the table gives a column no more room where it is narrow."""
-    catalog = words.read(words.po_file(words.LOCALE, language), language)
+    catalog = words.read(words.po_file(words.LOCALE_FOLDER, language), language)
     metrics = QFontMetricsF(head_font(theme))
     for column in columns:
         entry = catalog.get(column.title, getattr(column.title, "context", None))

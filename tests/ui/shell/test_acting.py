@@ -54,8 +54,8 @@ def test_commands_open_the_panels_and_stop_disarms(window: MainWindow) -> None:
     acting.arm()
     acting.allow(Target("topic", "/blackboard"))
     window._show_facts()
-    assert "Armed 5:00" in window.status.words()
+    assert "Armed 5:00" in window.status.texts()
     run("run.stop")
     assert not acting.arming.is_on
     window._show_facts()
-    assert not any(words.startswith("Armed") for words in window.status.words())
+    assert not any(words.startswith("Armed") for words in window.status.texts())

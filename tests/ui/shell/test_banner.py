@@ -9,9 +9,9 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 from app.core.run.view import RunView
-from app.ui.shell.bars.banner import FRESH_S
+from app.ui.shell.bars.banner import CLICK_GUARD_S
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.main_window import FACTS_EVERY, MainWindow
+from app.ui.shell.main_window import FACTS_REFRESH_TICKS, MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -41,7 +41,7 @@ def mouse(qtbot, window: MainWindow, commands: Commands) -> Mouse:
     show(window, "developer")
     assert window.bench is not None
     topics = window.bench.docks["topics"]
-    qtbot.waitUntil(topics.shown)
+    qtbot.waitUntil(topics.is_displayed)
     return Mouse(window)
 
 
@@ -54,12 +54,14 @@ def show(window: MainWindow, layout: str) -> None:
 
 
 def say(window: MainWindow, name: str = "one", severity: str = "error") -> None:
-    window.session.alerts.put(name, severity, f"It is {name}.", "Mend it.", button="Mend", action="run.stop")
+    window.session.alerts.raise_alert(
+        name, severity, f"It is {name}.", "Mend it.", button="Mend", action="run.stop"
+    )
     settle(window)
 
 
 def settle(window: MainWindow) -> None:
-    for _ in range(FACTS_EVERY):  # Qt lays out what lies in what was laid out
+    for _ in range(FACTS_REFRESH_TICKS):  # Qt lays out what lies in what was laid out
         window.tick()
         QApplication.processEvents()
 
@@ -88,7 +90,7 @@ def test_banner_covers_no_control_and_moves_no_layout(
     before = places(window)
     say(window)
     if (layout, size) == ("developer", SMALL):  # its tools leave no room: the status bar tells
-        assert "1 alert" in window.status.words()
+        assert "1 alert" in window.status.texts()
         return
     assert window.banner.isVisible()
     assert places(window) == before
@@ -115,7 +117,7 @@ def test_adjacent_text_is_shortened_except_text_that_requires_action(
     bar = window.run_bar
     wide = bar.sentence.width()
     say(window)
-    bar.sentence.show_words("Running", "It waits until a face is seen, which takes a while. " * 2)
+    bar.sentence.show_text("Running", "It waits until a face is seen, which takes a while. " * 2)
     beside = window.banner.x() - bar.sentence.x()
     assert bar.sentence.width() == wide, "only the painting ends before the banner"
     assert beside < bar.sentence.full_width()
@@ -129,7 +131,7 @@ def test_press_right_after_the_banner_appeared_is_ignored(window: MainWindow, mo
     mouse.at = window.middle.mapToGlobal(window.tool_bar.banner_area().center())
     say(window)
     assert not window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
-    mouse.now += FRESH_S
+    mouse.now += CLICK_GUARD_S
     window.tick()
     assert window.banner.isAncestorOf(mouse.under_it())  # type: ignore[arg-type]
 
@@ -156,7 +158,7 @@ def test_banner_moves_to_the_bar_of_the_new_layout(window: MainWindow, mouse: Mo
 
 def test_button_in_a_narrow_banner_keeps_its_name(window: MainWindow, mouse: Mouse) -> None:
     step = {"button": "Open the connection doctor", "action": "help.doctor"}
-    window.session.alerts.put("one", "warn", "It is one.", **step)
+    window.session.alerts.raise_alert("one", "warn", "It is one.", **step)
     settle(window)
     button = window.banner.banner.button
     assert button.accessibleName() == "Open the connection doctor"
@@ -165,7 +167,7 @@ def test_button_in_a_narrow_banner_keeps_its_name(window: MainWindow, mouse: Mou
 
 def test_unchanged_banner_is_not_repainted(window: MainWindow, mouse: Mouse) -> None:
     say(window)
-    mouse.now += FRESH_S
+    mouse.now += CLICK_GUARD_S
     settle(window)
     changed: list[QEvent.Type] = []
 
@@ -184,13 +186,13 @@ def test_unchanged_banner_is_not_repainted(window: MainWindow, mouse: Mouse) -> 
 
 
 def test_alert_for_developers_is_shown_in_their_layout_only(window: MainWindow, mouse: Mouse) -> None:
-    window.session.alerts.put("ports", "warn", "Port 7000 is taken.", for_developers=True)
+    window.session.alerts.raise_alert("ports", "warn", "Port 7000 is taken.", for_developers=True)
     settle(window)
     assert window.banner.identity == "ports"
     for layout in ("behaviour", "start"):
         show(window, layout)
         assert window.banner.identity == ""
-        assert not any("alert" in words for words in window.status.words())
+        assert not any("alert" in words for words in window.status.texts())
     show(window, "developer")
     assert window.banner.identity == "ports"
 
@@ -205,7 +207,7 @@ def test_alert_count_opens_the_alerts_by_mouse_and_keyboard(window: MainWindow, 
     QTest.mouseClick(item, Qt.MouseButton.LeftButton)
     QTest.keyClick(item, Qt.Key.Key_Return)
     assert opened == ["alerts", "alerts"]
-    assert window.showing == "behaviour"
+    assert window.current_layout == "behaviour"
 
 
 def test_shift_tab_moves_from_the_banner_through_the_whole_window(

@@ -17,9 +17,9 @@ from app.ui.shell.actions.actions import ROLES, STOP
 from app.ui.shell.actions.command import UnknownCommandError
 from app.ui.shell.bars.banner import STEP_ICONS
 from app.ui.shell.bars.run_bar import PACES
-from app.ui.shell.commands.behaviours import TabPlace
+from app.ui.shell.commands.behaviours import TabPosition
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.menus import ARRANGING
+from app.ui.shell.commands.menus import LAYOUT_COMMANDS
 from app.ui.shell.commands.robots import RobotSwap
 from app.ui.shell.commands.table import ARGUMENT_COMMANDS, COMMANDS, MENUS
 from app.ui.shell.main_window import MainWindow
@@ -125,7 +125,7 @@ def test_every_referenced_command_exists() -> None:
 
 
 def test_lists_of_command_ids_contain_only_existing_commands() -> None:
-    assert {*STEP_ICONS, *ROLES, *PACES, *ARRANGING, STOP} <= IDS
+    assert {*STEP_ICONS, *ROLES, *PACES, *LAYOUT_COMMANDS, STOP} <= IDS
 
 
 def test_tab_menu_lists_only_tab_commands() -> None:
@@ -154,14 +154,14 @@ def test_unknown_command_id_from_a_panel_raises_immediately(window: MainWindow) 
     with pytest.raises(UnknownCommandError, match=r"help\.nobody"):
         window.context.run("help.nobody")
     with pytest.raises(UnknownCommandError):
-        window.commands.shortcuts.of("help.nobody")
+        window.commands.shortcuts.keys_of("help.nobody")
 
 
 def test_command_arguments_are_typed() -> None:
-    assert TabPlace.parse("a:b:2") == TabPlace("a:b", 2)
+    assert TabPosition.parse("a:b:2") == TabPosition("a:b", 2)
     assert RobotSwap.parse("NAO:Pepper:2") == RobotSwap("NAO", "Pepper:2")
     with pytest.raises(ValueError, match="invalid literal"):
-        TabPlace.parse("key:first")
+        TabPosition.parse("key:first")
 
 
 def test_command_ids_are_unique_and_each_menu_is_in_the_menu_bar() -> None:

@@ -51,23 +51,23 @@ def test_freeze_is_disabled_without_live_panels(tools, window) -> None:
     live(window, "inspector").hide()
     tools.refresh()
     assert not tools.freeze.isEnabled()
-    assert window.commands.actions.why_not("view.freeze") == "Nothing to freeze here"
+    assert window.commands.actions.disabled_reason("view.freeze") == "Nothing to freeze here"
     live(window, "image")
     tools.refresh()
     assert tools.freeze.isEnabled()
-    assert window.commands.actions.why_not("view.freeze") == ""
+    assert window.commands.actions.disabled_reason("view.freeze") == ""
 
 
 @pytest.fixture
 def dropped(monkeypatch: pytest.MonkeyPatch) -> list[tuple[QMenu, QWidget]]:
     """The menus that were opened, each with the button that it is below."""
     seen: list[tuple[QMenu, QWidget]] = []
-    monkeypatch.setattr(menus, "drop_below", lambda menu, anchor: seen.append((menu, anchor)))
+    monkeypatch.setattr(menus, "open_below", lambda menu, anchor: seen.append((menu, anchor)))
     return seen
 
 
 def test_layout_button_shows_the_name_and_offers_the_others(tools, window, dropped) -> None:
-    window.saved_layouts.keep_as(window.bench, "developer", "Two cameras")
+    window.saved_layouts.save_as(window.bench, "developer", "Two cameras")
     tools.refresh()
     assert tools.layout.text() == "Two cameras"
     assert tools.layout.accessibleName() == "Layout Two cameras"

@@ -48,11 +48,11 @@ def test_text_field_stays_the_target_while_the_menu_bar_has_focus(
 
 def test_unavailable_edit_commands_are_disabled_with_a_reason(commands: Commands, field: QLineEdit) -> None:
     field.setReadOnly(True)
-    assert commands.actions.why_not("edit.paste") == "This text can't be changed"
-    assert commands.actions.why_not("edit.copy") == ""
+    assert commands.actions.disabled_reason("edit.paste") == "This text can't be changed"
+    assert commands.actions.disabled_reason("edit.copy") == ""
     field.clearFocus()
     field.hide()
-    assert commands.actions.why_not("edit.copy") == "Only for blocks and text fields"
+    assert commands.actions.disabled_reason("edit.copy") == "Only for blocks and text fields"
 
 
 def test_edit_shortcuts_are_left_to_the_focused_widget(commands: Commands) -> None:

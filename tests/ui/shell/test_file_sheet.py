@@ -10,10 +10,10 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from app.core.documents.folder import entries_of, free_name, name_refusal
+from app.core.documents.folder import entries_of, free_name, name_problem
 from app.core.session import Session
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.dialogs.file_sheet import FileSheet, FolderPlace, known_places
+from app.ui.shell.dialogs.file_sheet import FileSheet, FolderLocation, known_locations
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
@@ -40,7 +40,7 @@ def sheet(qtbot: QtBot, window: MainWindow, theme: Theme, folder: Path) -> FileS
     with qtbot.waitExposed(window):
         pass
     theme.set_motion("on")
-    return FileSheet(theme, window, lambda: (FolderPlace("Work", "house", folder),))
+    return FileSheet(theme, window, lambda: (FolderLocation("Work", "house", folder),))
 
 
 @pytest.fixture
@@ -128,7 +128,7 @@ def test_suggested_name_skips_numbers_in_use(folder: Path) -> None:
     ],
 )
 def test_invalid_names_are_rejected_with_a_reason(name: str, wrong: str) -> None:
-    assert name_refusal(name) == wrong
+    assert name_problem(name) == wrong
 
 
 def test_file_with_an_invalid_name_cannot_be_saved(sheet: FileSheet, folder: Path, taken: list[Path]) -> None:
@@ -151,8 +151,8 @@ def test_folder_is_opened_created_and_left(sheet: FileSheet, folder: Path, taken
     assert sheet.said.text() == "This folder is empty."
     QTest.mouseClick(sheet.up, LEFT)
     assert sheet.folder == folder
-    assert sheet.chosen is not None
-    assert sheet.chosen.path.name == "Class 4", "where one came from"
+    assert sheet.selected_entry is not None
+    assert sheet.selected_entry.path.name == "Class 4", "where one came from"
     QTest.mouseClick(sheet.new_folder, LEFT)
     QTest.keyClicks(sheet.folder_name, "Class 4")
     QTest.mouseClick(sheet.make_folder, LEFT)
@@ -194,7 +194,7 @@ def test_missing_folder_is_reported_and_the_previous_one_stays_open(sheet: FileS
 
 
 def test_places_are_existing_folders_without_duplicates(folder: Path, tmp_path: Path) -> None:
-    found = known_places(
+    found = known_locations(
         tmp_path, [folder / "Greeting.nepb", folder / "b.nepb", tmp_path / "x" / "gone.nepb"]
     )
     assert found[0].folder == Path.home()
@@ -251,7 +251,7 @@ def test_window_opens_its_own_file_sheet(qtbot: QtBot, theme: Theme, session: Se
     assert sheet is not None
     assert sheet.isVisible()
     assert "work" in [button.text() for button in sheet.places.findChildren(Button)]
-    sheet.shut()
+    sheet.dismiss()
     window.close()
 
 
@@ -308,7 +308,7 @@ def test_save_as_offers_several_file_types(sheet: FileSheet, folder: Path) -> No
     (folder / "Tea 1.svg").write_text("<svg/>")
 
     def ask(name: str) -> None:
-        sheet.ask_save_as("Save as image", folder / name, kinds, lambda p, k: taken.append((p.name, k.words)))
+        sheet.ask_save_as("Save as image", folder / name, kinds, lambda p, k: taken.append((p.name, k.label)))
 
     ask("Tea 1")
     assert (sheet.heading.text(), sheet.ending.text(), sheet.name.text()) == (

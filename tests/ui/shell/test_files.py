@@ -38,7 +38,7 @@ class _NoJournal:
 def test_saving_a_new_behaviour_opens_the_file_dialog(
     commands: Commands, document: Document, answers: Answers, tmp_path
 ) -> None:
-    document.edited(BLOCKS)
+    document.apply_edit(BLOCKS)
     answers.path = tmp_path / "Story.nepb"
     commands.run("file.save")
     assert answers.asked[0].endswith("New behaviour.nepb")
@@ -67,31 +67,31 @@ def names(window: MainWindow) -> list[str]:
 
 def test_another_file_opens_in_a_new_tab_beside_unsaved_work(commands, window, tmp_path: Path) -> None:
     path = saved(tmp_path / "Other.nepb")
-    window.session.document.edited(BLOCKS)
+    window.session.document.apply_edit(BLOCKS)
     commands.files.open(path)
     assert names(window) == ["New behaviour", "Other"]
     assert window.session.document.name == "Other"
     assert next(iter(window.session.documents)).dirty
-    assert window.showing == "behaviour"
+    assert window.current_layout == "behaviour"
 
 
 def test_unsaved_behaviour_without_a_file_is_kept_when_its_tab_is_closed(
     commands, window, home: Path
 ) -> None:
-    window.session.document.edited(BLOCKS)
+    window.session.document.apply_edit(BLOCKS)
     commands.run("tab.close")
     kept = list((home / "kept").glob("New behaviour*.nepb"))
     assert len(kept) == 1
     assert [file.path for file in window.session.settings.recent] == [kept[0].resolve()]
     assert window.toast.text == "Closed New behaviour. You'll find it under Recent."
     assert names(window) == ["New behaviour"]
-    assert window.session.document.blank
+    assert window.session.document.is_blank
 
 
 def test_changed_file_is_saved_when_its_tab_is_closed_and_can_be_reopened(commands, window, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     commands.run("tab.close")
     assert window.toast.text == "Saved Mine"
     assert names(window) == ["New behaviour"]
@@ -110,7 +110,7 @@ def test_saving_on_tab_close_can_be_undone(commands, window, tmp_path: Path) -> 
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     commands.run("tab.close")
     assert path.read_bytes() != before
     assert window.toast.button.accessibleName() == "Undo"
@@ -127,7 +127,7 @@ def test_previous_content_of_an_overwritten_file_is_kept_as_a_copy(
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     commands.run("tab.close")
     copies = list((home / "earlier").glob("Mine, before *.nepb"))
     assert [copy.read_bytes() for copy in copies] == [before]
@@ -138,7 +138,7 @@ def test_several_tabs_are_closed_and_restored_together(commands, window, tmp_pat
     before = [path.read_bytes() for path in paths]
     for path in paths:
         commands.files.open(path)
-        window.session.document.edited(changed(path.stem))
+        window.session.document.apply_edit(changed(path.stem))
     commands.run(f"tab.close_others:{window.session.document.key}")
     assert window.toast.text == "Saved 2 behaviours"
     press_toast(window)
@@ -152,7 +152,7 @@ def test_tab_reopened_before_undo_is_unsaved_work(commands, window, tmp_path: Pa
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     commands.run("tab.close")
     commands.run("tab.reopen")
     press_toast(window)
@@ -165,7 +165,7 @@ def test_undo_does_not_overwrite_changes_of_another_program(commands, window, tm
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     commands.run("tab.close")
     path.write_bytes(before + b"\n")
     press_toast(window)
@@ -181,7 +181,7 @@ def test_tab_stays_open_when_the_overwritten_content_cannot_be_backed_up(
     path = saved(tmp_path / "Mine.nepb")
     before = path.read_bytes()
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     (home / "earlier").write_text("in the way", "utf-8")
     commands.run("tab.close")
     assert path.read_bytes() == before
@@ -192,7 +192,7 @@ def test_tab_stays_open_when_the_overwritten_content_cannot_be_backed_up(
 def test_saving_over_changes_of_another_program_backs_them_up(commands, window, home: Path, tmp_path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     foreign = path.read_bytes().replace(b'"a"', b'"theirs"')
     path.write_bytes(foreign)
     commands.run("file.save")
@@ -212,7 +212,7 @@ def test_saving_twice_is_not_detected_as_an_external_change(commands, window, ho
     said = [path.read_bytes()]
     commands.files.open(path)
     for id in "xy":
-        window.session.document.edited(changed(id))
+        window.session.document.apply_edit(changed(id))
         commands.run("file.save")
         assert window.toast.text == "Saved Mine"
         said.append(path.read_bytes())
@@ -225,7 +225,7 @@ def test_saving_succeeds_when_the_earlier_versions_cannot_be_kept(
 ) -> None:
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     (home / "earlier").write_text("in the way", "utf-8")
     commands.run("file.save")
     assert window.toast.text == "Saved Mine"
@@ -236,7 +236,7 @@ def test_saving_succeeds_when_the_earlier_versions_cannot_be_kept(
 def test_save_as_backs_up_the_file_it_overwrites(commands, window, answers, home: Path, tmp_path) -> None:
     answers.path = saved(tmp_path / "Theirs.nepb")
     before = answers.path.read_bytes()
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     commands.run("file.save_as")
     assert window.toast.text == "Saved Theirs. The previous file is under Earlier versions."
     assert b'"z"' in answers.path.read_bytes()
@@ -251,8 +251,8 @@ def test_file_that_cannot_be_backed_up_is_not_overwritten(
 ) -> None:
     answers.path = saved(tmp_path / "Theirs.nepb")
     before = answers.path.read_bytes()
-    window.session.document.edited(changed("z"))
-    assert window.session.document.is_kept, "it makes the folder"
+    window.session.document.apply_edit(changed("z"))
+    assert window.session.document.is_on_disk, "it makes the folder"
     (home / "earlier").write_text("in the way", "utf-8")
     commands.run("file.save_as")
     assert answers.path.read_bytes() == before
@@ -262,7 +262,7 @@ def test_file_that_cannot_be_backed_up_is_not_overwritten(
 
 def test_save_as_to_a_new_file_creates_no_backup(commands, window, answers, home: Path, tmp_path) -> None:
     answers.path = tmp_path / "New.nepb"
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     commands.run("file.save_as")
     assert window.toast.text == "Saved New"
     assert not (home / "earlier").exists()
@@ -272,7 +272,7 @@ def test_tab_that_cannot_be_saved_stays_open(commands, window, tmp_path: Path) -
     folder = tmp_path / "gone"
     folder.mkdir()
     commands.files.open(saved(folder / "Mine.nepb"))
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     (folder / "Mine.nepb").unlink()
     folder.rmdir()
     folder.write_text("in the way", "utf-8")
@@ -285,7 +285,7 @@ def test_tab_that_cannot_be_saved_stays_open(commands, window, tmp_path: Path) -
 
 def test_closing_the_tab_of_a_running_program_stops_it(commands, window, monkeypatch) -> None:
     runs, stopped = window.session.runs, []
-    window.session.document.edited(BLOCKS)
+    window.session.document.apply_edit(BLOCKS)
     runs.document, runs._run = window.session.document, RunState("running")
     monkeypatch.setattr(runs, "stop", lambda: stopped.append(True))
     commands.run("tab.close")
@@ -320,7 +320,7 @@ def test_save_as_renames_the_tab_and_keeps_the_old_file(
     old = saved(tmp_path / "Old.nepb")
     before = old.read_bytes()
     commands.files.open(old)
-    window.session.document.edited(changed("z"))
+    window.session.document.apply_edit(changed("z"))
     answers.path = tmp_path / "New.nepb"
     commands.run("file.save_as")
     assert names(window) == ["New"]
@@ -344,7 +344,7 @@ def test_external_files_open_and_unsupported_ones_raise_one_alert(commands, wind
 def test_file_that_is_no_behaviour_raises_an_alert(commands, window, document, tmp_path: Path) -> None:
     path = tmp_path / "bad.nepb"
     path.write_text("not json", "utf-8")
-    document.edited(BLOCKS)
+    document.apply_edit(BLOCKS)
     commands.files.open(path)
     alert = window.session.alerts.active[0]
     assert alert.title == "bad.nepb is damaged or not a behaviour."
@@ -354,7 +354,7 @@ def test_file_that_is_no_behaviour_raises_an_alert(commands, window, document, t
 
 
 def test_unwritable_folder_raises_an_alert(commands: Commands, window, document, answers, tmp_path) -> None:
-    document.edited(BLOCKS)
+    document.apply_edit(BLOCKS)
     (tmp_path / "file").write_text("in the way", "utf-8")
     answers.path = tmp_path / "file" / "x.nepb"
     commands.run("file.save")
@@ -367,7 +367,7 @@ def test_unwritable_folder_raises_an_alert(commands: Commands, window, document,
 
 def test_fix_changes_the_blocks_and_updates_the_editor(commands: Commands, document: Document) -> None:
     wait = {"type": "control_wait_until", "id": "w"}
-    document.edited({"blocks": {"languageVersion": 0, "blocks": [wait]}})
+    document.apply_edit({"blocks": {"languageVersion": 0, "blocks": [wait]}})
     before = document.fixes
     assert commands.run("limit:w")
     assert document.workspace["blocks"]["blocks"][0]["type"] == "control_wait_until_at_most"

@@ -13,7 +13,7 @@ from app.ui.shell.bars.banner import AlertBanner
 from app.ui.shell.bars.toast import Toast
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.focus_ring import FocusRing
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import shortcut_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 
@@ -66,11 +66,11 @@ def test_toast_stays_while_it_has_focus(qtbot, place: QWidget, theme: Theme) -> 
     toast.show_toast("Deleted 4 blocks", "Undo", lambda: None)
     toast.button.setFocus()
     qtbot.waitUntil(toast.button.hasFocus)
-    toast._time_is_up()
+    toast._on_timeout()
     assert toast.isVisible()
     toast.button.clearFocus()
     toast.setAttribute(Qt.WidgetAttribute.WA_UnderMouse, False)
-    toast._time_is_up()
+    toast._on_timeout()
     assert not toast.isVisible()
 
 
@@ -256,7 +256,7 @@ def test_ring_survives_deletion_of_its_widget(qtbot, place: QWidget, theme: Them
     ("keys", "said"), [("Ctrl+Shift+S", "Ctrl+Shift+S"), ("Ctrl++", "Ctrl++"), ("F12", "F12")]
 )
 def test_keys_are_named_as_on_the_keyboard(keys: str, said: str) -> None:
-    assert spoken_key(keys) == said
+    assert shortcut_text(keys) == said
 
 
 def test_sheet_closes_with_esc_and_when_focus_moves_elsewhere(qtbot, place: QWidget, theme: Theme) -> None:

@@ -11,7 +11,7 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QLabel, QLineEdit, QScrollArea, QVBoxLayout, QWidget
 
 import app.ui
-from app.ui.widgets.keyboard import following, proxy_of, tab_stops
+from app.ui.widgets.keyboard import focus_proxy, next_in_focus_chain, tab_stops
 
 ASKS = re.compile(r"\.(nextInFocusChain|previousInFocusChain|focusProxy|buddy)\(\)")
 
@@ -38,9 +38,9 @@ def test_focus_chain_widgets_survive_deletion_of_the_queried_widget(window: QWid
     header = area.viewport()  # made by Qt, not by Python: what PySide would call deleted
     assert list(tab_stops(window, first)) == [area, second]
     assert list(tab_stops(window, first, forward=False)) == [second, area]
-    step = following(first)
+    step = next_in_focus_chain(first)
     while step is not first:
-        step = following(step)
+        step = next_in_focus_chain(step)
     delete(first)
     delete(second)
     for widget in (window, area, header):
@@ -50,15 +50,15 @@ def test_focus_chain_widgets_survive_deletion_of_the_queried_widget(window: QWid
 
 def test_focus_proxy_keeps_its_parent_when_queried(window: QWidget) -> None:
     first, second = window.findChildren(QLineEdit)
-    assert proxy_of(first) is None
+    assert focus_proxy(first) is None
     first.setFocusProxy(second)
-    assert proxy_of(first) is second
+    assert focus_proxy(first) is second
     assert second.parentWidget() is window
 
 
 def test_window_has_no_parent_after_a_focus_chain_query(window: QWidget) -> None:
     last = window.findChildren(QLineEdit)[-1]
-    assert any(following(each) is window for each in window.findChildren(QWidget))
+    assert any(next_in_focus_chain(each) is window for each in window.findChildren(QWidget))
     delete(last)
     assert shiboken6.isValid(window)
     assert window.isVisible()

@@ -37,7 +37,9 @@ def text(language: str, page: str) -> str:
 def test_guide_has_a_page_for_each_common_question() -> None:
     assert [page.title for page in read_pages(FOLDER, "en", lambda _command: "F1")] == TITLES
     assert "es" in LANGUAGES
-    assert {code for code, _name in i18n.offered()} <= set(LANGUAGES), "each language that is offered"
+    assert {code for code, _name in i18n.selectable_languages()} <= set(LANGUAGES), (
+        "each language that is offered"
+    )
 
 
 @pytest.mark.parametrize("language", LANGUAGES)
@@ -53,7 +55,7 @@ def test_every_language_has_every_page_with_the_same_keys_and_sections(language:
 
 def test_english_pages_use_the_names_of_the_menu_commands() -> None:
     called = {words for command in COMMANDS for words in (command.text, command.text.format(number=""))}
-    called |= {command.under for command in COMMANDS}
+    called |= {command.submenu for command in COMMANDS}
     for page in PAGES:
         for menu, entry in re.findall(r"\*(File|Edit|View|Run|Robots|Help) > ([^*]+)\*", text("en", page)):
             assert " ".join(entry.split()) in called, (page, menu, entry)
@@ -70,7 +72,7 @@ def test_translated_pages_use_the_translated_command_names(
     path = r"\*([^>*]+) > ([^*]+)\*"
     menus = {words(menu): menu for menu in ("File", "Edit", "View", "Run", "Robots", "Help")}
     called = {words(each.text).format(number="") for each in COMMANDS} | {
-        words(each.under) for each in COMMANDS if each.under
+        words(each.submenu) for each in COMMANDS if each.submenu
     }
     named = [(menu, " ".join(entry.split())) for menu, entry in re.findall(path, text(language, page))]
     assert [menu for menu, entry in named if menu not in menus or entry not in called] == []
@@ -158,8 +160,8 @@ def test_missing_translated_image_falls_back_to_english(tmp_path: Path) -> None:
     assert page.pictures == (("room", "A room with a robot"),)
     assert page.picture("room", dark=True) == tmp_path / "en" / "dark" / "room.png"
     assert page.picture("room", dark=False) is None
-    assert page.has("robot room")
-    assert not page.has("png")
+    assert page.matches("robot room")
+    assert not page.matches("png")
 
 
 def test_missing_translated_page_falls_back_to_english(tmp_path: Path) -> None:
@@ -179,9 +181,9 @@ def test_pages_show_the_current_shortcuts(tmp_path: Path) -> None:
 
 def test_search_matches_words_in_any_order_and_ignores_accents() -> None:
     page = GuidePage("Stop", "# Stop\n**Stop** tells *every* robot")
-    assert page.has("robot stop")
-    assert page.has("STOP TELLS")
-    assert not page.has("stop camera")
+    assert page.matches("robot stop")
+    assert page.matches("STOP TELLS")
+    assert not page.matches("stop camera")
 
 
 @pytest.fixture
@@ -203,7 +205,7 @@ def test_list_opens_pages_and_search_lists_pages_with_matches(qtbot, guide: Guid
     QTest.keyClick(guide.list, Qt.Key.Key_Slash)
     assert guide.search.hasFocus()
     QTest.keyClicks(guide.search, "ball")
-    assert [page.title for page in guide.shown] == ["The virtual room"]
+    assert [page.title for page in guide.matching_pages] == ["The virtual room"]
     assert guide.page.toPlainText().startswith("The virtual room")
     assert guide.page.textCursor().selectedText() == "ball"
     QTest.keyClicks(guide.search, "zzz")
@@ -214,7 +216,7 @@ def test_list_opens_pages_and_search_lists_pages_with_matches(qtbot, guide: Guid
 
 def test_guide_reopens_at_the_last_page(window: MainWindow, commands: Commands, guide: GuideSheet) -> None:
     guide.list.setCurrentRow(4)
-    guide.shut()
+    guide.dismiss()
     commands.run("help.guide")
     assert guide.page.toPlainText().startswith("When something is wrong")
 
@@ -239,4 +241,4 @@ def test_about_lists_versions_and_copies_them(qtbot, window: MainWindow, command
     assert f"Python: {platform.python_version()}" in copied
     assert any(line.startswith("Qt: 6.") for line in copied)
     assert window.toast.text == "Copied version information"
-    sheet.shut()
+    sheet.dismiss()

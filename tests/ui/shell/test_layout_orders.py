@@ -36,14 +36,14 @@ class Layouts(QStackedWidget):
         for bench in self.benches.values():
             self.addWidget(bench)
             bench.resize(1440, 800)
-            bench.arrange()
+            bench.reset_layout()
         self.resize(1440, 800)
 
     def switch(self, name: str) -> Workbench:
         """Show a layout as the window does, until everything that was put off is done."""
         bench = self.benches[name]
         self.setCurrentWidget(bench)
-        bench.focus_home()
+        bench.focus_main_panel()
         self.settle()
         return bench
 
@@ -63,7 +63,7 @@ def layouts(qtbot) -> Layouts:
     made.show()
     yield made
     for bench in made.benches.values():
-        bench.shut()
+        bench.dispose()
 
 
 def rest_of(bench: Workbench) -> list[str]:

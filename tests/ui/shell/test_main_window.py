@@ -12,14 +12,14 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QPushButton, QTabBar, QWidget
 
-from app.core.documents.journal import Journal, left_behind
+from app.core.documents.journal import Journal, unsaved_work
 from app.core.faults import RepeatFilter
 from app.core.run.view import RunState, RunView
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
-from app.robots.description.description import parse, td_for
-from app.ui.application import Options, first_steps, layout_left
+from app.robots.description.description import parse, thing_description
+from app.ui.application import Options, last_layout, show_first_page
 from app.ui.panels.base import PanelContext
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.table import COMMANDS
@@ -64,31 +64,31 @@ def test_home_button_opens_the_start_page_and_back_button_returns(
     show(qtbot, window)
     assert not window.bar.home.isVisible()
     assert not window.bar.back.isVisible(), "a first start leads back to nothing"
-    assert commands.actions.why_not("start_page.leave") == "Nothing open"
+    assert commands.actions.disabled_reason("start_page.leave") == "Nothing open"
     commands.run("layout.developer")
     QTest.mouseClick(window.bar.home, Qt.MouseButton.LeftButton)
     assert window.start.isVisible()
     QTest.mouseClick(window.bar.back, Qt.MouseButton.LeftButton)
-    assert window.showing == "developer"
+    assert window.current_layout == "developer"
     QTest.keyClick(window, Qt.Key.Key_Home, Qt.KeyboardModifier.AltModifier)
     assert window.start.isVisible()
     qtbot.waitUntil(lambda: window.start.isAncestorOf(QApplication.focusWidget()))
     QTest.keyClick(QApplication.focusWidget(), Qt.Key.Key_Escape)
-    assert window.showing == "developer"
+    assert window.current_layout == "developer"
 
 
 def test_open_work_on_the_start_page_opens_its_tab(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     documents = window.session.documents
     first = documents.current
-    first.edited({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "a"}]}})
-    documents.new().edited({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "b"}]}})
+    first.apply_edit({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "a"}]}})
+    documents.new().apply_edit({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "b"}]}})
     commands.run("file.start_page")
     rows = window.start.open_work.rows
     assert [row.work.name for row in rows] == [documents.current.name, first.name], "the current one first"
     QTest.mouseClick(rows[1], Qt.MouseButton.LeftButton)
     assert documents.current is first
-    assert window.showing == "behaviour"
+    assert window.current_layout == "behaviour"
 
 
 def test_stop_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
@@ -96,19 +96,19 @@ def test_stop_is_filled_on_the_start_page_while_a_robot_has_not_stopped(
 ) -> None:
     show(qtbot, window)
     fleet = window.session.fleet
-    fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
+    fleet.connect(parse(thing_description(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
     window.tick()
     assert not window.bar.stop.filled
     link = fleet.link("Pepper")
     assert link is not None
-    link.not_stopped = "Pepper may still move: the brake does not answer"
+    link.stop_problem = "Pepper may still move: the brake does not answer"
     window.tick()
     assert window.bar.stop.filled
-    link.not_stopped = ""
-    link.goes_on = "Pepper may still move: wave is still running"
+    link.stop_problem = ""
+    link.unended_actions = "Pepper may still move: wave is still running"
     window.tick()
     assert window.bar.stop.filled
-    link.goes_on = ""
+    link.unended_actions = ""
     window.tick()
     assert not window.bar.stop.filled
 
@@ -158,7 +158,7 @@ def test_only_visible_panels_are_refreshed(qtbot, window: MainWindow, commands: 
     show(qtbot, window)
     commands.run("layout.behaviour")
     commands.run("layout.developer")
-    qtbot.waitUntil(window.benches["developer"].docks["console"].shown)
+    qtbot.waitUntil(window.benches["developer"].docks["console"].is_displayed)
     hidden = panel(window, "behaviour", "robot").refreshed
     before = panel(window, "developer", "topics").refreshed
     window.tick()
@@ -168,7 +168,7 @@ def test_only_visible_panels_are_refreshed(qtbot, window: MainWindow, commands: 
     window.tick()
     assert panel(window, "developer", "alerts").refreshed == behind
     window.benches["developer"].docks["alerts"].raise_()
-    qtbot.waitUntil(window.benches["developer"].docks["alerts"].shown)
+    qtbot.waitUntil(window.benches["developer"].docks["alerts"].is_displayed)
     window.tick()
     assert panel(window, "developer", "alerts").refreshed == behind + 1
 
@@ -231,7 +231,7 @@ def test_tab_never_focuses_a_panel_hidden_behind_another(
     show(qtbot, window)
     commands.run("layout.developer")
     bench = window.benches["developer"]
-    qtbot.waitUntil(bench.docks["console"].shown)
+    qtbot.waitUntil(bench.docks["console"].is_displayed)
     behind = [dock for dock in bench.docks.values() if not dock.front]
     assert any(list(tab_stops(dock, dock)) for dock in behind), "Qt would go there"
     bench.focus_panel(bench.docks["console"])
@@ -262,7 +262,7 @@ def test_shift_f10_opens_the_menu_of_the_focused_widget(
 def test_f6_and_number_shortcuts_move_between_panels(qtbot, window: MainWindow, commands: Commands) -> None:
     show(qtbot, window)
     commands.run("layout.developer")
-    qtbot.waitUntil(window.benches["developer"].docks["console"].shown)
+    qtbot.waitUntil(window.benches["developer"].docks["console"].is_displayed)
     seen = []
     for _ in range(4):
         QTest.keyClick(window, Qt.Key.Key_F6)
@@ -323,15 +323,15 @@ def test_panels_in_the_same_dock_area_are_tabs_in_the_title(
     assert bench.docks["topics"].title.tabs == ()
     second = bench.docks["console"].title._tabs[1]
     QTest.mouseClick(second, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(bench.docks["alerts"].shown)
-    assert not bench.docks["console"].shown()
+    qtbot.waitUntil(bench.docks["alerts"].is_displayed)
+    assert not bench.docks["console"].is_displayed()
 
 
 def test_dock_tabs_and_the_tabs_of_a_panel_have_separate_rows(qtbot, window: MainWindow) -> None:
     """Nobody takes the tab of a panel for one of a file, however narrow the window is."""
 
     class Own(PlainPanel):
-        def replaces_title(self) -> QWidget:
+        def title_widget(self) -> QWidget:
             return own
 
     own = QWidget()
@@ -435,7 +435,7 @@ def test_topic_opens_in_the_matching_panel(qtbot, window: MainWindow, commands: 
     show(qtbot, window)
     window.show_layout("behaviour")
     window.open_topic("/odom")
-    assert window.showing == "developer"
+    assert window.current_layout == "developer"
     assert panel(window, "developer", "inspector").topics == ["/odom"]
     assert panel(window, "developer", "image").topics == []
 
@@ -457,8 +457,10 @@ def test_alert_is_a_banner_until_it_is_resolved(qtbot, window: MainWindow, comma
     show(qtbot, window)
     window.show_layout("developer")
     alerts = window.session.alerts
-    alerts.put("one", "warn", "A topic is slow.", "Look at it.")
-    alerts.put("two", "error", "The camera is silent.", "It waits.", button="Look", action="inspect:/camera")
+    alerts.raise_alert("one", "warn", "A topic is slow.", "Look at it.")
+    alerts.raise_alert(
+        "two", "error", "The camera is silent.", "It waits.", button="Look", action="inspect:/camera"
+    )
     window.tick()
     banner = window.banner.banner
     assert window.banner.isVisible()
@@ -472,7 +474,7 @@ def test_alert_is_a_banner_until_it_is_resolved(qtbot, window: MainWindow, comma
     QTest.mouseClick(banner.close_button, Qt.MouseButton.LeftButton)
     window.tick()
     assert not window.banner.isVisible()
-    assert alerts.dismissed("one")
+    assert alerts.is_dismissed("one")
 
 
 def test_recovery_of_work_after_a_crash_is_offered_without_a_dialog(
@@ -485,24 +487,24 @@ def test_recovery_of_work_after_a_crash_is_offered_without_a_dialog(
         entry = json.loads(file.read_text("utf-8"))
         file.write_text(json.dumps({**entry, "pid": 2**22 + 1}), "utf-8")
     show(qtbot, window)
-    commands.behaviours.come_back(left_behind(home / "journal"), window.banner.offer)
+    commands.behaviours.restore_tabs(unsaved_work(home / "journal"), window.banner.offer)
     assert window.banner.isVisible()
     assert "“Song” and 2 others weren't saved" in window.banner.banner.accessibleName()
     assert QApplication.activeModalWidget() is None
     QTest.mouseClick(window.banner.banner.button, Qt.MouseButton.LeftButton)
     assert {document.name for document in window.session.documents} == {"Story", "Tale", "Song"}
     assert all(document.dirty for document in window.session.documents)
-    assert window.showing == "behaviour"
+    assert window.current_layout == "behaviour"
     assert not window.banner.isVisible()
 
 
 def test_tabs_are_restored_without_asking_after_a_clean_exit(
     qtbot, theme: Theme, window: MainWindow, commands: Commands, home: Path
 ) -> None:
-    window.session.tabs.come_back([])
-    window.session.document.edited({"blocks": {"blocks": [{"type": "events_started"}]}})
+    window.session.tabs.restore([])
+    window.session.document.apply_edit({"blocks": {"blocks": [{"type": "events_started"}]}})
     commands.run("file.new")
-    window.session.document.edited({"blocks": {"blocks": [{"type": "events_message"}]}})
+    window.session.document.apply_edit({"blocks": {"blocks": [{"type": "events_message"}]}})
     window.close()
     for file in (home / "journal").glob("*.json"):
         entry = json.loads(file.read_text("utf-8"))
@@ -510,7 +512,7 @@ def test_tabs_are_restored_without_asking_after_a_clean_exit(
     again = Session(
         Settings(home), address="127.0.0.1:9", journal_folder=home / "journal", start_processes=False
     )
-    rest = again.tabs.come_back(left_behind(home / "journal"))
+    rest = again.tabs.restore(unsaved_work(home / "journal"))
     assert rest == []
     assert [document.name for document in again.documents] == ["New behaviour", "New behaviour 2"]
     assert all(document.dirty for document in again.documents)
@@ -560,7 +562,7 @@ def test_every_command_has_a_text_and_no_two_share_a_shortcut() -> None:
     assert len(set(keys)) == len(keys)
     assert all(row.text for row in COMMANDS)
     stop = next(row for row in COMMANDS if row.id == "run.stop")
-    assert (stop.text, stop.keys_at_first()[0]) == ("Stop the program and all robots", "F12")
+    assert (stop.text, stop.default_keys()[0]) == ("Stop the program and all robots", "F12")
 
 
 def test_no_plain_qt_buttons_are_used(qtbot, window: MainWindow, commands: Commands) -> None:
@@ -699,22 +701,24 @@ def test_system_file_dialogs_are_not_modal(qtbot, window: MainWindow, tmp_path: 
 
 
 def test_last_used_layout_is_shown_after_restart(window: MainWindow, commands: Commands) -> None:
-    assert layout_left(window) == "", "a first start"
+    assert last_layout(window) == "", "a first start"
     commands.run("layout.developer")
-    assert layout_left(window) == "developer"
+    assert last_layout(window) == "developer"
     commands.run("layout.behaviour")
-    assert layout_left(window) == "", "no behaviour is open"
-    window.session.document.edited({"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "a"}]}})
-    assert layout_left(window) == "behaviour"
+    assert last_layout(window) == "", "no behaviour is open"
+    window.session.document.apply_edit(
+        {"blocks": {"languageVersion": 0, "blocks": [{"type": "x", "id": "a"}]}}
+    )
+    assert last_layout(window) == "behaviour"
     commands.run("file.start_page")
-    assert layout_left(window) == "", "a person went to the start page"
+    assert last_layout(window) == "", "a person went to the start page"
 
 
 def test_loading_layout_shows_its_bars_first_and_then_its_panels(
     qtbot, window: MainWindow, commands: Commands
 ) -> None:
     show(qtbot, window)
-    window.expect("behaviour")
+    window.show_placeholder("behaviour")
     assert window.ring.target is None, "no ring round a page that is only words"
     placeholder = window.findChild(Placeholder)
     assert window.pages.currentWidget() is placeholder
@@ -730,40 +734,40 @@ def test_loading_layout_shows_its_bars_first_and_then_its_panels(
 def test_start_with_a_file_argument_shows_that_file(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    monkeypatch.setattr(window, "begin", lambda: None)
+    monkeypatch.setattr(window, "start_session", lambda: None)
     path = tmp_path / "Mine.nepb"
     path.write_text('{"format": "nep-behaviour", "version": 1, "workspace": {}}' if kind == "good" else "?")
-    steps = first_steps(window, Options((path,) if kind != "none" else ()))
+    steps = show_first_page(window, Options((path,) if kind != "none" else ()))
     for step in steps:
         step()
-    assert window.showing == ("behaviour" if kind == "good" else "start")
+    assert window.current_layout == ("behaviour" if kind == "good" else "start")
     assert len(list(window.session.alerts.active)) == (1 if kind == "bad" else 0)
 
 
 def test_start_shows_what_was_open_last(
     window: MainWindow, commands: Commands, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(window, "begin", lambda: None)
-    window.state.keep_layout("developer")
-    steps = first_steps(window, Options())
+    monkeypatch.setattr(window, "start_session", lambda: None)
+    window.state.save_layout("developer")
+    steps = show_first_page(window, Options())
     assert window.findChild(Placeholder).accessibleName() == "Loading panels."
     for step in steps:
         step()
-    assert window.showing == "developer"
-    assert [step.__name__ for step in first_steps(window, Options(new_window=True))] == ["<lambda>"]
+    assert window.current_layout == "developer"
+    assert [step.__name__ for step in show_first_page(window, Options(new_window=True))] == ["<lambda>"]
 
 
 def test_very_first_start_offers_the_first_steps_and_the_second_does_not(
     window: MainWindow, commands: Commands, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(window, "begin", lambda: None)
-    first_steps(window, Options())
+    monkeypatch.setattr(window, "start_session", lambda: None)
+    show_first_page(window, Options())
     assert window.start.offers_first_steps
     assert not Settings(home).are_new, "however this start ends"
     commands.run("help.first_steps")
     assert not window.start.offers_first_steps
     window.session.settings.are_new = Settings(home).are_new
-    first_steps(window, Options())
+    show_first_page(window, Options())
     assert not window.start.offers_first_steps
 
 
@@ -771,14 +775,14 @@ def test_very_first_start_offers_the_first_steps_and_the_second_does_not(
 def test_first_steps_are_not_offered_when_there_is_other_work(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, instead: str
 ) -> None:
-    monkeypatch.setattr(window, "begin", lambda: None)
+    monkeypatch.setattr(window, "start_session", lambda: None)
     if instead == "work of last time":
         window.banner.offer("Put back?", "It was not saved.", ("Restore", bool), ("Cancel", bool))
     elif instead == "open work":
-        window.session.document.edited({"blocks": {"blocks": [{"type": "events_started"}]}})
+        window.session.document.apply_edit({"blocks": {"blocks": [{"type": "events_started"}]}})
     elif instead == "an earlier version":
         window.session.settings.are_new = False
-    first_steps(window, Options((tmp_path / "Mine.nepb",) if instead == "a file" else ()))
+    show_first_page(window, Options((tmp_path / "Mine.nepb",) if instead == "a file" else ()))
     assert not window.start.offers_first_steps
 
 
@@ -786,12 +790,12 @@ def test_demo_option_starts_the_demo_except_in_self_drive_mode(
     window: MainWindow, commands: Commands, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begun: list[str] = []
-    monkeypatch.setattr(window, "begin", lambda: None)
+    monkeypatch.setattr(window, "start_session", lambda: None)
     monkeypatch.setattr(commands.behaviours, "demo", lambda: begun.append("demo"))
-    for step in first_steps(window, Options(demo=True, self_drive=tmp_path)):
+    for step in show_first_page(window, Options(demo=True, self_drive=tmp_path)):
         step()
     assert begun == []
-    for step in first_steps(window, Options(demo=True)):
+    for step in show_first_page(window, Options(demo=True)):
         step()
     assert begun == ["demo"]
 
@@ -812,7 +816,7 @@ def test_only_panels_of_a_visible_layout_are_created_ahead(theme: Theme, session
     window = MainWindow(session, theme, counted)
     window.show_layout("behaviour")
     shown = len(made)
-    for step in window.steps_ahead():
+    for step in window.preload_steps():
         step()
     ahead = made[shown:]
     assert {"topics", "inspector"} <= set(ahead)
@@ -833,7 +837,7 @@ def test_panels_created_ahead_and_never_shown_are_closed_with_the_window(
         return panels[-1]
 
     window = MainWindow(session, theme, {name: replace(each, make=make) for name, each in PANELS.items()})
-    steps = window.steps_ahead()
+    steps = window.preload_steps()
     for step in steps[:-1]:
         step()
     assert panels

@@ -12,13 +12,13 @@ from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
 from app.core.robots.motion.permission import MotionPermission
 from app.core.storage.settings import Settings
-from app.robots.description.description import Robot, parse, td_for
+from app.robots.description.description import Robot, parse, thing_description
 from app.robots.turtle import ROBOT
 from app.ui.shell.dialogs.motion_permission import MotionQuestion
 from app.ui.theme.theme import Theme
 from tests.ui.clipping import clipped
 
-ROVER: Robot = replace(parse(td_for(ROBOT.thing_model, "Rover")), virtual=False)
+ROVER: Robot = replace(parse(thing_description(ROBOT.thing_model, "Rover")), virtual=False)
 
 
 class Window(QWidget):
@@ -36,7 +36,7 @@ class Window(QWidget):
         self.done: list[str] = []
 
     def ask(self, *actions: str) -> None:
-        self.permission.permits([(ROVER, actions)], lambda: self.done.append("moved"))
+        self.permission.request_permission([(ROVER, actions)], lambda: self.done.append("moved"))
         self.question.refresh()
 
 
@@ -73,7 +73,7 @@ def test_allowing_motion_continues_the_action(window) -> None:
     assert window.done == ["moved"]
     assert not window.question.isVisible()
     assert window.focusWidget() is window.field
-    assert window.permission.allowed(ROVER)
+    assert window.permission.is_allowed(ROVER)
 
 
 @pytest.mark.parametrize("how", ["button", "escape", "enter"])
@@ -87,7 +87,7 @@ def test_not_now_moves_nothing(window, how) -> None:
         QTest.keyClick(window.question.not_now, Qt.Key.Key_Space)
     assert window.done == []
     assert not window.question.isVisible()
-    assert not window.permission.allowed(ROVER)
+    assert not window.permission.is_allowed(ROVER)
 
 
 def test_always_allow_is_saved(window, tmp_path) -> None:
@@ -97,7 +97,7 @@ def test_always_allow_is_saved(window, tmp_path) -> None:
     )
     assert window.question.always.isChecked()
     QTest.mouseClick(window.question.let, Qt.MouseButton.LeftButton)
-    assert MotionPermission(Settings(tmp_path)).allowed(ROVER)
+    assert MotionPermission(Settings(tmp_path)).is_allowed(ROVER)
 
 
 def test_always_allow_that_cannot_be_saved_is_reported_and_motion_is_allowed(window, tmp_path) -> None:
@@ -153,7 +153,7 @@ def test_long_robot_name_is_shown_in_full(qtbot, tmp_path, name, size, percent) 
     window.resize(*size)
     window.show()
     rover = replace(ROVER, name=name)
-    window.permission.permits([(rover, ("move",))], lambda: None)
+    window.permission.request_permission([(rover, ("move",))], lambda: None)
     window.question.refresh()
     assert clipped(window.question) == []
     for words in (window.question.title, window.question.sentence):

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.alerts import Alerts
-from app.core.network.remote_access import RemoteAccess, access_words
+from app.core.network.remote_access import RemoteAccess, access_status
 from app.core.storage.settings import Settings
 from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.theme.theme import Theme
@@ -70,8 +70,8 @@ def test_not_now_changes_nothing(make):
 
 def test_access_is_revoked_in_the_same_sheet(make):
     sheet, reach, asked = make()
-    reach.follow(GraphView(epoch=1, revision=1, listens=("192.168.1.20",)))
-    assert access_words(reach) == ("wifi", "Other computers connect at 192.168.1.20", "warn")
+    reach.update_graph(GraphView(epoch=1, revision=1, listens=("192.168.1.20",)))
+    assert access_status(reach) == ("wifi", "Other computers connect at 192.168.1.20", "warn")
     sheet.open()
     assert sheet.heading.text() == "Other computers can connect at 192.168.1.20"
     assert not sheet.yes.isVisible()
@@ -85,7 +85,7 @@ def test_without_a_network_the_sheet_explains_what_to_do_first(make):
     sheet.open()
     assert sheet.heading.text() == "This computer is not connected to a network"
     assert not sheet.yes.isVisible()
-    assert access_words(reach)[1] == "This computer only"
+    assert access_status(reach)[1] == "This computer only"
 
 
 def test_access_to_a_remote_master_is_decided_on_its_computer(make):
@@ -94,4 +94,4 @@ def test_access_to_a_remote_master_is_decided_on_its_computer(make):
     assert "192.168.1.9" in sheet.heading.text()
     assert not sheet.yes.isVisible()
     assert not sheet.end.isVisible()
-    assert access_words(reach) == ("network", "Master on 192.168.1.9", None)
+    assert access_status(reach) == ("network", "Master on 192.168.1.9", None)

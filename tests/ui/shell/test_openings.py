@@ -11,11 +11,11 @@ from PySide6.QtCore import QCoreApplication, QEvent, QObject, QPoint
 from PySide6.QtGui import QContextMenuEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QMenu, QPlainTextEdit, QPushButton, QWidget
 
-from app.core.graph.walk import GraphChoice
+from app.core.graph.walk import GraphSelection
 from app.core.session import Session
 from app.core.storage.settings import Settings
 from app.robots import simulated
-from app.robots.description.description import parse, td_for
+from app.robots.description.description import parse, thing_description
 from app.ui.panels.base import Panel
 from app.ui.panels.behaviour.panel import BehaviourPanel
 from app.ui.panels.graph.panel import GraphPanel
@@ -23,7 +23,7 @@ from app.ui.panels.registry import PanelRegistry
 from app.ui.panels.table_panel import TablePanel
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.docking.dock import Dock
-from app.ui.shell.main_window import FACTS_EVERY, MainWindow
+from app.ui.shell.main_window import FACTS_REFRESH_TICKS, MainWindow
 from app.ui.theme.theme import Theme
 from tests.ui.panels.test_behaviour import Editor
 from tests.ui.shell_parts import Answers, free_address
@@ -48,8 +48,10 @@ def window(qtbot, theme: Theme, home: Path) -> Iterator[MainWindow]:
     session = Session(
         Settings(home), address=free_address(), journal_folder=home / "journal", start_processes=False
     )
-    session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description")
-    session.fleet.join(parse(td_for(simulated.ROBOT.thing_model, "Anna")), "/Anna/description")
+    session.fleet.connect(
+        parse(thing_description(simulated.ROBOT.thing_model, "Pepper")), "/Pepper/description"
+    )
+    session.fleet.connect(parse(thing_description(simulated.ROBOT.thing_model, "Anna")), "/Anna/description")
     panels = PanelRegistry()
     behaviour = Panel("behaviour", "Behaviour", "blocks", (), lambda ctx: BehaviourPanel(ctx, Editor))
     made = MainWindow(session, theme, {**panels, "behaviour": behaviour}, asks=Answers())
@@ -84,7 +86,7 @@ def close_what_is_open(window: QWidget) -> None:
     for menu in [each for each in window.findChildren(QMenu) if each.isVisible()]:
         menu.close()
     for overlay in [each for each in window.findChildren(Overlay) if each.isVisible()]:
-        overlay.shut()
+        overlay.dismiss()
 
 
 def leaves_nothing(window: QWidget, open_it: Callable[[], object], times: int = TIMES) -> None:
@@ -117,7 +119,7 @@ def test_reopening_every_menu_of_a_panel_leaks_no_objects(qtbot, window: MainWin
     shown: list[QMenu] = []
 
     def open_more() -> None:
-        dock.title.menu_wanted.emit(dock.title.more)
+        dock.title.menu_requested.emit(dock.title.more)
         shown.append(QApplication.activePopupWidget())  # type: ignore[arg-type]
 
     def open_the_others() -> None:
@@ -176,7 +178,7 @@ def test_reopening_the_edge_menu_of_the_graph_leaks_no_objects(window: MainWindo
     window.show()
     inside = opened(window, "graph").panel
     assert isinstance(inside, GraphPanel)
-    leaves_nothing(window, lambda: inside._show_menu(GraphChoice("topic", "/blackboard"), QPoint(5, 5)))
+    leaves_nothing(window, lambda: inside._show_menu(GraphSelection("topic", "/blackboard"), QPoint(5, 5)))
 
 
 def test_reopening_the_column_menu_of_a_table_leaks_no_objects(window: MainWindow) -> None:
@@ -221,10 +223,10 @@ def test_toasts_and_banners_leak_no_objects(window: MainWindow) -> None:
 
     def say() -> None:
         window.toast.show_toast("Done", "Undo", lambda: None)
-        window.session.alerts.put(
+        window.session.alerts.raise_alert(
             "x", "error", "This is wrong.", "Mend it.", button="Stop", action="run.stop"
         )
-        for _ in range(FACTS_EVERY):  # the status bar tells of alerts, too
+        for _ in range(FACTS_REFRESH_TICKS):  # the status bar tells of alerts, too
             window.tick()
         window.session.alerts.resolve("x")
         window.tick()

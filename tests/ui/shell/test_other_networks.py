@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QWidget
 
-from app.core.network.source import GraphSeen, MasterLost
+from app.core.network.source import GraphReceived, MasterLost
 from app.core.storage.settings import Settings
 from app.errors import SettingsError
 from app.ui.shell.dialogs.other_networks import OtherNetworksSheet
@@ -64,7 +64,7 @@ def test_switch_applies_at_once_and_shows_the_connection_state(
     ros.switch.click()
     assert (world.made[0].address, ros.address.text()) == ("127.0.0.1:11311", "127.0.0.1:11311")
     assert states(sheet)[0] == "Searching."
-    world.tell(GraphSeen(graph("/a", "/b"), 0.0))
+    world.tell(GraphReceived(graph("/a", "/b"), 0.0))
     assert states(sheet)[0] == "Connected: 2 topics, 1 node."
     world.tell(MasterLost("", LONG))
     assert states(sheet)[0] == f"N{LONG[1:]}."
@@ -98,11 +98,11 @@ def test_typed_address_is_applied_when_the_sheet_closes(sheet: OtherNetworksShee
     row = sheet.rows[2]
     row.switch.click()
     row.address.setText("local/lab")
-    sheet.shut()
+    sheet.dismiss()
     assert [fake.address for fake in world.made] == ["local", "local/lab"]
     sheet.open()
     assert (row.switch.isChecked(), row.address.text()) == (True, "local/lab")
-    sheet.shut()
+    sheet.dismiss()
 
 
 def test_setting_that_cannot_be_saved_is_reported(

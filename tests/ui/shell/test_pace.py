@@ -48,8 +48,8 @@ def test_speed_applies_to_the_running_program_and_the_next_one(
 
 def test_start_position_of_virtual_robots_can_be_disabled(window: MainWindow, commands: Commands) -> None:
     fleet, action = window.session.fleet, commands.actions["run.from_start"]
-    assert (fleet.begins_at_start, action.isChecked()) == (True, True)
+    assert (fleet.resets_at_start, action.isChecked()) == (True, True)
     commands.run("run.from_start")
-    assert (fleet.begins_at_start, action.isChecked()) == (False, False)
+    assert (fleet.resets_at_start, action.isChecked()) == (False, False)
     commands.run("run.from_start")
-    assert (fleet.begins_at_start, action.isChecked()) == (True, True)
+    assert (fleet.resets_at_start, action.isChecked()) == (True, True)

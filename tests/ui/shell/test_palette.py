@@ -30,7 +30,7 @@ CTRL = Qt.KeyboardModifier.ControlModifier
 
 def found(*words: str, query: str) -> list[str]:
     entries = [Entry(f"command:{each}", each) for each in words]
-    return [each.entry.words for each in Finder(entries).find(query, 20)[0]]
+    return [each.entry.text for each in Finder(entries).find(query, 20)[0]]
 
 
 def bold(query: str, words: str) -> str:
@@ -57,7 +57,7 @@ def test_non_matching_entries_are_not_found(query: str) -> None:
 
 def test_available_commands_rank_above_unavailable_ones() -> None:
     entries = [Entry("command:a", "Let go", reason="Nothing is held"), Entry("command:b", "Go up")]
-    assert [each.entry.words for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Let go"]
+    assert [each.entry.text for each in Finder(entries).find("go", 20)[0]] == ["Go up", "Let go"]
 
 
 def test_scattered_letters_do_not_match() -> None:
@@ -73,7 +73,7 @@ def test_initials_match_a_command(query: str, words: str) -> None:
     topics = [Entry(f"topic:/{query}", f"/{query}"), Entry(f"topic:/a{query}", f"/a{query}")]
     other = Entry("command:x", f"Take the {query}x away")
     rows, _count = Finder([*topics, Entry("command:layout.reset", words)]).find(query, 20)
-    assert [each.entry.words for each in rows] == [words, f"/{query}", f"/a{query}"]
+    assert [each.entry.text for each in rows] == [words, f"/{query}", f"/a{query}"]
     rows, _count = Finder([other, Entry("command:layout.reset", words)]).find(query, 20)
     assert rows[0].entry is other, "whole letters of a command are still better than initials"
 
@@ -90,10 +90,10 @@ def test_among_ten_thousand_entries_whole_words_are_found_and_all_matches_counte
     assert count == 10_000
     assert len(rows) == 40
     rows, count = finder.find("robot77 joi", 40)
-    assert count == sum("robot77" in entry.words for entry in many)
-    assert rows[0].entry.words == "/robot77/joint/77"
+    assert count == sum("robot77" in entry.text for entry in many)
+    assert rows[0].entry.text == "/robot77/joint/77"
     rows, count = finder.find("joi", 40)
-    assert rows[0].entry.words == "Joists and beams"
+    assert rows[0].entry.text == "Joists and beams"
     assert count == 10_001
 
 
@@ -107,8 +107,8 @@ def test_fuzzy_comparison_is_limited_among_ten_thousand_topics(monkeypatch: pyte
     for query in ("j", "jo", "joi", "joint", "joint 9", "robot9999"):
         compared.clear()
         assert finder.find(query, 40)[0]
-        assert 0 < len(compared) <= fuzzy.MANY
-        assert fuzzy.MANY * 10 <= 10_000
+        assert 0 < len(compared) <= fuzzy.MAX_FUZZY_ENTRIES
+        assert fuzzy.MAX_FUZZY_ENTRIES * 10 <= 10_000
 
 
 class Steady(Overlay):
@@ -116,7 +116,7 @@ class Steady(Overlay):
 
     top = 300
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         return QSize(300, 200)
 
 
@@ -139,11 +139,11 @@ def palette(qtbot, window: MainWindow, commands: Commands) -> Palette:
 
 
 def words(palette: Palette) -> list[str]:
-    return [line.entry.words for line in palette.rows.lines.lines if isinstance(line, Match)]
+    return [line.entry.text for line in palette.rows.lines.lines if isinstance(line, Match)]
 
 
 def headings(palette: Palette) -> list[str]:
-    return [line.words for line in palette.rows.lines.lines if isinstance(line, Heading)]
+    return [line.text for line in palette.rows.lines.lines if isinstance(line, Heading)]
 
 
 def test_palette_is_640_px_wide_128_px_from_the_top_and_focused(palette: Palette, window: MainWindow) -> None:
@@ -157,7 +157,7 @@ def test_palette_opens_in_120_ms_and_at_once_with_reduced_motion(
     qtbot, palette: Palette, window: MainWindow
 ) -> None:
     assert palette.graphicsEffect() is None
-    palette.shut()
+    palette.dismiss()
     window.theme.set_motion("off")
     palette.open()
     assert palette._opening.duration() == 120
@@ -182,7 +182,7 @@ def test_overlay_cutout_follows_the_stop_button_when_the_text_size_changes(
     qtbot, palette: Palette, window: MainWindow, layout: str, percent: int
 ) -> None:
     """Whatever opens over the window: one that keeps its place is not laid out again by itself."""
-    palette.shut()
+    palette.dismiss()
     window.commands.run(f"layout.{layout}")
     window.theme.set_text_percent(150)
     stop = next(each for each in window.findChildren(StopButton) if each.isVisible())
@@ -234,7 +234,7 @@ def test_results_are_selected_by_keyboard(palette: Palette) -> None:
         QTest.keyClick(palette.field, key)
         entry = palette.rows.entry
         assert entry is not None
-        return entry.words
+        return entry.text
 
     assert chosen_after(Qt.Key.Key_Down) == order[1]
     assert chosen_after(Qt.Key.Key_Up) == order[0]
@@ -246,7 +246,7 @@ def test_results_are_selected_by_keyboard(palette: Palette) -> None:
 
 
 def test_esc_and_ctrl_k_close_the_palette_and_restore_focus(palette: Palette, window: MainWindow) -> None:
-    palette.shut()
+    palette.dismiss()
     panel = window.benches["developer"].docks["topics"].panel
     assert isinstance(panel, PlainPanel)
     panel.filter.setFocus()
@@ -273,7 +273,7 @@ def test_tab_stays_inside_the_palette(palette: Palette) -> None:
 
 
 def test_panels_topics_and_files_are_found(palette: Palette, window: MainWindow, tmp_path: Path) -> None:
-    palette.shut()
+    palette.dismiss()
     topics = window.session.topics
     topics._topics["/faces"] = Topic("/faces", "json", "json")
     topics.revision += 1
@@ -284,7 +284,7 @@ def test_panels_topics_and_files_are_found(palette: Palette, window: MainWindow,
     palette.open()
     QTest.keyClicks(palette.field, "faces")
     assert {"Topics", "Recent files"} <= set(headings(palette))
-    lines = {line.entry.words: line.entry for line in palette.rows.lines.lines if isinstance(line, Match)}
+    lines = {line.entry.text: line.entry for line in palette.rows.lines.lines if isinstance(line, Match)}
     assert lines["old faces"].reason == "No longer in gone"
     assert lines["faces"].reason == ""
     palette.field.setText("/faces")
@@ -304,10 +304,10 @@ def test_examples_are_found_and_open_as_new_behaviours(palette, window: MainWind
     path = tmp_path / "Tour.nepb"
     Document().save(path)
     window.start.examples = (Example(path, "Tour guide", "Shows the room", ()),)
-    palette.shut()
+    palette.dismiss()
     palette.open()
     QTest.keyClicks(palette.field, "tour g")
-    rows = [each.entry.words for each in palette.rows.lines.lines if isinstance(each, Match)]
+    rows = [each.entry.text for each in palette.rows.lines.lines if isinstance(each, Match)]
     assert (rows, headings(palette)) == (["Tour guide"], ["Examples"])
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert window.session.document.name == "Tour"
@@ -334,7 +334,7 @@ def test_empty_result_is_reported(palette: Palette) -> None:
 
 
 def test_list_stays_short_with_very_many_topics(palette: Palette, window: MainWindow) -> None:
-    palette.shut()
+    palette.dismiss()
     for number in range(10_000):
         window.session.topics._topics[f"/t{number}"] = Topic(f"/t{number}", "json", "json")
     window.session.topics.revision += 1
@@ -356,7 +356,7 @@ def test_screen_reader_text_contains_command_shortcut_and_reason(palette: Palett
 
 
 def test_search_field_in_the_app_bar_opens_the_palette(palette: Palette, window: MainWindow) -> None:
-    palette.shut()
+    palette.dismiss()
     assert window.bar.search.toolTip() == "Find a command or panel (Ctrl+K)"
     QTest.mouseClick(window.bar.search, Qt.MouseButton.LeftButton)
     assert palette.isVisible()

@@ -15,7 +15,7 @@ from PySide6.QtPrintSupport import QPrintDialog, QPrinter
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.core.session import Session
-from app.ui.shell.commands.printing import Printing, paint_pdf, usual_paper
+from app.ui.shell.commands.printing import Printing, default_page_layout, paint_pdf
 from app.ui.shell.commands.shell import Shell
 from tests.ui.shell_parts import Answers
 
@@ -36,7 +36,7 @@ def pages(count: int) -> bytes:
     buffer = QBuffer()
     buffer.open(QIODevice.OpenModeFlag.WriteOnly)
     writer = QPdfWriter(buffer)
-    writer.setPageLayout(usual_paper())
+    writer.setPageLayout(default_page_layout())
     painter = QPainter(writer)
     for number in range(count):
         if number:
@@ -67,7 +67,7 @@ def dialogs(kind: type) -> list[QWidget]:
 def test_without_a_printer_a_pdf_is_offered(qtbot, tmp_path: Path) -> None:
     case = Case(qtbot, b"%PDF", [])
     case.answers.path = tmp_path / "Tea 1.2"
-    case.printing.ask()
+    case.printing.show_dialog()
     assert "No printer" in case.said[0]
     assert case.answers.asked == [f"Save blocks as PDF: {Path.home() / 'Tea'}"]
     assert (tmp_path / "Tea 1.2.pdf").read_bytes() == b"%PDF"
@@ -77,7 +77,7 @@ def test_without_a_printer_a_pdf_is_offered(qtbot, tmp_path: Path) -> None:
 
 def test_print_dialog_is_not_modal(qtbot) -> None:
     case = Case(qtbot, b"%PDF", ["Office"])
-    case.printing.ask()
+    case.printing.show_dialog()
     (dialog,) = dialogs(QPrintDialog)
     assert not dialog.isModal()
     dialog.close()
@@ -101,7 +101,7 @@ def test_only_the_requested_pages_are_painted(qtbot, tmp_path: Path, first, last
     printer.setOutputFormat(QPrinter.OutputFormat.PdfFormat)
     printer.setOutputFileName(str(tmp_path / "out.pdf"))
     printer.setResolution(96)
-    printer.setPageLayout(usual_paper())
+    printer.setPageLayout(default_page_layout())
     printer.setFromTo(first, last)
     case = Case(qtbot, pages(3), ["Office"])
     case.printing.print(printer)

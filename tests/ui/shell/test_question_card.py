@@ -9,10 +9,10 @@ from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from app.core.run.asking import AskedQuestion, Asking
+from app.core.run.asking import AskedQuestion, OpenQuestion
 from app.core.run.runner import Runner, RunnerEvent
 from app.ui.shell.bars.question_card import QuestionCard
-from app.ui.shell.dialogs.overlay import stops_in
+from app.ui.shell.dialogs.overlay import stop_buttons_in
 from app.ui.shell.main_window import MainWindow
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
@@ -96,7 +96,7 @@ def test_card_stays_inside_the_window_and_does_not_cover_stop(card, window, word
     card.show_question(AskedQuestion(1, 1, words), held=False)
     assert window.rect().contains(card.geometry())
     assert card.words.text()
-    stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
+    stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
     assert stops
     assert not [stop for stop in stops if stop.intersects(card.geometry())]
 
@@ -113,10 +113,10 @@ class Answered:
 
 
 def test_only_the_current_question_is_answered_and_only_once() -> None:
-    asking, runner = Asking(), Answered(4)
+    asking, runner = OpenQuestion(), Answered(4)
     asking.apply(RunnerEvent("ask", 4, text="Nobody runs yet", question=9))
     assert asking.question is None
-    asking.begin(cast("Runner", runner))
+    asking.reset(cast("Runner", runner))
     asking.apply(RunnerEvent("ask", 4, text="Name?", question=1))
     shown = asking.question
     assert shown is not None
@@ -196,7 +196,7 @@ def test_long_choices_wrap_and_many_choices_scroll_to_the_focused_one(card, wind
     many = tuple(f"{number} " + "a choice of some length " * 8 for number in range(12))
     card.show_question(AskedQuestion(1, 4, "Which one? " * 20, many), held=False)
     assert window.rect().contains(card.geometry())
-    stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
+    stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
     assert not [stop for stop in stops if stop.intersects(card.geometry())]
     assert card.choices.buttons[0].height() > 2 * card.choices.buttons[0].fontMetrics().height()
     for _each in range(11):

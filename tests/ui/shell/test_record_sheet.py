@@ -9,8 +9,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from app.core.recording.choice import RecordingChoice, RingWish
-from app.core.recording.client import RecorderSaid
+from app.core.recording.choice import RecordingChoice, RingSettings
+from app.core.recording.client import RecorderEvent
 from app.core.recording.recordings import SessionRecordings
 from app.ui.shell.dialogs.record import RecordSheet
 from app.ui.shell.main_window import MainWindow
@@ -44,7 +44,7 @@ class Recorder:
         return [order["op"] for order in self.line.orders]
 
     def say(self, event: str, **content: object) -> None:
-        self.session.recordings.on_event(RecorderSaid(1, {"event": event, **content}))
+        self.session.recordings.on_event(RecorderEvent(1, {"event": event, **content}))
 
 
 @pytest.fixture
@@ -88,17 +88,17 @@ def test_shortcut_starts_and_stops_recording_and_the_bars_show_it(window, record
     recorder.say("figures", recording=status(size_bytes=168_000_000), ring=None, free_bytes=10**12)
     assert shown(window) == "0:42, 168 MB"
     assert window.tools.record.width() == wide
-    assert "Recording 0:42, 168 MB, 2 lost" in window.status.words()
-    assert window.commands.actions.why_not("recording.stop") == ""
+    assert "Recording 0:42, 168 MB, 2 lost" in window.status.texts()
+    assert window.commands.actions.disabled_reason("recording.stop") == ""
     window.commands.run("layout.behaviour")
     window._show_facts()
-    assert any(words.startswith("Recording 0:42") for words in window.status.words())
+    assert any(words.startswith("Recording 0:42") for words in window.status.texts())
     window.commands.run("recording.toggle")
     recorder.say("ended", status=status(duration_s=42.0, size_bytes=168_000_000))
     assert recorder.ops() == ["record", "stop"]
     assert shown(window) == "Record"
-    assert not any(words.startswith("Recording") for words in window.status.words())
-    assert window.commands.actions.why_not("recording.stop") == "Not recording"
+    assert not any(words.startswith("Recording") for words in window.status.texts())
+    assert window.commands.actions.disabled_reason("recording.stop") == "Not recording"
     assert ": 0:42, 168 MB" in window.toast.accessibleName()
 
 
@@ -124,17 +124,17 @@ def test_only_selected_topics_are_recorded(window, recorder):
     session = recorder.session
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    names = sorted(topic.name for topic in session.topics.live())
+    names = sorted(topic.name for topic in session.topics.existing_topics())
     assert sheet.count.text().startswith(f"{len(names)} of {len(names)}")
-    sheet._choose_mode("chosen")
+    sheet._set_mode("chosen")
     assert session.recordings.choice.topics == tuple(names)
     sheet._toggle("/odom")
     assert sheet.count.text().startswith(f"{len(names) - 1} of {len(names)}")
     place = sheet.model.index_of("/odom").row()
-    assert [sheet.model.cell_at(place, column).said for column in (0,)] == ["excluded"]
-    sheet._choose_mode("pattern")
+    assert [sheet.model.cell_at(place, column).accessible_text for column in (0,)] == ["excluded"]
+    sheet._set_mode("pattern")
     QTest.keyClicks(sheet.patterns.edit, "/** not /odom")
-    assert session.recordings.choice.left_out == ("/odom",)
+    assert session.recordings.choice.excluded == ("/odom",)
     sheet.note.setText("second try")
     sheet.record.click()
     (order,) = recorder.line.orders
@@ -144,7 +144,7 @@ def test_only_selected_topics_are_recorded(window, recorder):
 def test_invalid_topic_pattern_is_reported_and_not_recorded(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    sheet._choose_mode("pattern")
+    sheet._set_mode("pattern")
     sheet.patterns.show_patterns(("/a\x01",), ())
     sheet.patterns.changed.emit()
     assert sheet.wrong.isVisible()
@@ -158,7 +158,7 @@ def test_invalid_topic_pattern_is_reported_and_not_recorded(window, recorder):
 def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorder):
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    sheet._choose_mode("pattern")
+    sheet._set_mode("pattern")
     field = sheet.patterns
 
     def tokens() -> list[tuple[str, bool]]:
@@ -171,7 +171,7 @@ def test_topic_patterns_are_tokens_added_and_removed_by_keyboard(window, recorde
     QTest.keyClicks(field.edit, "/arm/* ")  # it is there already
     assert field.edit.text() == ""
     choice = recorder.session.recordings.choice
-    assert (choice.patterns, choice.left_out) == (("/arm/*", "*camera*"), ("/arm/raw",))
+    assert (choice.patterns, choice.excluded) == (("/arm/*", "*camera*"), ("/arm/raw",))
     QTest.keyClick(field.edit, Qt.Key.Key_Backspace)
     assert len(tokens()) == 2
     QTest.mouseClick(field.tokens[0], Qt.MouseButton.LeftButton)
@@ -190,7 +190,7 @@ def test_recording_stops_after_the_chosen_limit_and_its_size_is_estimated(window
         field.editingFinished.emit()
     assert sheet.ends_words.text() == "whichever comes first"
     choice = recorder.session.recordings.choice
-    assert (choice.ends_min, choice.ends_gb) == (30.0, 8.0)
+    assert (choice.max_minutes, choice.max_gb) == (30.0, 8.0)
     sheet.ends_min.setText("-1")
     sheet.ends_min.editingFinished.emit()
     assert sheet.ends_words.text() == "The minimum is 0.1 min."
@@ -213,18 +213,18 @@ def test_recording_stops_after_the_chosen_limit_and_its_size_is_estimated(window
     assert "at the time limit" in window.toast.text
     sheet.ends_min.clear()
     sheet.ends_min.editingFinished.emit()
-    assert recorder.session.recordings.choice.ends_min is None
+    assert recorder.session.recordings.choice.max_minutes is None
 
 
 def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, recorder):
     window.commands.run("recording.keep")
     assert recorder.ops() == []
     assert "flight recorder is off" in window.toast.accessibleName()
-    window.commands.recording._switch_on()
+    window.commands.recording._enable_flight_recorder()
     recorder.say("ring")
     recorder.say("figures", recording=None, ring={"seconds": 41.0, "size_bytes": 10**9}, free_bytes=None)
     window._show_facts()
-    assert "last 41 s available" in window.status.words()
+    assert "last 41 s available" in window.status.texts()
     window.commands.run("recording.keep")
     assert recorder.ops() == ["ring", "keep"]
     window.commands.run("recording.sheet")
@@ -233,7 +233,7 @@ def test_saving_the_last_seconds_offers_to_enable_the_flight_recorder(window, re
     assert sheet.ring_words.text() == "41 s buffered, 1.0 GB of 2.0 GB"
     sheet.seconds.setText("30")
     sheet.seconds.editingFinished.emit()
-    assert recorder.session.recordings.wish == RingWish(is_on=True, seconds=30)
+    assert recorder.session.recordings.wish == RingSettings(is_on=True, seconds=30)
     QTest.keyClicks(sheet.ring_topics.edit, "/arm/* not /arm/raw")
     assert recorder.session.recordings.wish.patterns == ("/arm/*",)
     QTest.keyClick(sheet.ring_topics.edit, Qt.Key.Key_Return)
@@ -273,12 +273,12 @@ def test_texts_of_the_sheet_are_translated_and_fit(qtbot, pseudo, window, record
     theme.set_text_percent(percent)
     window.commands.run("recording.sheet")
     sheet = sheet_of(window)
-    sheet._choose_mode("pattern")
-    recorder.session.recordings.set_wish(RingWish(is_on=True))
+    sheet._set_mode("pattern")
+    recorder.session.recordings.set_ring_settings(RingSettings(is_on=True))
     recorder.say("ring")
     sheet.show_state()
     qtbot.wait(50)  # Qt lays out later
-    topics = [topic.name for topic in recorder.session.topics.live()]
+    topics = [topic.name for topic in recorder.session.topics.existing_topics()]
     assert [text for _where, text in said_by(sheet) if untranslated(text, "GB", *topics)] == []
     assert clipped(sheet) == []
     assert not list(unsaid(sheet))

@@ -21,7 +21,7 @@ def test_starting_a_second_behaviour_reports_which_one_was_stopped(
     for name in ("Greeting", "Quiz"):
         if session.document.has_blocks:
             commands.run("file.new")
-        session.document.edited(workspace(started(write(number(1)))))
+        session.document.apply_edit(workspace(started(write(number(1)))))
         session.document.name = name
         commands.run("run.run")
     assert "Greeting" in window.toast.text
@@ -32,7 +32,7 @@ def test_restarting_the_same_behaviour_reports_no_stop(window: MainWindow, comma
     session = window.session
     runs, seconds = session.runs, itertools.count(0.0, 10.0)
     runs._make_runner, runs._clock = Runner, lambda: next(seconds)
-    session.document.edited(workspace(started(write(number(1)))))
+    session.document.apply_edit(workspace(started(write(number(1)))))
     for _ in range(2):
         commands.run("run.run")
     assert window.toast.text == ""

@@ -16,7 +16,7 @@ from app.core.recording.replay.replay import Replay
 from app.core.session import Session
 from app.ui.panels.base import Panel, PanelWidget
 from app.ui.panels.registry import PanelRegistry
-from app.ui.panels.timeline.canvas import shades
+from app.ui.panels.timeline.canvas import density_image
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from nep.messages.message import Message
@@ -204,8 +204,8 @@ def test_tool_bar_and_status_bar_show_the_current_source(qtbot, window, session,
     window.tools.refresh()
     assert source.text() == "Tour.mcap  0:00"
     window._show_facts()
-    assert window.status.words()[0].startswith("Tour.mcap, ")
-    assert "The live network keeps running" in window.status.words()
+    assert window.status.texts()[0].startswith("Tour.mcap, ")
+    assert "The live network keeps running" in window.status.texts()
     QTest.mouseClick(source.back, Qt.MouseButton.LeftButton)
     window.tools.refresh()
     assert (source.text(), source.back.isVisible()) == ("Live network", False)
@@ -269,7 +269,7 @@ def test_mouse_seeks_selects_and_zooms(qtbot, window, session, path, whole):
 
 
 def test_timeline_lanes_are_darker_where_the_message_density_is_higher():
-    made = shades([0, 1, 2, 4], 4, QColor("#ffffff"))
+    made = density_image([0, 1, 2, 4], 4, QColor("#ffffff"))
     alphas = [made.pixelColor(x, 0).alphaF() for x in range(4)]
     assert made.format() == QImage.Format.Format_ARGB32_Premultiplied
     assert alphas[0] == 0.0

@@ -55,7 +55,7 @@ def path(tmp_path_factory) -> Path:
         ("runs", run("Tour guide", 55, 90, "failed", "wave failed")),
         ("alarms", alarm),
     ]
-    with RecordingWriter(path, clock=TestClock(), limits=limits(figures_s=1e6)) as writer:
+    with RecordingWriter(path, clock=TestClock(), limits=limits(stats_interval_s=1e6)) as writer:
         for number in range(COUNT):
             if number == 5:
                 writer.write_entry("notes", {"text": "it fell"})
@@ -108,7 +108,7 @@ class Shown:
 
         def found() -> list[LaneMark]:
             self.canvas.grab()
-            return [each for each in self.canvas._marks if words in each.words]
+            return [each for each in self.canvas._marks if words in each.text]
 
         self.wait(lambda: len(found()) == 1)
         (mark,) = found()
@@ -157,7 +157,7 @@ def test_click_seeks_to_a_run_or_alarm_and_both_are_marked(shown):
         shown.press(words)
         shown.wait(lambda step=step: shown.replay.player.position_ns == at(step))
     shown.wait(lambda: running in colours(36, line))
-    assert canvas._theme.colour("error").name() in colours(65, canvas._top() + canvas._row() / 2)
+    assert canvas._theme.colour("error").name() in colours(65, canvas._lanes_top() + canvas._row_height() / 2)
     for key, step in ((Qt.Key.Key_Right, 55), (Qt.Key.Key_Left, 10)):
         QTest.keyClick(canvas, key, Qt.KeyboardModifier.ControlModifier)
         shown.wait(lambda step=step: shown.replay.player.position_ns == at(step))

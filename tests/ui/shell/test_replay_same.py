@@ -134,7 +134,7 @@ class Studio:
         for name in ("image", "plot"):  # behind a tab they would look at nothing
             self.window.bench.docks[name].setFloating(True)
         docks = self.window.bench.docks
-        self.until(lambda: docks["image"].shown() and docks["plot"].shown())
+        self.until(lambda: docks["image"].is_displayed() and docks["plot"].is_displayed())
         self.until(lambda: self.source.wanted >= {*INSPECTED, CAMERA, LOG_TOPIC})
 
     def panel(self, name: str, kind: type) -> PanelWidget:
@@ -175,7 +175,9 @@ class Studio:
             held["picture"] = (shown.picture.width, shown.picture.height, shown.picture.bgra.tobytes())
         console = self.panel("console", ConsolePanel)
         self.window.tick()
-        held["lines"] = [(r.stamp_s, r.level, r.origin, r.text) for r in self.session.shown_console.records]
+        held["lines"] = [
+            (r.stamp_s, r.level, r.origin, r.text) for r in self.session.displayed_console.records
+        ]
         held["lines in sight"] = [
             console.model.index(n, 0).data(Qt.ItemDataRole.AccessibleTextRole)
             for n in range(console.model.rowCount())

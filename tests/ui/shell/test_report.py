@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 
 from app.core.documents.file_format import read_file
 from app.core.reports.crash import Crash
-from app.core.reports.crash_reports import ALERT, CrashReports, offer
+from app.core.reports.crash_reports import ALERT, CrashReports, show_crash_alert
 from app.core.session import Session
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.reporting import ReportCommands
@@ -128,8 +128,8 @@ def test_folder_path_is_shown_when_the_file_manager_cannot_be_opened(
 def test_behaviours_are_included_only_when_enabled_each_time(
     qtbot, window: MainWindow, sheet: ReportSheet, session: Session, answers: Answers, tmp_path: Path
 ) -> None:
-    sheet.shut()
-    session.document.edited(SECRET)
+    sheet.dismiss()
+    session.document.apply_edit(SECRET)
     assert window.commands.run("help.report")
     assert sheet.work.isVisible()
     assert not sheet.work.isChecked()
@@ -144,7 +144,7 @@ def test_behaviours_are_included_only_when_enabled_each_time(
     found = inside(tmp_path / "with.zip")
     (tmp_path / "it.nepb").write_bytes(found["work/New behaviour.nepb"])
     assert read_file(tmp_path / "it.nepb").workspace == SECRET
-    sheet.shut()
+    sheet.dismiss()
     assert window.commands.run("help.report")
     assert not sheet.work.isChecked()
 
@@ -168,7 +168,7 @@ def test_report_finished_after_the_sheet_is_closed_is_announced_by_a_toast(
 ) -> None:
     answers.path = tmp_path / "report.zip"
     sheet.write.click()
-    sheet.shut()
+    sheet.dismiss()
     qtbot.waitUntil(lambda: window.toast._words.text().startswith("The report is in"))
 
 
@@ -177,7 +177,7 @@ def test_banner_offers_a_crash_report_that_contains_the_crash(
 ) -> None:
     CrashReports().add(Crash("studio", "by signal 11", "where it was"))
     window.show()
-    offer(session.alerts, CrashReports())
+    show_crash_alert(session.alerts, CrashReports())
     window.tick()
     banner = window.banner.banner
     assert banner.isVisible()
@@ -196,13 +196,13 @@ def test_banner_offers_a_crash_report_that_contains_the_crash(
 def test_dismissed_crash_is_not_offered_again(window: MainWindow, session: Session, home: Path) -> None:
     CrashReports().add(Crash("robot", "by signal 11"))
     window.show()
-    offer(session.alerts, CrashReports())
+    show_crash_alert(session.alerts, CrashReports())
     window.tick()
     window.banner.banner.close_button.click()
     window.tick()
     assert not window.banner.isVisible()
     session.alerts.resolve(ALERT)  # as at the next start
-    offer(session.alerts, CrashReports())
+    show_crash_alert(session.alerts, CrashReports())
     assert not session.alerts.has(ALERT)
 
 
@@ -236,7 +236,7 @@ def test_texts_are_translated_and_fit(
     theme.set_motion(True)
     theme.set_text_percent(percent)
     window.show()
-    session.document.edited(SECRET)
+    session.document.apply_edit(SECRET)
     CrashReports().add(Crash("studio", "how"))
     window.commands.run("help.report")
     sheet = window.findChild(ReportSheet)
@@ -274,7 +274,7 @@ def test_checking_for_a_new_version_only_opens_the_page(
     said: list[str] = []
     monkey = ReportCommands(window, session, window.commands.files, answers)
     window.toast.show_toast = lambda words, *_more: said.append(words)  # type: ignore[method-assign]
-    monkey.look_for_new_version("https://example.org/releases")
+    monkey.open_releases_page("https://example.org/releases")
     assert opened.urls == ["https://example.org/releases"]
     assert f"This is NEP Studio {__version__}." in said[0]
     assert ("example.org" in said[0]) is not works

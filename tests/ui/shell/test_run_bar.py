@@ -24,17 +24,17 @@ VIEWS = {
     ),
     "running": RunView(
         "running", "Running, 14 s", "Pepper says “Touch my head.”", "Greeting runs, 14 s",
-        can_pause=True, can_step=True, can_restart=True, run_word="Restart",
+        can_pause=True, can_step=True, can_restart=True, run_label="Restart",
         last_stop="all 2 robots stopped (41 ms)",
         last_stop_status="ok",
     ),
     "paused": RunView(
         "paused", "Paused at “wait 2 s”", "Robots and timers are paused", "Greeting is paused",
-        can_run=True, can_step=True, can_restart=True, run_word="Resume",
+        can_run=True, can_step=True, can_restart=True, run_label="Resume",
     ),
     "stopping": RunView(
         "stopping", "Stopping", "Waiting for Turtle, 0.2 s", "Stopping",
-        stop_word="Stopping", result="1 of 2 robots stopped",
+        stop_label="Stopping", result="1 of 2 robots stopped",
     ),
     "proven": RunView(
         "proven", "Stopped after 14 s", "It stopped at the dashed block", "Stopped after 14 s",
@@ -42,8 +42,8 @@ VIEWS = {
     ),
     "unanswered": RunView(
         "unanswered", "Turtle did not reply", "Pepper stopped (38 ms). Switch Turtle off by hand.",
-        "Turtle did not reply; switch it off by hand", stop_word="Stop again",
-        result="1 of 2 robots stopped", result_status="error", confirm="Turtle isn't moving",
+        "Turtle did not reply; switch it off by hand", stop_label="Stop again",
+        result="1 of 2 robots stopped", result_status="error", confirm_label="Turtle isn't moving",
     ),
 }  # fmt: skip
 
@@ -84,7 +84,7 @@ def test_each_state_matches_the_design(bar: RunBar, state, run, pause, step, sto
     assert bar.run.kind == ("run" if run else "plain")
     assert bar.stop.text() == stop
     assert bar.stop.isEnabled()
-    assert bar.result.look == look
+    assert bar.result.appearance == look
     assert bar.confirm.isVisible() == (state == "unanswered")
     assert bar.sentence.accessibleName() == f"{VIEWS[state].title}. {VIEWS[state].detail}"
     assert (bar.sentence.colour_role == "text") == (state != "unanswered")  # else red
@@ -93,7 +93,7 @@ def test_each_state_matches_the_design(bar: RunBar, state, run, pause, step, sto
 @pytest.mark.parametrize("status", ["ok", "off", "error"])
 def test_icon_shows_the_result_of_the_last_stop(bar: RunBar, status: StopStatus) -> None:
     bar.show_view(replace(VIEWS["running"], last_stop="1 of 2 robots stopped", last_stop_status=status))
-    assert (bar.result.look, bar.result.status) == ("reminder", status)
+    assert (bar.result.appearance, bar.result.status) == ("reminder", status)
 
 
 def test_buttons_keep_their_position_in_all_states(bar: RunBar) -> None:
@@ -115,9 +115,9 @@ def test_run_button_shows_resume_when_paused(bar: RunBar) -> None:
 def test_restart_replaces_run_and_is_filled_when_the_blocks_were_edited(bar: RunBar) -> None:
     bar.show_view(VIEWS["running"])
     assert (bar.run.text(), bar.run.icon_name, bar.run.kind) == ("Restart", "rotate-ccw", "plain")
-    bar.show_view(replace(VIEWS["running"], edited=True))
+    bar.show_view(replace(VIEWS["running"], is_edited=True))
     assert (bar.run.text(), bar.run.kind, bar.restart.isVisible()) == ("Restart", "run", False)
-    bar.show_view(replace(VIEWS["paused"], edited=True))
+    bar.show_view(replace(VIEWS["paused"], is_edited=True))
     assert (bar.run.text(), bar.restart.isVisible()) == ("Resume", True)
     bar.show_view(VIEWS["paused"])
     assert not bar.restart.isVisible()
@@ -130,7 +130,7 @@ def test_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     def row(name: str) -> Command[None]:
         return Command(name, name, lambda _do: told.append(name))
 
-    bar.use(Actions(bar, theme, [row(name) for name in names], None))
+    bar.set_actions(Actions(bar, theme, [row(name) for name in names], None))
     bar.show_view(VIEWS["ready"])
     QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
     bar.show_view(VIEWS["unanswered"])
@@ -139,7 +139,7 @@ def test_buttons_trigger_their_commands(theme: Theme, bar: RunBar) -> None:
     QTest.mouseClick(bar.stop, Qt.MouseButton.LeftButton)
     bar.show_view(VIEWS["running"])
     QTest.mouseClick(bar.run, Qt.MouseButton.LeftButton)
-    bar.show_view(replace(VIEWS["paused"], edited=True))
+    bar.show_view(replace(VIEWS["paused"], is_edited=True))
     QTest.mouseClick(bar.restart, Qt.MouseButton.LeftButton)
     assert told == ["run.run", "run.confirm", "run.stop", "run.run", "run.restart"]
 

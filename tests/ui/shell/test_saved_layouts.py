@@ -92,7 +92,7 @@ def test_layout_is_renamed(shown: MainWindow, commands: Commands) -> None:
     sheet.field.setText("Two")
     QTest.keyClick(sheet.field, Qt.Key.Key_Return)
     assert [own.name for own in shown.saved_layouts.all()] == ["Two"]
-    assert shown.saved_layouts.own("developer") == "Two"
+    assert shown.saved_layouts.custom_name("developer") == "Two"
 
 
 def test_deleted_layout_is_restored_by_undo(shown: MainWindow, commands: Commands) -> None:
@@ -104,7 +104,7 @@ def test_deleted_layout_is_restored_by_undo(shown: MainWindow, commands: Command
     assert opened(shown) > small
     QTest.mouseClick(shown.toast.button, Qt.MouseButton.LeftButton)
     assert [own.name for own in shown.saved_layouts.all()] == ["One"]
-    assert shown.saved_layouts.own("developer") == "One"
+    assert shown.saved_layouts.custom_name("developer") == "One"
     assert opened(shown) == small
 
 
@@ -119,7 +119,7 @@ def test_selected_layout_is_restored_after_restart(
     qtbot.addWidget(other)
     again = other.commands
     again.run("layout.developer")
-    assert other.saved_layouts.own("developer") == "Mine"
+    assert other.saved_layouts.custom_name("developer") == "Mine"
     assert opened(other) == left
     use(other, again, "Developer")
     assert "console" in opened(other)
@@ -175,9 +175,9 @@ def test_unavailable_entries_are_disabled_in_the_menu(shown: MainWindow, command
 def test_palette_lists_custom_layouts(shown: MainWindow, commands: Commands) -> None:
     keep_as(shown, commands, "Two cameras")
     use(shown, commands, "Developer")
-    found = {entry.words: entry for entry in commands.entries.all()}
-    commands.view.do(found["Two cameras"])
-    assert shown.saved_layouts.own("developer") == "Two cameras"
+    found = {entry.text: entry for entry in commands.entries.all()}
+    commands.view.run_entry(found["Two cameras"])
+    assert shown.saved_layouts.custom_name("developer") == "Two cameras"
 
 
 def test_unwritable_layout_is_reported_as_not_saved(shown: MainWindow, commands: Commands) -> None:
@@ -193,7 +193,7 @@ def test_unwritable_layout_is_reported_as_not_saved(shown: MainWindow, commands:
     assert alert.title == "Settings you change now are lost when Studio closes."
     commands.run("layout.delete")
     assert shown.toast.text == "Can't save this change: “Two” will return at the next start"
-    commands.behaviours.forget_recent()
+    commands.behaviours.clear_recent()
     assert shown.toast.text == "Can't save this change: the recent files will return at the next start"
     commands.run("robots.ask")
     assert shown.toast.text == "Until you close Studio, it will ask again before a real robot moves"

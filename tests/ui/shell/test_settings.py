@@ -114,10 +114,10 @@ def test_missing_recent_files_are_disabled_and_the_list_can_be_cleared(
         "Clear recent files": True,
     }
     commands.run("file.forget_recent")
-    assert settings.recent_known == []
+    assert settings.all_recent == []
     window.show()
     QTest.mouseClick(window.toast.button, Qt.MouseButton.LeftButton)
-    assert [file.name for file in settings.recent_known] == ["there", "gone"]
+    assert [file.name for file in settings.all_recent] == ["there", "gone"]
 
 
 def test_failed_settings_write_is_reported_once_until_a_write_succeeds(tmp_path: Path) -> None:
@@ -125,23 +125,23 @@ def test_failed_settings_write_is_reported_once_until_a_write_succeeds(tmp_path:
     told: list[str] = []
     state = WindowState(Settings(tmp_path / "home"), told.append)
     for number in range(3):
-        state.keep(f"key{number}", number)
+        state.save(f"key{number}", number)
     assert len(told) == 1
     (tmp_path / "home").unlink()
-    state.keep("key", 1)
+    state.save("key", 1)
     assert len(told) == 1
     for file in (tmp_path / "home").iterdir():
         file.unlink()
     (tmp_path / "home").rmdir()
     (tmp_path / "home").write_text("no folder")
-    state.keep("key", 2)
+    state.save("key", 2)
     assert len(told) == 2
 
 
 def test_language_is_saved_for_the_next_start(
     monkeypatch, window: MainWindow, commands: Commands, home: Path
 ) -> None:
-    monkeypatch.setattr("nep.i18n.offered", lambda: [("en", "English"), ("es", "Español")])
+    monkeypatch.setattr("nep.i18n.selectable_languages", lambda: [("en", "English"), ("es", "Español")])
     window.show()
     commands.run("settings.open")
     sheet = window.findChild(SettingsSheet)
@@ -160,7 +160,7 @@ def test_many_languages_are_shown_in_a_drop_down_list(
     monkeypatch, window: MainWindow, commands: Commands, home: Path
 ) -> None:
     names = [("en", "English"), ("es", "Español"), ("fr", "Français"), ("ja", "日本語")]
-    monkeypatch.setattr("nep.i18n.offered", lambda: names)
+    monkeypatch.setattr("nep.i18n.selectable_languages", lambda: names)
     window.show()
     commands.run("settings.open")
     sheet = window.findChild(SettingsSheet)
@@ -186,7 +186,7 @@ def test_settings_show_whether_the_robot_voice_is_available(
             """Nobody speaks."""
 
     assert sheet.voice.text()
-    sheet.shut()
+    sheet.dismiss()
     window.session.voices.speaker = Silent()
     commands.run("settings.open")
     assert sheet.voice.text().startswith("This computer has no voice for French. ")
@@ -195,7 +195,7 @@ def test_settings_show_whether_the_robot_voice_is_available(
 def test_language_change_offers_a_restart_that_waits_until_robots_stop(
     qtbot, monkeypatch, window: MainWindow, commands: Commands
 ) -> None:
-    monkeypatch.setattr("nep.i18n.offered", lambda: [("en", "English"), ("es", "Español")])
+    monkeypatch.setattr("nep.i18n.selectable_languages", lambda: [("en", "English"), ("es", "Español")])
     window.can_restart = True
     window.show()
     commands.run("settings.open")

@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QApplication
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
 from app.ui.shell.dialogs.command_palette import TITLES, Palette
-from app.ui.shell.docking.dock import Dock, key_of, kind_of
+from app.ui.shell.docking.dock import Dock, key_of, parse_key
 from app.ui.shell.docking.layouts import layout_named
-from app.ui.shell.docking.workbench import MAX_OF_A_KIND, Workbench
+from app.ui.shell.docking.workbench import MAX_PER_KIND, Workbench
 from app.ui.shell.main_window import MainWindow
 from app.ui.theme.theme import Theme
 from app.ui.widgets.lists.entry_list import Heading
@@ -43,7 +43,7 @@ def of_topics(name: str):
     def make(context: PanelContext) -> TopicPanel:
         return TopicPanel(context, PANELS[name].title)
 
-    return replace(PANELS[name], make=make, several=True)
+    return replace(PANELS[name], make=make, allows_multiple=True)
 
 
 SEVERAL = {**PANELS, "inspector": of_topics("inspector"), "image": of_topics("image")}
@@ -66,7 +66,7 @@ def bench(qtbot, window: MainWindow) -> Workbench:
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     made = window.show_layout("developer")
-    qtbot.waitUntil(made.docks["inspector"].shown)
+    qtbot.waitUntil(made.docks["inspector"].is_displayed)
     return made
 
 
@@ -94,7 +94,7 @@ def apart(one: Dock, other: Dock) -> bool:
     ],
 )  # fmt: skip
 def test_panel_key_encodes_kind_and_number(key, kind) -> None:
-    assert kind_of(key) == kind
+    assert parse_key(key) == kind
     assert key_of(*kind) == key
 
 
@@ -105,7 +105,7 @@ def test_additional_panel_opens_beside_the_first_with_a_number_and_its_own_topic
     first.panel.show_topic("/odom")
     choose(first, MORE)
     second = bench.docks["inspector#2"]
-    qtbot.waitUntil(lambda: first.shown() and second.shown() and apart(first, second))
+    qtbot.waitUntil(lambda: first.is_displayed() and second.is_displayed() and apart(first, second))
     assert (first.panel.title(), second.panel.title()) == ("Inspector", "Inspector 2")
     assert second.accessibleName() == second.panel.accessibleName() == "Inspector 2"
     assert second.isAncestorOf(QApplication.focusWidget())
@@ -123,7 +123,7 @@ def test_additional_panel_beside_a_tabbed_dock_keeps_the_tabs(qtbot, bench, wind
     qtbot.waitUntil(lambda: bench.docks["console"] in bench.tabifiedDockWidgets(first))
     choose(first, MORE)
     second = bench.docks["image#2"]
-    qtbot.waitUntil(lambda: first.shown() and second.shown() and apart(first, second))
+    qtbot.waitUntil(lambda: first.is_displayed() and second.is_displayed() and apart(first, second))
     qtbot.waitUntil(lambda: first.title.tabs == ("Image", "Console"))
     assert second.title.tabs == ()
 
@@ -136,21 +136,23 @@ def test_single_instance_panel_does_not_offer_another(bench) -> None:
 
 
 def test_number_of_panels_of_a_kind_is_limited(bench, window) -> None:
-    opened = [bench.open_another("image") for _ in range(MAX_OF_A_KIND)]
-    assert len([dock for dock in opened if dock is not None]) == MAX_OF_A_KIND - 1
-    assert window.toast.text == f"The maximum of {MAX_OF_A_KIND} panels of this kind is already open"
+    opened = [bench.open_another("image") for _ in range(MAX_PER_KIND)]
+    assert len([dock for dock in opened if dock is not None]) == MAX_PER_KIND - 1
+    assert window.toast.text == f"The maximum of {MAX_PER_KIND} panels of this kind is already open"
 
 
 def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, window) -> None:
     for key, topic in (("inspector", "/odom"), ("inspector#2", "/cmd"), ("image#2", "/camera")):
-        dock = bench.docks.get(key) or bench.open_another(kind_of(key)[0])
+        dock = bench.docks.get(key) or bench.open_another(parse_key(key)[0])
         assert dock is not None
         assert dock.key == key
         dock.panel.show_topic(topic)
-    qtbot.waitUntil(lambda: all(bench.docks[key].shown() for key in ("inspector", "inspector#2", "image#2")))
+    qtbot.waitUntil(
+        lambda: all(bench.docks[key].is_displayed() for key in ("inspector", "inspector#2", "image#2"))
+    )
     places = {key: dock.geometry() for key, dock in bench.docks.items() if dock.shown()}
     kept = json.loads(json.dumps(bench.save()))
-    bench.arrange()
+    bench.reset_layout()
     assert "inspector#2" not in bench.docks
     again = Workbench(window.theme, layout_named("developer"), SEVERAL, window.context)
     qtbot.addWidget(again)
@@ -161,7 +163,7 @@ def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, windo
         "/odom", "/cmd", "/camera",
     ]  # fmt: skip
     qtbot.waitUntil(lambda: places == {key: again.docks[key].geometry() for key in places})
-    again.shut()
+    again.dispose()
 
 
 def test_layouts_of_earlier_and_later_versions_are_restored(qtbot, bench) -> None:
@@ -202,7 +204,7 @@ def test_first_panel_is_kept_when_it_is_closed(bench) -> None:
 def test_topic_opens_in_the_last_used_panel_or_in_an_additional_one(qtbot, bench, window) -> None:
     window.open_topic("/a")
     assert topic_of(bench, "inspector") == "/a"
-    window.context.open_beside("/b")
+    window.context.open_to_side("/b")
     assert topic_of(bench, "inspector#2") == "/b"
     window.open_topic("/c")
     assert (topic_of(bench, "inspector"), topic_of(bench, "inspector#2")) == ("/a", "/c")
@@ -211,7 +213,7 @@ def test_topic_opens_in_the_last_used_panel_or_in_an_additional_one(qtbot, bench
     window.open_topic("/d")
     assert (topic_of(bench, "inspector"), topic_of(bench, "inspector#2")) == ("/d", "/c")
     bench.docks["inspector"].panel.show_topic("")
-    window.context.open_beside("/e")
+    window.context.open_to_side("/e")
     assert topic_of(bench, "inspector") == "/e", "one that shows nothing yet is taken first"
 
 
@@ -224,7 +226,7 @@ def test_menu_and_palette_list_the_additional_panels(bench, window) -> None:
     entries["Inspector 2"].trigger()
     assert "inspector#2" not in bench.docks
     found = {entry.words: entry for entry in window.commands.view._entries.all()}
-    window.commands.view.do(found["Another panel: Inspector"])
+    window.commands.view.run_entry(found["Another panel: Inspector"])
     assert "inspector#2" in bench.docks
 
 
@@ -235,7 +237,7 @@ def test_command_for_an_additional_panel_is_found_in_the_palette(bench, window, 
     palette = window.findChild(Palette)
     assert palette is not None
     lines = palette.rows.lines.lines
-    assert "Another panel" in [line.words for line in lines if isinstance(line, Heading)]
+    assert "Another panel" in [line.text for line in lines if isinstance(line, Heading)]
     palette.field.setText("Another panel: Inspector")
     QTest.keyClick(palette.field, Qt.Key.Key_Return)
     assert "inspector#2" in bench.docks

@@ -11,9 +11,9 @@ from PySide6.QtTest import QTest
 
 from app.core.storage.settings import Settings
 from app.robots.description.description import Parameter
-from app.ui.panels.console.list import FindWords
+from app.ui.panels.console.list import FindField
 from app.ui.panels.robots.controls.number import OpenNumber
-from app.ui.shell.actions.shortcuts import FIXED, Shortcuts
+from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts
 from app.ui.shell.bars.app_bar import AppBar
 from app.ui.shell.commands.commands import Commands
 from app.ui.shell.commands.table import COMMANDS
@@ -21,7 +21,7 @@ from app.ui.shell.dialogs.command_palette import Palette
 from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.shell.main_window import MainWindow
-from app.ui.text.numbers import spoken_key, tip_with_key
+from app.ui.text.numbers import shortcut_text, tip_with_key
 from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.lists.entry_list import Heading
@@ -38,37 +38,37 @@ def keys(qapp: object, tmp_path: Path) -> Shortcuts:
 
 
 def test_default_shortcuts_are_unique(keys: Shortcuts) -> None:
-    given = [key for row in COMMANDS for key in keys.of(row.id)]
+    given = [key for row in COMMANDS for key in keys.keys_of(row.id)]
     assert sorted(given) == sorted(set(given))
     assert all(key == QKeySequence(key).toString() for key in given)
 
 
 def test_ctrl_y_is_redo(window: MainWindow, commands: Commands, keys: Shortcuts) -> None:
-    assert keys.of("edit.redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
+    assert keys.keys_of("edit.redo") == ("Ctrl+Shift+Z", "Ctrl+Y")
     assert [key.toString() for key in commands.actions["edit.redo"].shortcuts()] == ["Ctrl+Shift+Z", "Ctrl+Y"]
-    assert keys.holder("Ctrl+Y") == "edit.redo"
+    assert keys.command_for("Ctrl+Y") == "edit.redo"
 
 
 def test_macos_shortcuts_avoid_system_keys_and_option_characters(qapp: object, tmp_path: Path) -> None:
     """Ctrl is Cmd there, Meta the key that says Ctrl; Option types signs, Cmd+Tab changes the program."""
     keys = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS, platform="darwin")
-    given = [key for row in COMMANDS for key in keys.of(row.id)]
+    given = [key for row in COMMANDS for key in keys.keys_of(row.id)]
     assert sorted(given) == sorted(set(given))
     assert not {"Ctrl+Tab", "Ctrl+Shift+Tab", "Ctrl+H", "Ctrl+M", "Ctrl+Space"} & set(given)
     assert not [key for key in given if key.startswith("Alt+")]
     arrows = ("Left", "Right", "Up", "Down", "Home", "End", "Backspace", "Delete")
     assert not [key for key in given if key.endswith(arrows)], "they move in the text of a field"
-    assert keys.of("tab.next") == ("Meta+Tab", "Ctrl+Shift+]")
-    assert keys.of("layout.behaviour") == ("Ctrl+Alt+1",)
-    assert not keys.own("tab.next")
+    assert keys.keys_of("tab.next") == ("Meta+Tab", "Ctrl+Shift+]")
+    assert keys.keys_of("layout.behaviour") == ("Ctrl+Alt+1",)
+    assert not keys.is_customised("tab.next")
 
 
 def test_shortcuts_are_formatted_with_macos_symbols() -> None:
-    assert spoken_key("Ctrl+Shift+S", "darwin") == "⇧⌘S"
-    assert spoken_key("Meta+Tab", "darwin") == "⌃Tab"
-    assert spoken_key("Ctrl++", "darwin") == "⌘+"
-    assert spoken_key("Ctrl+Shift+S", "linux") == "Ctrl+Shift+S"
-    assert spoken_key("Ctrl+C, Ctrl+Shift+V", "darwin") == "⌘C, ⇧⌘V"
+    assert shortcut_text("Ctrl+Shift+S", "darwin") == "⇧⌘S"
+    assert shortcut_text("Meta+Tab", "darwin") == "⌃Tab"
+    assert shortcut_text("Ctrl++", "darwin") == "⌘+"
+    assert shortcut_text("Ctrl+Shift+S", "linux") == "Ctrl+Shift+S"
+    assert shortcut_text("Ctrl+C, Ctrl+Shift+V", "darwin") == "⌘C, ⇧⌘V"
     assert tip_with_key("Save", "Ctrl+S", "darwin") == "Save (⌘S)"
     assert tip_with_key("Save", "Ctrl+S", "linux") == "Save (Ctrl+S)"
     assert tip_with_key("Save", "", "darwin") == "Save"
@@ -93,10 +93,10 @@ def test_text_navigation_keys_are_left_to_the_text_field(
     left: list[str] = []
     field = FilterField(theme, "Filter")
     qtbot.addWidget(field)
-    field.leave.connect(lambda: left.append("filter"))
-    words = FindWords(theme)
+    field.exited.connect(lambda: left.append("filter"))
+    words = FindField(theme)
     qtbot.addWidget(words)
-    words.left.connect(lambda: left.append("console"))
+    words.exited.connect(lambda: left.append("console"))
     number = OpenNumber(theme, Parameter("n", "n", "number", default=5))
     qtbot.addWidget(number)
     number.setText("5")
@@ -109,58 +109,58 @@ def test_text_navigation_keys_are_left_to_the_text_field(
 
 
 def test_changed_shortcut_is_saved(keys: Shortcuts, tmp_path: Path) -> None:
-    keys.give("file.save", "Ctrl+Alt+S")
+    keys.assign("file.save", "Ctrl+Alt+S")
     again = Shortcuts(Settings(tmp_path), lambda _sentence: None, COMMANDS)
-    assert again.of("file.save") == ("Ctrl+Alt+S",)
-    assert again.own("file.save")
-    assert not again.own("file.open")
+    assert again.keys_of("file.save") == ("Ctrl+Alt+S",)
+    assert again.is_customised("file.save")
+    assert not again.is_customised("file.open")
 
 
 def test_reassigned_shortcut_is_removed_from_its_previous_command(keys: Shortcuts) -> None:
-    keys.give("file.open", "Ctrl+S")
-    assert keys.of("file.save") == ()
-    assert keys.holder("Ctrl+S") == "file.open"
+    keys.assign("file.open", "Ctrl+S")
+    assert keys.keys_of("file.save") == ()
+    assert keys.command_for("Ctrl+S") == "file.open"
 
 
 def test_two_commands_swap_their_shortcuts(keys: Shortcuts) -> None:
     keys.swap("file.open", "Ctrl+S")
-    assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+S",), ("Ctrl+O",))
+    assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+S",), ("Ctrl+O",))
 
 
 def test_one_or_all_shortcuts_are_reset(keys: Shortcuts, tmp_path: Path) -> None:
     keys.swap("file.open", "Ctrl+S")
     keys.reset("file.open")
-    assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
+    assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+O",), ("Ctrl+S",))
     keys.swap("file.open", "Ctrl+S")
-    keys.give("file.new", "Ctrl+S")  # "Open" has none now, and "Save" that of "Open"
+    keys.assign("file.new", "Ctrl+S")  # "Open" has none now, and "Save" that of "Open"
     keys.reset("file.open")
-    assert (keys.of("file.open"), keys.of("file.save")) == (("Ctrl+O",), ())
-    assert keys.of("file.new") == ("Ctrl+S",)
+    assert (keys.keys_of("file.open"), keys.keys_of("file.save")) == (("Ctrl+O",), ())
+    assert keys.keys_of("file.new") == ("Ctrl+S",)
     keys.reset_all()
-    assert keys.of("file.save") == ("Ctrl+S",)
+    assert keys.keys_of("file.save") == ("Ctrl+S",)
     assert Settings(tmp_path).get("shortcuts", {"not": "kept"}) == {}
 
 
 def test_stop_keeps_f12_and_may_have_a_second_shortcut(keys: Shortcuts) -> None:
-    keys.give("run.stop", "")
-    assert keys.of("run.stop") == ("F12",)
-    keys.give("run.stop", "Ctrl+.")
-    assert keys.of("run.stop") == ("F12", "Ctrl+.")
+    keys.assign("run.stop", "")
+    assert keys.keys_of("run.stop") == ("F12",)
+    keys.assign("run.stop", "Ctrl+.")
+    assert keys.keys_of("run.stop") == ("F12", "Ctrl+.")
     keys.swap("run.stop", "F5")
-    assert keys.of("run.stop") == ("F12", "F5")
-    assert keys.of("run.run") == ()
+    assert keys.keys_of("run.stop") == ("F12", "F5")
+    assert keys.keys_of("run.run") == ()
     keys.reset("run.stop")
-    assert keys.of("run.stop") == ("F12", "Ctrl+.")
+    assert keys.keys_of("run.stop") == ("F12", "Ctrl+.")
 
 
 def test_default_second_shortcut_of_stop_yields_to_a_user_assignment(tmp_path: Path, qapp: object) -> None:
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.step": ["Ctrl+."]})
     keys = Shortcuts(settings, print, COMMANDS)
-    assert keys.of("run.stop") == ("F12",)
-    assert keys.holder("Ctrl+.") == "run.step"
+    assert keys.keys_of("run.stop") == ("F12",)
+    assert keys.command_for("Ctrl+.") == "run.step"
     keys.reset("run.step")
-    assert keys.of("run.stop") == ("F12", "Ctrl+.")
+    assert keys.keys_of("run.stop") == ("F12", "Ctrl+.")
 
 
 def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
@@ -169,9 +169,9 @@ def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
     settings = Settings(tmp_path)
     settings.set("shortcuts", {"run.run": ["F12"], "run.stop": [], "no.such": ["F2"], "file.open": 7})
     keys = Shortcuts(settings, lambda _sentence: None, COMMANDS)
-    assert keys.of("run.run") == ()
-    assert keys.of("run.stop") == ("F12",)
-    assert keys.of("file.open") == ("Ctrl+O",)
+    assert keys.keys_of("run.run") == ()
+    assert keys.keys_of("run.stop") == ("F12",)
+    assert keys.keys_of("file.open") == ("Ctrl+O",)
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_f12_cannot_be_assigned_to_another_command_even_in_the_settings_file(
 def test_invalid_shortcuts_are_rejected_with_a_reason(
     keys: Shortcuts, key: Qt.Key, held: Qt.KeyboardModifier, said: str
 ) -> None:
-    refusal = keys.refusal("file.open", QKeyCombination(held, key))
+    refusal = keys.rejection_reason("file.open", QKeyCombination(held, key))
     assert said in refusal
     assert bool(refusal) == bool(said)
 
@@ -215,7 +215,7 @@ def choose(sheet: ShortcutSheet, words: str) -> None:
     sheet.field.setText(words)
     entry = sheet.rows.entry
     assert entry is not None
-    assert entry.words == words
+    assert entry.text == words
 
 
 def press(sheet: ShortcutSheet, key: Qt.Key, held: Qt.KeyboardModifier = NONE) -> None:
@@ -226,9 +226,9 @@ def test_sheet_lists_every_command_and_every_fixed_shortcut(sheet: ShortcutSheet
     shown = [line.entry.id for line in sheet.rows.lines.lines if isinstance(line, Match)]
     assert shown == list(dict.fromkeys(shown))
     assert set(shown) == {f"command:{row.id}" for row in COMMANDS if row.in_shortcuts} | {
-        f"fixed:{number}" for number in range(len(FIXED))
+        f"fixed:{number}" for number in range(len(FIXED_KEYS))
     }
-    headings = [line.words for line in sheet.rows.lines.lines if isinstance(line, Heading)]
+    headings = [line.text for line in sheet.rows.lines.lines if isinstance(line, Heading)]
     assert len(headings) == len(set(headings))
     assert {"File", "View", "Run", "Blocks"} <= set(headings)
 
@@ -264,11 +264,11 @@ def test_shortcut_conflict_names_the_other_command_and_can_swap(
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_S, CTRL)
     assert "“Save”" in sheet.said.text()
-    assert commands.shortcuts.of("file.open") == ("Ctrl+O",)
+    assert commands.shortcuts.keys_of("file.open") == ("Ctrl+O",)
     assert sheet.swap.isVisible()
     QTest.mouseClick(sheet.swap, Qt.MouseButton.LeftButton)
-    assert commands.shortcuts.of("file.open") == ("Ctrl+S",)
-    assert commands.shortcuts.of("file.save") == ("Ctrl+O",)
+    assert commands.shortcuts.keys_of("file.open") == ("Ctrl+S",)
+    assert commands.shortcuts.keys_of("file.save") == ("Ctrl+O",)
     assert not sheet.swap.isVisible()
 
 
@@ -277,7 +277,7 @@ def test_esc_cancels_recording_a_shortcut(sheet: ShortcutSheet, commands: Comman
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_Escape)
     assert sheet.isVisible()
-    assert commands.shortcuts.of("file.save") == ("Ctrl+S",)
+    assert commands.shortcuts.keys_of("file.save") == ("Ctrl+S",)
 
 
 def test_f12_stops_while_a_shortcut_is_recorded(sheet: ShortcutSheet, commands: Commands) -> None:
@@ -287,7 +287,7 @@ def test_f12_stops_while_a_shortcut_is_recorded(sheet: ShortcutSheet, commands: 
     press(sheet, Qt.Key.Key_Return)
     press(sheet, Qt.Key.Key_F12)
     assert stops == ["stop"]
-    assert commands.shortcuts.of("file.save") == ("Ctrl+S",)
+    assert commands.shortcuts.keys_of("file.save") == ("Ctrl+S",)
 
 
 def test_recording_a_shortcut_does_not_trigger_its_current_command(
@@ -307,26 +307,26 @@ def test_shortcuts_are_removed_and_reset(sheet: ShortcutSheet, commands: Command
     choose(sheet, "Save")
     sheet.rows.setFocus()
     sheet.field.setFocus()
-    sheet._take_away()
-    assert keys.of("file.save") == ()
+    sheet._remove_shortcut()
+    assert keys.keys_of("file.save") == ()
     assert sheet.reset.isEnabled()
     QTest.mouseClick(sheet.reset, Qt.MouseButton.LeftButton)
-    assert keys.of("file.save") == ("Ctrl+S",)
-    keys.give("file.save", "F3")
+    assert keys.keys_of("file.save") == ("Ctrl+S",)
+    keys.assign("file.save", "F3")
     QTest.mouseClick(sheet.reset_all, Qt.MouseButton.LeftButton)
-    assert keys.of("file.save") == ("Ctrl+S",)
+    assert keys.keys_of("file.save") == ("Ctrl+S",)
     choose(sheet, "Stop the program and all robots")
-    sheet._take_away()
+    sheet._remove_shortcut()
     assert sheet.said.text() == "Stop has only the shortcut F12 now."
-    assert keys.of("run.stop") == ("F12",)
-    sheet._take_away()
+    assert keys.keys_of("run.stop") == ("F12",)
+    sheet._remove_shortcut()
     assert sheet.said.text() == "F12 can't be removed: it always triggers Stop."
 
 
 def test_ctrl_enter_in_the_palette_opens_the_shortcut_sheet(
     sheet: ShortcutSheet, window: MainWindow, commands: Commands
 ) -> None:
-    sheet.shut()
+    sheet.dismiss()
     commands.view.open_palette()
     palette = window.findChild(Palette)
     assert palette is not None
@@ -337,7 +337,7 @@ def test_ctrl_enter_in_the_palette_opens_the_shortcut_sheet(
     assert sheet.rows.entry is not None
     assert sheet.rows.entry.name == "file.save_as"
     press(sheet, Qt.Key.Key_F7)
-    assert commands.shortcuts.of("file.save_as") == ("F7",)
+    assert commands.shortcuts.keys_of("file.save_as") == ("F7",)
 
 
 def test_ctrl_f_searches_blocks_only_in_the_behaviour_layout(

@@ -25,7 +25,7 @@ from app.ui.shell.main_window import MainWindow
 from app.ui.shell.start_page.page import read_examples
 from app.ui.theme.theme import Mode, Theme
 from app.ui.widgets import Chip, StopButton
-from app.ui.widgets.menus import beside
+from app.ui.widgets.menus import avoid_stop
 from tests.ui.clipping import clipped
 from tests.ui.fakes import Session
 from tests.ui.shell_parts import Answers
@@ -202,7 +202,7 @@ def test_collapsed_panels_stay_collapsed_after_restart(qtbot, window: MainWindow
     qtbot.waitUntil(lambda: tabs_of(again, "sensors") == {"problems", "variables"})
     again.resize(1440, 800)
     qtbot.waitUntil(lambda: tabs_of(again, "sensors") == set() == tabs_of(again, "robot"))
-    again.shut()
+    again.dispose()
 
 
 def test_tab_of_a_collapsed_panel_shows_a_count_badge(qtbot, window: MainWindow) -> None:
@@ -217,10 +217,10 @@ def test_tab_of_a_collapsed_panel_shows_a_count_badge(qtbot, window: MainWindow)
         return next(tab.badge for tab in tabs if tab.text() == "Problems" and tab.isVisible())
 
     document.found = (Problem("error", None, None, "x", "x is not known."),)
-    document.edited({"blocks": {"blocks": [{"type": "control_wait", "id": "one"}]}})
+    document.apply_edit({"blocks": {"blocks": [{"type": "control_wait", "id": "one"}]}})
     qtbot.waitUntil(lambda: badge() == ("1", "error"))
     document.found = ()
-    document.edited({"blocks": {"blocks": [{"type": "control_wait", "id": "two"}]}})
+    document.apply_edit({"blocks": {"blocks": [{"type": "control_wait", "id": "two"}]}})
     qtbot.waitUntil(lambda: badge() is None)
 
 
@@ -250,7 +250,7 @@ def test_app_bar_shortens_its_texts_before_its_menus(qtbot, window: MainWindow, 
     settle(qtbot, window)
     assert bar.menus.width() >= bar.menus.sizeHint().width()
     assert bar.switch.width() < wide
-    button = bar.switch.chosen_button()
+    button = bar.switch.selected_button()
     assert button is not None
     assert button.toolTip() == "Behaviour"
     window.theme.set_text_percent(100)
@@ -301,11 +301,11 @@ def test_chip_beside_tabs_loses_its_text_before_the_tabs_do(qtbot, theme: Theme,
     assert chip.width() == chip.full_width()
 
     chip.set("virtual, ready, and moving")  # longer, in a title that keeps its size
-    qtbot.waitUntil(lambda: chip.width() == chip.bare_width())
+    qtbot.waitUntil(lambda: chip.width() == chip.icon_only_width())
     assert (front.width(), behind.width()) == names
     assert chip.toolTip() == "virtual, ready, and moving"
     title.resize(195, 40)
-    qtbot.waitUntil(lambda: behind.width() == behind.bare_width())
+    qtbot.waitUntil(lambda: behind.width() == behind.icon_only_width())
     assert front.width() >= front.full_width()
     title.resize(500, 40)
     qtbot.waitUntil(lambda: chip.width() == chip.full_width())
@@ -324,21 +324,21 @@ STOP = QRect(780, 50, 230, 52)
     ],
 )
 def test_menu_that_would_cover_stop_is_moved_aside(menu: QRect, goes_to: tuple[int, int]) -> None:
-    assert beside(menu, STOP, SCREEN).topLeft().toTuple() == goes_to
-    assert beside(menu, STOP, SCREEN).size() == menu.size()
+    assert avoid_stop(menu, STOP, SCREEN).topLeft().toTuple() == goes_to
+    assert avoid_stop(menu, STOP, SCREEN).size() == menu.size()
 
 
 def test_menu_that_is_too_wide_to_move_aside_is_narrowed() -> None:
-    assert beside(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
+    assert avoid_stop(QRect(0, 0, 1000, 590), STOP, SCREEN) == QRect(0, 0, 780, 590)
     early = QRect(100, 50, 230, 52)  # left of this there is no room for words
-    assert beside(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)
+    assert avoid_stop(QRect(0, 0, 1000, 590), early, SCREEN) == QRect(0, 0, 1000, 590)
 
 
 @pytest.mark.parametrize("wide", [24, 34, 90])
 def test_count_badge_on_a_narrow_tab_is_not_clipped(qtbot, theme: Theme, wide: int) -> None:
     tab = TitleTab(theme, "Problems", "triangle-alert", False)
     qtbot.addWidget(tab)
-    tab.set_bare(True)
+    tab.set_icon_only(True)
     tab.show_badge(("2", "error"))
     tab.resize(wide, 30)
     tab.show()

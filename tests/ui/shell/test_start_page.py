@@ -17,7 +17,7 @@ from app.ui.shell.start_page.cards import BigCard, CardTitle
 from app.ui.shell.start_page.open_work import OpenWork
 from app.ui.shell.start_page.page import StartPage, read_examples
 from app.ui.shell.start_page.preview import Row, category_of, rows
-from app.ui.text.dates import day_words
+from app.ui.text.dates import relative_day_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button
 from app.ui.widgets.buttons import LinkButton
@@ -109,9 +109,9 @@ def test_first_steps_are_not_offered_when_work_is_open(page: StartPage) -> None:
 
 def test_pressed_buttons_emit_their_signals(qtbot, page: StartPage, tmp_path: Path) -> None:
     told: list[object] = []
-    page.virtual_robot.connect(lambda: told.append("robot"))
-    page.new_behaviour.connect(lambda: told.append("new"))
-    page.example_chosen.connect(told.append)
+    page.virtual_robot_pressed.connect(lambda: told.append("robot"))
+    page.new_behaviour_pressed.connect(lambda: told.append("new"))
+    page.example_selected.connect(told.append)
     page.learn_pressed.connect(lambda: told.append("learn"))
     page.developer_pressed.connect(lambda: told.append("developer"))
     for button in page.findChildren(Button):
@@ -126,7 +126,7 @@ def test_pressed_buttons_emit_their_signals(qtbot, page: StartPage, tmp_path: Pa
 def test_open_work_is_listed_first_and_opens_its_tab(page: StartPage) -> None:
     assert "Open now" not in words(page)
     page.show_open(
-        [OpenWork("a", "Greeting", unsaved=True), OpenWork("b", "Quiz", path="/q.nepb", runs=True)]
+        [OpenWork("a", "Greeting", is_unsaved=True), OpenWork("b", "Quiz", path="/q.nepb", is_running=True)]
     )
     assert "Open now" in words(page)
     assert [row.accessibleName() for row in page.open_work.rows] == [
@@ -134,7 +134,7 @@ def test_open_work_is_listed_first_and_opens_its_tab(page: StartPage) -> None:
         "Continue with Quiz, running",
     ]
     told: list[str] = []
-    page.work_chosen.connect(told.append)
+    page.work_selected.connect(told.append)
     QTest.mouseClick(page.open_work.rows[1], Qt.MouseButton.LeftButton)
     QTest.keyClick(page.open_work.rows[0], Qt.Key.Key_Space)
     assert told == ["b", "a"]
@@ -195,7 +195,7 @@ def test_recent_files_are_listed_with_their_date(page: StartPage, tmp_path: Path
     [(0, "Today, 9:00"), (1, "Yesterday"), (3, "17 November"), (400, "16 October 2025")],
 )
 def test_dates_are_formatted_in_words(days: int, said: str) -> None:
-    assert day_words(NOW - dt.timedelta(days=days), NOW) == said
+    assert relative_day_text(NOW - dt.timedelta(days=days), NOW) == said
 
 
 def test_robots_chip_is_shown_only_with_a_robot(qtbot, page: StartPage) -> None:

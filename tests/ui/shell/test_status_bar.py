@@ -27,7 +27,7 @@ def facts(session: object) -> StatusFacts:
 
 def test_health_item_shows_alerts_before_robots(session: fakes.Session) -> None:
     assert facts(session).health() == ("circle-x", "1 alert", "error")
-    session.alerts.put("slow", "warn", "Slow.")
+    session.alerts.raise_alert("slow", "warn", "Slow.")
     assert facts(session).health()[1] == "2 alerts"
     session.alerts.resolve("slow")
     session.alerts.resolve("message:/faces")
@@ -46,7 +46,7 @@ def test_health_item_matches_the_health_panel(session: fakes.Session) -> None:
 def test_robot_that_has_not_reported_is_connected_and_not_healthy(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
-    link.answered_s, link.values = None, {}
+    link.replied_s, link.values = None, {}
     for topic in session.topics:
         topic.rate_hz = topic.age_s = None
     assert facts(session).health() == ("circle-dashed", "Pepper is connected", "off")
@@ -55,7 +55,7 @@ def test_robot_that_has_not_reported_is_connected_and_not_healthy(session: fakes
 def test_disconnected_robot_counts_as_to_check(session: fakes.Session) -> None:
     session.alerts.resolve("message:/faces")
     link = session.fleet.links[0]
-    link.connected = False
+    link.is_connected = False
     assert facts(session).health() == ("triangle-alert", "Pepper: needs attention (1)", "warn")
 
 
@@ -64,11 +64,11 @@ def test_health_item_shows_no_robot_when_none_is_connected() -> None:
 
 
 def test_save_state_shows_its_time(session: fakes.Session) -> None:
-    assert facts(session).saved()[1] == ""
+    assert facts(session).save_state()[1] == ""
     session.document.saved_at = 8 * 3600 + 41 * 60
-    assert facts(session).saved()[1] == "Saved 8:41"
+    assert facts(session).save_state()[1] == "Saved 8:41"
     session.document.dirty = True
-    assert facts(session).saved()[1] == "Not saved · backed up"
+    assert facts(session).save_state()[1] == "Not saved · backed up"
 
 
 def test_unsaved_work_that_cannot_be_backed_up_is_reported(session: fakes.Session) -> None:
@@ -76,9 +76,9 @@ def test_unsaved_work_that_cannot_be_backed_up_is_reported(session: fakes.Sessio
     session.document._journal_error = (
         "can't back up unsaved work (No space left on device); save the file now"
     )
-    assert facts(session).saved() == ("circle-x", "Not saved · no backup", "error")
+    assert facts(session).save_state() == ("circle-x", "Not saved · no backup", "error")
     session.document._journal_error = None
-    assert facts(session).saved()[1] == "Not saved · backed up"
+    assert facts(session).save_state()[1] == "Not saved · backed up"
 
 
 def test_traffic_item_counts_live_topics_only(session: fakes.Session) -> None:
@@ -98,9 +98,9 @@ def test_lost_messages_are_shown_only_when_there_are_any(session: fakes.Session)
 
 def test_number_of_messages_not_shown_is_reported(session: fakes.Session) -> None:
     session.traffic.shown_30s = session.traffic.sent_30s = 900
-    assert facts(session).shown()[1] == ""
+    assert facts(session).displayed_messages()[1] == ""
     session.traffic.sent_30s = 4900
-    assert facts(session).shown()[1] == "900 of 4\u2009900 shown in 30 s"
+    assert facts(session).displayed_messages()[1] == "900 of 4\u2009900 shown in 30 s"
 
 
 @pytest.mark.parametrize(
@@ -122,9 +122,9 @@ def test_empty_status_items_leave_no_gap(qtbot, theme: Theme) -> None:
     bar.resize(900, 26)
     bar.show()
     bar.show_facts((("", "one", None), ("", "", None), ("", "two", None)), (("", "right", None),))
-    assert bar.words() == ["one", "two", "right"]
+    assert bar.texts() == ["one", "two", "right"]
     bar.show_facts((("", "one", None),), ())
-    assert bar.words() == ["one"]
+    assert bar.texts() == ["one"]
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,7 @@ def a_menu(window: MainWindow) -> None:
 
 def a_menu_of_a_panel(window: MainWindow) -> None:
     dock = window.benches["developer"].docks["topics"]
-    dock.title.menu_wanted.emit(None)
+    dock.title.menu_requested.emit(None)
 
 
 def a_context_menu_of_a_field(window: MainWindow) -> None:

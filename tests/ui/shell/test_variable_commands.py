@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 
 from app.blocks.model.workspace import parse_workspace
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.variables import uses_of, value_of
+from app.ui.shell.commands.variables import parse_value, uses_of
 from app.ui.shell.dialogs.name import NameSheet
 from app.ui.shell.main_window import MainWindow
 from tests.blocks.samples import block, get, number, started, workspace, write
@@ -33,7 +33,7 @@ def shown(qtbot, window: MainWindow, commands: Commands) -> MainWindow:
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     commands.run("layout.behaviour")
-    window.session.document.edited(SAVED)
+    window.session.document.apply_edit(SAVED)
     return window
 
 
@@ -76,7 +76,7 @@ def test_new_variable_is_named_in_a_sheet_and_created(shown: MainWindow, command
 
 def test_existing_name_is_not_suggested(shown: MainWindow, commands: Commands) -> None:
     used = [{"id": str(number), "name": name} for number, name in enumerate(["count", "Count 2"])]
-    shown.session.document.edited({**SAVED, "variables": used})
+    shown.session.document.apply_edit({**SAVED, "variables": used})
     commands.run("variable.new")
     assert sheet_of(shown).field.text() == "count 3"
 
@@ -140,6 +140,6 @@ def test_value_can_be_set_only_while_the_behaviour_runs(shown: MainWindow, comma
      ("1e999", "1e999"), ("nan", "nan"), ("18446744073709551615", 2**64 - 1)],
 )  # fmt: skip
 def test_typed_value_is_parsed_as_a_number_if_possible(words: str, value: object) -> None:
-    made = value_of(words)
+    made = parse_value(words)
     assert made == value
     assert type(made) is type(value)

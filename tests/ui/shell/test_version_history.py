@@ -11,11 +11,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from app.core.documents.diff import Difference
-from app.core.documents.versions import keep_earlier
+from app.core.documents.versions import save_version
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.dialogs.version_history import VersionHistorySheet, difference_words
+from app.ui.shell.dialogs.version_history import VersionHistorySheet, difference_text
 from app.ui.shell.main_window import MainWindow
-from app.ui.text.dates import when_words
+from app.ui.text.dates import date_time_text
 from app.ui.widgets import Button
 from app.ui.widgets.lists.entry_list import Heading
 from app.ui.widgets.lists.fuzzy import Match
@@ -44,10 +44,10 @@ def rows(sheet: VersionHistorySheet) -> list[tuple[str, str]]:
     told = []
     for line in sheet.rows.lines.lines:
         if isinstance(line, Match):
-            told.append((line.entry.words.partition(",")[0], line.entry.note or line.entry.reason))
+            told.append((line.entry.text.partition(",")[0], line.entry.note or line.entry.reason))
         else:
             assert isinstance(line, Heading)
-            told.append((line.words, ""))
+            told.append((line.text, ""))
     return told
 
 
@@ -56,7 +56,7 @@ def test_each_save_creates_a_version_that_lists_its_differences(
 ) -> None:
     commands.files.open(saved(tmp_path / "Mine.nepb"))
     for id in "xy":
-        shown.session.document.edited(changed(id))
+        shown.session.document.apply_edit(changed(id))
         commands.run("file.save")
     sheet = opened(qtbot, commands, shown)
     assert sheet.heading.text() == "Earlier versions of Mine"
@@ -69,7 +69,7 @@ def test_enter_opens_the_selected_version_as_a_copy(qtbot, commands, shown, tmp_
     path = saved(tmp_path / "Mine.nepb")
     commands.files.open(path)
     for id in "xy":
-        shown.session.document.edited(changed(id))
+        shown.session.document.apply_edit(changed(id))
         commands.run("file.save")
     before = path.read_bytes()
     sheet = opened(qtbot, commands, shown)
@@ -83,13 +83,13 @@ def test_enter_opens_the_selected_version_as_a_copy(qtbot, commands, shown, tmp_
     assert ":" not in document.name
     assert len(shown.session.documents) == 2
     assert shown.toast.text == f"Opened {document.name} as a copy"
-    document.edited(changed("mine now"))
+    document.apply_edit(changed("mine now"))
     assert (path.read_bytes(), oldest.is_file()) == (before, True)
 
 
 def test_button_and_double_click_open_a_version_too(qtbot, commands, shown, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
-    keep_earlier(path)
+    save_version(path)
     commands.files.open(path)
     sheet = opened(qtbot, commands, shown)
     QTest.mouseClick(sheet.button, Qt.MouseButton.LeftButton)
@@ -106,7 +106,7 @@ def test_button_and_double_click_open_a_version_too(qtbot, commands, shown, tmp_
 def test_unreadable_version_is_reported_and_does_not_open(qtbot, commands, shown, tmp_path: Path) -> None:
     path = saved(tmp_path / "Mine.nepb")
     path.write_text("not json", "utf-8")
-    keep_earlier(path)
+    save_version(path)
     commands.files.open(saved(path))
     sheet = opened(qtbot, commands, shown)
     assert rows(sheet) == [("Today", "Mine is damaged or not a behaviour")]
@@ -119,7 +119,7 @@ def test_versions_of_other_files_with_the_same_name_are_listed_below(
 ) -> None:
     for folder in ("here", "there"):
         (tmp_path / folder).mkdir()
-        keep_earlier(saved(tmp_path / folder / "Mine.nepb"))
+        save_version(saved(tmp_path / folder / "Mine.nepb"))
     commands.files.open(tmp_path / "here" / "Mine.nepb")
     sheet = opened(qtbot, commands, shown)
     same = ("Today", "1 block, unchanged since")
@@ -131,14 +131,14 @@ def test_empty_list_explains_what_creates_a_version(qtbot, commands, shown, tmp_
     sheet = opened(qtbot, commands, shown)
     assert not sheet.rows.isVisible()
     assert sheet.empty.isVisible()
-    sheet.shut()
+    sheet.dismiss()
 
 
 def test_behaviour_without_a_file_is_saved_from_the_version_list(
     qtbot, commands, shown, answers, tmp_path
 ) -> None:
     answers.path = tmp_path / "New.nepb"
-    shown.session.document.edited(BLOCKS)
+    shown.session.document.apply_edit(BLOCKS)
     sheet = opened(qtbot, commands, shown)
     save = next(each for each in sheet.empty.findChildren(Button) if each.accessibleName() == "Save")
     assert save.hasFocus()
@@ -149,15 +149,15 @@ def test_behaviour_without_a_file_is_saved_from_the_version_list(
 
 def test_version_time_is_formatted_in_plain_words() -> None:
     now = dt.datetime(2026, 11, 20, 15, 0, tzinfo=dt.timezone.utc)
-    told = [when_words(now - dt.timedelta(days=days, hours=1), now) for days in (0, 1, 3, 400)]
+    told = [date_time_text(now - dt.timedelta(days=days, hours=1), now) for days in (0, 1, 3, 400)]
     assert told == ["Today, 14:00", "Yesterday, 14:00", "17 November, 14:00", "16 October 2025, 14:00"]
 
 
 def test_version_differences_are_described_in_plain_words() -> None:
-    assert difference_words(Difference(14)) == "14 blocks, unchanged since"
-    assert difference_words(Difference(1, moved=True)) == "1 block, reordered"
+    assert difference_text(Difference(14)) == "14 blocks, unchanged since"
+    assert difference_text(Difference(1, is_rearranged=True)) == "1 block, reordered"
     found = Difference(14, added=3, removed=1, changed=2)
-    assert difference_words(found) == "14 blocks, 3 added, 1 removed, 2 changed since"
+    assert difference_text(found) == "14 blocks, 3 added, 1 removed, 2 changed since"
 
 
 def test_long_version_list_stays_inside_the_window(qtbot, commands, shown, tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_long_version_list_stays_inside_the_window(qtbot, commands, shown, tmp_p
         saved(path)
         path.write_bytes(path.read_bytes() + b" " * number)
         os.utime(path, (number * 1000, number * 1000))
-        keep_earlier(path)
+        save_version(path)
     commands.files.open(path)
     shown.theme.set_text_percent(200)
     try:

@@ -32,7 +32,7 @@ from tests.ui.test_accessible import unsaid
 pytest_plugins = ["tests.ui.shell_fixtures"]
 WIFI = OwnAddress("192.168.1.20", "wlan0")
 CAMERA = PageTopic("/camera", False, 15.0, 15.0, 190e3, 9_970, 30)
-BUTTONS = PageTopic("/buttons", True, rate=0.1, bytes_per_s=6.0)
+BUTTONS = PageTopic("/buttons", True, rate_hz=0.1, bytes_per_s=6.0)
 
 
 class Desk:
@@ -110,7 +110,7 @@ def test_client_of_a_real_server_is_listed_and_disconnected(
         connect(sheet.access.address.text(), origin="http://192.168.1.77:5173")
     with connect(sheet.access.address.text()) as client:
         client.send(json.dumps({"op": "subscribe", "topic": "/odom", "type": "nep/Json"}))
-        qtbot.waitUntil(lambda: bool(web.pages) and web.pages[0].subscribed == ("/odom",))
+        qtbot.waitUntil(lambda: bool(web.pages) and web.pages[0].subscribed_topics == ("/odom",))
         sheet.refresh()
         assert sheet.model.rowCount(sheet.model.index(0, 0)) == 1
         sheet.table.setFocus(Qt.FocusReason.TabFocusReason)
@@ -136,7 +136,7 @@ def test_topic_figures_are_updated_in_place_and_keep_selection_and_expansion(des
     assert [table.isExpanded(model.index(row, 0)) for row in range(3)] == [False, True, True]
     topic = model.topic(table.currentIndex())
     assert topic is not None
-    assert (topic.topic, topic.rate) == ("/buttons", 12.0)
+    assert (topic.topic, topic.rate_hz) == ("/buttons", 12.0)
 
 
 def test_disconnected_page_is_struck_through_without_a_button(desk: Desk) -> None:
@@ -177,7 +177,7 @@ def test_refreshing_many_pages_takes_less_than_a_frame(desk: Desk) -> None:
 
 
 def test_new_token_disconnects_pages_and_undo_restores_the_old_one(desk: Desk) -> None:
-    desk.web.open_to(WIFI.host)
+    desk.web.listen_on(WIFI.host)
     with_pages(desk)
     before = desk.web.token
     desk.sheet.access.new_token.click()
@@ -190,7 +190,7 @@ def test_new_token_disconnects_pages_and_undo_restores_the_old_one(desk: Desk) -
 
 
 def test_token_is_hidden_and_copied_in_full(desk: Desk) -> None:
-    desk.web.open_to(WIFI.host)
+    desk.web.listen_on(WIFI.host)
     access = desk.sheet.access
     desk.sheet.refresh()
     assert desk.web.token not in access.token.text()
@@ -202,7 +202,7 @@ def test_token_is_hidden_and_copied_in_full(desk: Desk) -> None:
 
 
 def test_qr_code_opens_the_test_page_and_stays_light_in_the_dark_theme(desk: Desk, theme: Theme) -> None:
-    desk.web.open_to(WIFI.host)
+    desk.web.listen_on(WIFI.host)
     desk.switch_on()
     code = desk.sheet.access.qr
     assert code.text == f"http://192.168.1.20:9090/?token={desk.web.token}"
@@ -315,12 +315,12 @@ def test_texts_are_translated_and_fit(
 ) -> None:
     theme.set_text_percent(percent)
     desk.window.resize(*size)
-    desk.web.open_to(WIFI.host)
+    desk.web.listen_on(WIFI.host)
     server = with_pages(desk)
     server.refusals = (Refusal(1.0, "http://lab.example", "refused", "http://lab.example", "origin"),)
     desk.sheet.permissions.robots.open_list()
     desk.sheet.permissions.origins.edit.setText("wrong")
-    desk.sheet.permissions.origins.edit.ended.emit()
+    desk.sheet.permissions.origins.edit.completed.emit()
     desk.sheet.refresh()
     place = desk.sheet.geometry()
     assert desk.window.rect().contains(place)

@@ -19,8 +19,8 @@ from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.run.view import RunState, RunView, view_of
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.application import translate_qt, why_not
-from app.ui.shell.actions.shortcuts import FIXED
+from app.ui.application import startup_problem, translate_qt
+from app.ui.shell.actions.shortcuts import FIXED_KEYS
 from app.ui.shell.bars.app_bar import robots_chip
 from app.ui.shell.bars.status_bar import StatusFacts
 from app.ui.shell.commands.table import COMMANDS
@@ -31,9 +31,9 @@ from app.ui.shell.dialogs.network_access import NetworkAccessSheet
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.shell.dialogs.shortcuts import ShortcutSheet
 from app.ui.shell.dialogs.version_history import VersionHistorySheet
-from app.ui.shell.documents import strange_words
+from app.ui.shell.documents import unknown_type_text
 from app.ui.shell.main_window import MainWindow, Placeholder
-from app.ui.shell.start_page.page import all_words, read_examples
+from app.ui.shell.start_page.page import all_examples_text, read_examples
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import StatusItem
@@ -63,13 +63,15 @@ KEYS = ("Delete", "PgUp", "PgDown")
 ANSWERED, SILENT = RobotStop("Rover", True, 41.4), RobotStop("Turtle", False, None)
 RUNS = (
     RunState(),
-    RunState(nothing_in=object()),
-    RunState(nothing_in=object(), errors={"a": "Greeting"}),
-    RunState("running", "Greeting", begun=False),
-    RunState("running", "Greeting", last_words="Rover"),
+    RunState(unrunnable_program=object()),
+    RunState(unrunnable_program=object(), errors={"a": "Greeting"}),
+    RunState("running", "Greeting", is_started=False),
+    RunState("running", "Greeting", last_stop_text="Rover"),
     RunState("paused", "Greeting"),
-    RunState("stopping", "Greeting", asked=("Rover", "Turtle"), answered=(ANSWERED,), elapsed_s=3.0),
-    RunState("proven", "Greeting", report=StopReport((ANSWERED,), 41.4), elapsed_s=3.0, dashed=True),
+    RunState("stopping", "Greeting", robots_to_stop=("Rover", "Turtle"), replies=(ANSWERED,), elapsed_s=3.0),
+    RunState(
+        "proven", "Greeting", report=StopReport((ANSWERED,), 41.4), elapsed_s=3.0, has_stopped_blocks=True
+    ),
     RunState("proven", "Greeting", report=StopReport((ANSWERED,), 41.4), finished=True),
     RunState("unanswered", "Greeting", report=StopReport((ANSWERED, SILENT), 41.4)),
 )
@@ -103,9 +105,9 @@ def said_by(root: QWidget) -> Iterator[tuple[str, str]]:
     for rows in root.findChildren(EntryList):
         for line in rows.lines.lines:
             if isinstance(line, Heading):
-                yield "heading", line.words
+                yield "heading", line.text
             else:
-                yield from ((f"row {line.entry.id}", t) for t in (line.entry.words, line.entry.reason))
+                yield from ((f"row {line.entry.id}", t) for t in (line.entry.text, line.entry.reason))
                 if line.entry.kind not in {"topic", "robot"}:
                     yield f"note {line.entry.id}", line.entry.note
 
@@ -155,10 +157,10 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
     look("start page", window)
     window.start.show_all(True)
     look("all examples", window.start)
-    window.session.alerts.put(
+    window.session.alerts.raise_alert(
         "one", "error", _("Nothing is running"), button=_("Try again"), action="panel:topics"
     )
-    window.session.alerts.put("two", "error", _("Nothing is running"))
+    window.session.alerts.raise_alert("two", "error", _("Nothing is running"))
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
         commands.run(f"layout.{layout}")
         window.tick()
@@ -171,13 +173,13 @@ def everything(qtbot, window: MainWindow, look: Look) -> None:
         commands.run(name)
         (sheet,) = [each for each in window.findChildren(Overlay) if each.isVisible()]
         look(name, sheet)
-        sheet.shut()
+        sheet.dismiss()
 
 
 def test_all_texts_of_the_window_are_translated(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     found: set[str] = set()
     paths = (plain.tip(str(tmp_path / "Mine.nepb")), str(snapshots.folder(whole.session.settings)))
-    languages = [name for _code, name in i18n.offered()]  # each is called what it calls itself
+    languages = [name for _code, name in i18n.selectable_languages()]  # each is called what it calls itself
     system = f"{platform.system()} {platform.release()} ({platform.machine()})"
 
     def look(what: str, root: QWidget) -> None:
@@ -201,7 +203,7 @@ def test_window_has_room_for_longer_translations(qtbot, whole: MainWindow, size:
 
 
 @pytest.mark.parametrize(
-    "language", [code for code, _name in i18n.offered() if code != i18n.ENGLISH], indirect=True
+    "language", [code for code, _name in i18n.selectable_languages() if code != i18n.ENGLISH], indirect=True
 )
 def test_window_clips_no_text_in_any_language(qtbot, whole: MainWindow) -> None:
     whole.resize(1100, 700)
@@ -234,16 +236,16 @@ def test_all_menus_are_translated(qtbot, whole: MainWindow) -> None:
 
 def test_all_commands_and_shortcuts_are_translated(whole: MainWindow) -> None:
     shown = whole.commands.shortcuts
-    said = [text for each in COMMANDS for text in (each.words, _(each.menu), _(each.tip))]
-    said += [whole.commands.actions.why_not(each.id) for each in COMMANDS]
-    said += [text for each in FIXED for text in (_(each.words), _(each.place))]
+    said = [text for each in COMMANDS for text in (each.label, _(each.menu), _(each.tip))]
+    said += [whole.commands.actions.disabled_reason(each.id) for each in COMMANDS]
+    said += [text for each in FIXED_KEYS for text in (_(each.label), _(each.scope))]
     ctrl = Qt.KeyboardModifier.ControlModifier
     for key in (
         QKeyCombination(Qt.Key.Key_A),
         QKeyCombination(Qt.Key.Key_F12),
         QKeyCombination(ctrl, Qt.Key.Key_C),
     ):
-        refusal = shown.refusal("file.new", key)
+        refusal = shown.rejection_reason("file.new", key)
         assert refusal
         said.append(refusal)
     assert [each for each in said if untranslated(each, *DATA)] == []
@@ -257,12 +259,17 @@ def test_command_palette_and_shortcut_sheet_are_translated(qtbot, whole: MainWin
         palette.field.setText(typed)
         assert forgotten(palette, "nowhere") == []
         assert untranslated(palette.foot.counted) == []
-    palette.shut()
+    palette.dismiss()
     assert untranslated(" ".join(_(said) for _keys, said in palette.foot.KEYS)) == []
     whole.commands.run("help.shortcuts")
     (sheet,) = whole.findChildren(ShortcutSheet)
     told = []
-    for act in (sheet.record, sheet._take_away, sheet._reset, lambda: sheet._set_status(sheet.said.text())):
+    for act in (
+        sheet.record,
+        sheet._remove_shortcut,
+        sheet._reset,
+        lambda: sheet._set_status(sheet.said.text()),
+    ):
         act()
         told.append(sheet.said.text())
     sheet.open_for("file.new")
@@ -274,7 +281,7 @@ def test_command_palette_and_shortcut_sheet_are_translated(qtbot, whole: MainWin
 def test_version_history_is_translated(qtbot, whole: MainWindow, tmp_path: Path) -> None:
     whole.commands.files.open(tmp_path / "Mine.nepb")
     for block in "xy":
-        whole.session.document.edited(changed(block))
+        whole.session.document.apply_edit(changed(block))
         whole.commands.run("file.save")
     whole.commands.run("file.earlier")
     (sheet,) = whole.findChildren(VersionHistorySheet)
@@ -290,17 +297,17 @@ def test_name_dialog_is_translated(whole: MainWindow) -> None:
     (sheet,) = whole.findChildren(NameSheet)
     for name in ("", "x" * 50, _("Developer")):
         sheet.field.setText(name)
-        sheet._done()
+        sheet._submit()
         assert sheet.isVisible()
         assert sheet.wrong.text()
         assert forgotten(sheet) == []
     sheet.field.setText("Mine")
-    sheet._done()
+    sheet._submit()
     for act in ("layout.rename", "layout.delete"):
         assert forgotten(whole.toast, "Mine") == []
         whole.commands.run(act)
         assert forgotten(sheet, "Mine") == []
-        sheet.shut()
+        sheet.dismiss()
 
 
 @pytest.mark.parametrize("here", [(), (("192.168.1.20", "wlan0"), ("10.8.0.2", "tun0"))])
@@ -329,7 +336,7 @@ def test_motion_permission_question_is_translated(qtbot, pseudo, tmp_path: Path)
     window.show()
     moving = MotionPermission(Settings(tmp_path))
     question = MotionQuestion(Theme("light"), window, moving, print)
-    moving.permits([(ROVER, ("move",))], lambda: None)
+    moving.request_permission([(ROVER, ("move",))], lambda: None)
     question.refresh()
     settle(qtbot)
     assert forgotten(question, "move") == []
@@ -353,8 +360,8 @@ def test_robots_chip_is_translated(pseudo, states: tuple[str, ...], run: str) ->
 @pytest.mark.parametrize("session", [fakes.Session, fakes.Session.full], ids=["empty", "full"])
 def test_status_bar_items_are_translated(pseudo, session) -> None:
     facts = StatusFacts(session())
-    told = [facts.health(), facts.saved(), facts.topics(), facts.master(), facts.traffic()]
-    told += [facts.lost(), facts.shown(), facts.window()]
+    told = [facts.health(), facts.save_state(), facts.topics(), facts.master(), facts.traffic()]
+    told += [facts.lost(), facts.displayed_messages(), facts.window()]
     for alert in list(facts._session.alerts.active):
         facts._session.alerts.resolve(alert.id)
     told.append(facts.health())
@@ -370,21 +377,21 @@ def test_messages_about_files_are_translated(whole: MainWindow, tmp_path: Path) 
     for alert in alerts.active:
         data = ("gone.nepb", "a.png", ".nepb", "No such file or directory")
         assert untranslated(f"{alert.title} {alert.detail} {alert.button}", *data) == []
-    assert untranslated(" ".join(strange_words(strange[:1])), "a.png", ".nepb") == []
+    assert untranslated(" ".join(unknown_type_text(strange[:1])), "a.png", ".nepb") == []
     files.reopen()
     assert untranslated(toast.text) == []
     files.open(tmp_path / "Mine.nepb")
-    whole.session.document.edited(changed("x"))
+    whole.session.document.apply_edit(changed("x"))
     files.close(whole.session.document)
     assert untranslated(toast.text, "Mine") == []
-    whole.commands.behaviours.forget_recent()
+    whole.commands.behaviours.clear_recent()
     assert untranslated(toast.text) == []
 
 
 def test_startup_errors_without_a_display_are_translated(pseudo) -> None:
     data = ("DISPLAY", "WAYLAND_DISPLAY", "QTWEBENGINE_DISABLE_SANDBOX")
-    assert untranslated(why_not({}, "linux", 1000), *data) == []
-    assert untranslated(why_not({"DISPLAY": ":0"}, "linux", 0), *data) == []
+    assert untranslated(startup_problem({}, "linux", 1000), *data) == []
+    assert untranslated(startup_problem({"DISPLAY": ":0"}, "linux", 0), *data) == []
 
 
 def test_placeholders_of_layouts_and_panels_are_translated(qtbot, whole: MainWindow) -> None:
@@ -394,7 +401,7 @@ def test_placeholders_of_layouts_and_panels_are_translated(qtbot, whole: MainWin
         assert forgotten(place) == []
     bench = whole.show_layout("developer")
     dock = bench.docks["topics"]
-    dock.body.fail("", dock.try_again)
+    dock.body.show_error("", dock.retry)
     assert forgotten(dock) == []
     dock.body.show_panel()
 
@@ -414,4 +421,4 @@ def test_texts_of_qt_itself_are_translated(qapp, monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize("count", [1, *range(5, 13)])
 def test_link_to_all_examples_is_translated(pseudo, count: int) -> None:
-    assert untranslated(all_words(count)) == []
+    assert untranslated(all_examples_text(count)) == []

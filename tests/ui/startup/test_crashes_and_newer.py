@@ -16,7 +16,7 @@ from app.core.reports.crash_reports import ALERT, CrashReports
 from app.core.reports.studio_run import StudioRun
 from app.core.session import Session
 from app.core.storage.settings import Settings
-from app.ui.application import close_when_asked, keep_version, tell_of_crashes, tell_of_what_was_found
+from app.ui.application import close_on_signals, raise_startup_alerts, report_crashes, save_version
 from app.ui.shell.main_window import MainWindow
 from nep.version import __version__
 from tests.pseudo import untranslated
@@ -39,18 +39,18 @@ class Run:
 
 
 def test_crashes_of_several_windows_are_combined_into_one_offer(session: Session, home: Path) -> None:
-    tell_of_crashes(session, Run(Crash("studio", "without a word"), Crash("studio", "without a word")))
+    report_crashes(session, Run(Crash("studio", "without a word"), Crash("studio", "without a word")))
     assert [each.id for each in session.alerts.active] == [ALERT]
     assert len(CrashReports().all()) == 2
     again = Session(Settings(home), journal_folder=home / "journal", start_processes=False)
-    tell_of_crashes(again, Run())
+    report_crashes(again, Run())
     assert not again.alerts.active
 
 
 def test_clean_exit_offers_no_crash_report(session: Session, home: Path) -> None:
     with StudioRun(home / "runs", home / "log"):
         pass
-    tell_of_crashes(session, StudioRun(home / "runs", home / "log"))
+    report_crashes(session, StudioRun(home / "runs", home / "log"))
     assert not session.alerts.active
 
 
@@ -60,7 +60,7 @@ def test_work_and_settings_of_a_newer_studio_are_reported(pseudo: None, home: Pa
     (home / "journal" / "a.json").write_text(json.dumps(entry))
     (home / "settings.json").write_text(json.dumps({"format": 7}))
     session = Session(Settings(home), journal_folder=home / "journal", start_processes=False)
-    tell_of_what_was_found(session)
+    raise_startup_alerts(session)
     told = {each.id: f"{each.title} {each.detail}" for each in session.alerts.active}
     assert set(told) == {"journal:newer", "settings:notice"}
     assert "“Mine”" in told["journal:newer"]
@@ -69,16 +69,16 @@ def test_work_and_settings_of_a_newer_studio_are_reported(pseudo: None, home: Pa
 
 
 def test_nothing_is_reported_without_data_of_a_newer_studio(session: Session) -> None:
-    tell_of_what_was_found(session)
+    raise_startup_alerts(session)
     assert not session.alerts.active
 
 
 def test_first_start_of_another_version_is_recorded(window: MainWindow, home: Path) -> None:
-    window.state.keep(studio_versions.KEY, [{"version": "0.0.9", "since_s": 1000.0}])
-    keep_version(window, 2000.0)
-    keep_version(window, 3000.0)
+    window.state.save(studio_versions.KEY, [{"version": "0.0.9", "since_s": 1000.0}])
+    save_version(window, 2000.0)
+    save_version(window, 3000.0)
     told = [("0.0.9", 1000.0), (__version__, 2000.0)]
-    assert studio_versions.known(Settings(home).all()) == told
+    assert studio_versions.known_versions(Settings(home).all()) == told
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
@@ -89,7 +89,7 @@ def test_termination_signal_closes_the_window_cleanly(qtbot, window: MainWindow,
     run = Run()
     window.show()
     try:
-        close_when_asked(window, run)
+        close_on_signals(window, run)
         os.kill(os.getpid(), getattr(signal, name))
         qtbot.waitUntil(lambda: not window.isVisible())
     finally:
@@ -103,7 +103,7 @@ def test_ignored_sighup_stays_ignored(window: MainWindow) -> None:
     before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
     try:
-        close_when_asked(window, Run())
+        close_on_signals(window, Run())
         assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
     finally:
         for number, handler in before.items():

@@ -32,7 +32,7 @@ def test_deferred_steps_do_not_run_before_the_first_paint(qtbot: QtBot) -> None:
     qtbot.addWidget(window)
     done: list[str] = []
     soon = DeferredSteps(window, [lambda: done.append("panels"), lambda: done.append("editor")])
-    soon.put_first([lambda: done.append("begin"), lambda: done.append("meeting")])
+    soon.prepend([lambda: done.append("begin"), lambda: done.append("meeting")])
     qtbot.wait(50)
     assert (done, soon.began) == ([], False)
     window.show()
@@ -142,7 +142,7 @@ def test_widgets_of_the_first_paint_use_our_fonts(
     application.setFont(QFont("DejaVu Serif"))  # as the system gives it: nothing of ours is applied yet
     journal = Journal(tmp_path / "journal")
     journal.write("Walk", None, '{"blocks": {"blocks": [{"type": "x", "id": "a"}]}}', {})
-    monkeypatch.setattr("app.core.documents.journal._alive", lambda _pid, _born_s: False)
+    monkeypatch.setattr("app.core.documents.journal._is_running", lambda _pid, _born_s: False)
     (tmp_path / "settings.json").write_text(json.dumps({"theme": mode}), "utf-8")
     window = make_window(Session(Settings(tmp_path), start_processes=False), Options())
     qtbot.addWidget(window)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.__main__ import hand_over, main, run_parser, window_parser
+from app.__main__ import main, run_child_module, run_parser, window_parser
 
 ROOT = Path(__file__).parents[3]
 
@@ -56,7 +56,7 @@ def test_child_process_entry_reports_ready() -> None:
 
 
 def test_only_known_child_processes_are_started(capsys: pytest.CaptureFixture[str]) -> None:
-    assert hand_over("os", []) == 2
+    assert run_child_module("os", []) == 2
     assert main(["--module", "antigravity"]) == 2
     assert "no process 'os'" in capsys.readouterr().err
 

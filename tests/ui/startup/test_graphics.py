@@ -23,12 +23,12 @@ def test_software_rendering_is_chosen_without_a_gpu_unless_the_user_set_it(
     given, has_one, wanted, is_so
 ) -> None:
     environ = dict(given)
-    assert graphics.draw_by_software(environ, "linux", lambda _platform: has_one) is is_so
+    assert graphics.use_software_renderer(environ, "linux", lambda _platform: has_one) is is_so
     assert environ == wanted
 
 
 def test_linux_gpu_is_detected_by_its_render_device(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(graphics, "DEVICES", (str(tmp_path / "renderD*"),))
+    monkeypatch.setattr(graphics, "GPU_DEVICE_PATTERNS", (str(tmp_path / "renderD*"),))
     assert not graphics.has_graphics_processor("linux")
     (tmp_path / "card0").touch()  # what only shows a screen computes nothing
     assert not graphics.has_graphics_processor("linux")

@@ -53,7 +53,7 @@ def test_studio_shortens_the_switch_interval_at_startup() -> None:
 def test_long_lived_objects_are_frozen_and_later_garbage_is_collected() -> None:
     standing = [[n] for n in range(1000)]
     gc.disable()
-    interpreter.freeze_garbage()
+    interpreter.freeze_objects()
     assert gc.get_freeze_count() > 1000
     assert not any(each is standing for each in gc.get_objects())
     circle: list[object] = []

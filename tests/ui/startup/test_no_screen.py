@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.ui.application import why_not
+from app.ui.application import startup_problem
 
 X11 = {"DISPLAY": ":0"}
 
@@ -31,8 +31,8 @@ X11 = {"DISPLAY": ":0"}
 def test_reason_why_no_window_can_open_is_reported(
     environ: dict[str, str], platform: str, user: int, said: str
 ) -> None:
-    assert said in why_not(environ, platform, user)
-    assert bool(said) == bool(why_not(environ, platform, user))
+    assert said in startup_problem(environ, platform, user)
+    assert bool(said) == bool(startup_problem(environ, platform, user))
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="screens have no name elsewhere")

@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QMessageLogContext, QtMsgType
 
-from app.core.faults import IN_CONSOLE, LogFile
-from app.ui.startup.qt_log import FLAGS, Log, TerminalHandler, on_qt_message, quiet_chromium
+from app.core.faults import CONSOLE_EXTRA, LogFile
+from app.ui.startup.qt_log import FLAGS, ConsoleHandler, TerminalHandler, on_qt_message, quiet_chromium
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_chromium_flags_of_the_user_are_kept(before: str | None, after: str) -> 
 
 
 def test_log_records_are_buffered_until_the_console_takes_them() -> None:
-    log = Log()
+    log = ConsoleHandler()
     logger = logging.getLogger("qt.test_messages")
     logger.addHandler(log)
     try:
@@ -129,11 +129,11 @@ def test_windowed_studio_logs_uncaught_exceptions_to_console_and_file(tmp_path: 
 
 
 def test_record_already_shown_in_the_console_is_written_to_the_log_file_only(tmp_path: Path) -> None:
-    logger, log, file = logging.getLogger("studio.test_messages"), Log(), LogFile(tmp_path)
+    logger, log, file = logging.getLogger("studio.test_messages"), ConsoleHandler(), LogFile(tmp_path)
     for handler in (log, file):
         logger.addHandler(handler)
     try:
-        logger.error("the panel 'a' stopped", extra=IN_CONSOLE)
+        logger.error("the panel 'a' stopped", extra=CONSOLE_EXTRA)
     finally:
         for handler in (log, file):
             logger.removeHandler(handler)

@@ -10,7 +10,13 @@ from pathlib import Path
 import pytest
 
 from app.ui.startup.qt_log import FLAGS
-from app.ui.startup.sandbox import FILTER_ALONE, OFF, SandboxTrial, begin_trial, fit_sandbox
+from app.ui.startup.sandbox import (
+    DISABLE_VARIABLE,
+    NO_NAMESPACES_FLAG,
+    SandboxTrial,
+    configure_sandbox,
+    start_trial,
+)
 
 ROOT = Path(__file__).resolve().parents[3]
 GUARDED = """
@@ -47,7 +53,7 @@ class Told(SandboxTrial):
     def __init__(self, outcome: bool) -> None:
         self._outcome = outcome
 
-    def allowed(self) -> bool:
+    def is_allowed(self) -> bool:
         return self._outcome
 
 
@@ -66,22 +72,22 @@ def test_each_namespace_restriction_is_detected() -> None:
 
 def test_without_namespaces_seccomp_and_user_flags_are_kept() -> None:
     environ = {FLAGS: "--log-level=3"}
-    fit_sandbox(environ, Told(False))
-    assert environ == {FLAGS: f"--log-level=3 {FILTER_ALONE}"}
+    configure_sandbox(environ, Told(False))
+    assert environ == {FLAGS: f"--log-level=3 {NO_NAMESPACES_FLAG}"}
 
 
 def test_nothing_is_changed_with_namespaces_or_without_a_trial() -> None:
     environ: dict[str, str] = {}
-    fit_sandbox(environ, Told(True))
-    fit_sandbox(environ, None)
+    configure_sandbox(environ, Told(True))
+    configure_sandbox(environ, None)
     assert environ == {}
 
 
 @pytest.mark.parametrize(
     ("environ", "platform"),
-    [({}, "win32"), ({}, "darwin"), ({OFF: "1"}, "linux"), ({FLAGS: "--no-sandbox"}, "linux")],
+    [({}, "win32"), ({}, "darwin"), ({DISABLE_VARIABLE: "1"}, "linux"), ({FLAGS: "--no-sandbox"}, "linux")],
 )
 def test_no_trial_is_made_when_the_user_set_the_sandbox_option(
     environ: dict[str, str], platform: str
 ) -> None:
-    assert begin_trial(environ, platform) is None
+    assert start_trial(environ, platform) is None

@@ -20,12 +20,12 @@ from app.ui.startup import single_instance
 from app.ui.startup.single_instance import (
     SingleInstanceServer,
     StartRequest,
-    found,
-    hand_over,
-    is_ours,
+    is_own_socket,
     parse,
-    peer_of,
-    place,
+    pass_to_running,
+    peer_user,
+    send_request,
+    socket_name,
 )
 
 WAIT_MS = 30_000
@@ -45,7 +45,7 @@ def meet(name: str, do: Callable[[StartRequest], object]) -> SingleInstanceServe
 
 @pytest.fixture
 def name(tmp_path: Path) -> str:
-    return place(tmp_path)
+    return socket_name(tmp_path)
 
 
 def second(name: str, *files: str, cwd: Path) -> subprocess.Popen[bytes]:
@@ -54,7 +54,7 @@ def second(name: str, *files: str, cwd: Path) -> subprocess.Popen[bytes]:
 
 
 def test_start_without_a_running_instance_opens_its_own_window(name: str) -> None:
-    assert hand_over(name, StartRequest()) is False
+    assert send_request(name, StartRequest()) is False
 
 
 def test_second_process_hands_over_absolute_paths(qtbot, name: str, tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_second_process_hands_over_absolute_paths(qtbot, name: str, tmp_path: Pa
     assert process.returncode == 0
     assert asked == [StartRequest((tmp_path / "a.nepb", tmp_path / "Grüße.nepb"))]
     meeting.close()
-    assert hand_over(name, StartRequest()) is False
+    assert send_request(name, StartRequest()) is False
 
 
 STARTING = """
@@ -97,7 +97,7 @@ def test_second_of_two_simultaneous_starts_waits_for_the_window_of_the_first(
     qtbot, name: str, tmp_path: Path
 ) -> None:
     turn, asked = FileLock(tmp_path / "starting"), []
-    assert not found(name, StartRequest(), turn)
+    assert not pass_to_running(name, StartRequest(), turn)
     process = starting(name, tmp_path / "starting")
     assert process.stdout is not None
     assert process.stdout.readline() == "begun\n"
@@ -116,7 +116,7 @@ def test_start_that_dies_before_its_window_opens_is_not_waited_for(name: str, tm
     assert not turn.acquire()
     process.kill()
     process.communicate(timeout=60)
-    assert not found(name, StartRequest(), turn, 60.0)
+    assert not pass_to_running(name, StartRequest(), turn, 60.0)
     assert not FileLock(tmp_path / "starting").acquire(), "it has the turn"
     turn.release()
 
@@ -184,11 +184,11 @@ needs_modes = pytest.mark.skipif(os.name != "posix", reason="Windows has pipes w
 
 @needs_modes
 def test_socket_is_in_the_runtime_folder_with_one_per_studio_folder(runtime: Path, tmp_path: Path) -> None:
-    one, other = Path(place(tmp_path / "a")), Path(place(tmp_path / "b"))
+    one, other = Path(socket_name(tmp_path / "a")), Path(socket_name(tmp_path / "b"))
     assert one.parent == other.parent == runtime / "nep-studio"
     assert one != other
     assert one.parent.stat().st_mode & 0o777 == 0o700
-    deep = Path(place(tmp_path / ("x" * 120)))
+    deep = Path(socket_name(tmp_path / ("x" * 120)))
     assert deep.parent == one.parent
 
 
@@ -205,7 +205,7 @@ def test_runtime_folder_accessible_to_others_is_not_used(
         monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "link"))
     else:
         monkeypatch.setenv("XDG_RUNTIME_DIR", "run" if wrong == "relative" else str(tmp_path / "none"))
-    found = Path(place(home))
+    found = Path(socket_name(home))
     assert found.parent == home
     assert home.stat().st_mode & 0o777 == 0o700
 
@@ -216,21 +216,21 @@ def test_without_a_private_folder_studio_starts_without_a_socket(
 ) -> None:
     """A stranger has made the folders before us."""
     monkeypatch.setattr(os, "geteuid", lambda: 4242)
-    assert place(tmp_path) == ""
-    assert hand_over("", StartRequest()) is False
+    assert socket_name(tmp_path) == ""
+    assert send_request("", StartRequest()) is False
     assert SingleInstanceServer("", lambda _asked: None).open is False
 
 
 @needs_modes
 def test_file_that_is_not_our_socket_is_not_connected_to(qtbot, runtime: Path, tmp_path: Path) -> None:
-    name = place(tmp_path)
+    name = socket_name(tmp_path)
     os.mkfifo(name)
-    assert hand_over(name, StartRequest()) is False
+    assert send_request(name, StartRequest()) is False
     meeting = meet(name, lambda _asked: None)
     assert meeting.open, "what is left in our own folder is ours to take away"
-    assert is_ours(name)
+    assert is_own_socket(name)
     Path(name).parent.chmod(0o777)
-    assert hand_over(name, StartRequest()) is False
+    assert send_request(name, StartRequest()) is False
     meeting.close()
 
 
@@ -238,8 +238,8 @@ def test_file_that_is_not_our_socket_is_not_connected_to(qtbot, runtime: Path, t
 def test_connection_of_another_user_is_rejected(qtbot, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[StartRequest] = []
     meeting = meet(name, asked.append)
-    monkeypatch.setattr(single_instance, "peer_of", lambda _descriptor: os.geteuid() + 1)
-    assert hand_over(name, StartRequest()) is False
+    monkeypatch.setattr(single_instance, "peer_user", lambda _descriptor: os.geteuid() + 1)
+    assert send_request(name, StartRequest()) is False
     socket = QLocalSocket()
     socket.connectToServer(name)
     socket.waitForConnected(WAIT_MS)
@@ -253,14 +253,14 @@ def test_connection_of_another_user_is_rejected(qtbot, name: str, monkeypatch: p
 def test_peer_user_id_is_reported_by_the_system(tmp_path: Path) -> None:
     ours, theirs = socket_module.socketpair()
     with ours, theirs:
-        assert peer_of(ours.fileno()) == os.geteuid()
+        assert peer_user(ours.fileno()) == os.geteuid()
     with (tmp_path / "file").open("wb") as file:
-        assert peer_of(file.fileno()) is None
+        assert peer_user(file.fileno()) is None
 
 
 @needs_modes
 def test_unresponsive_instance_does_not_block_a_start(qtbot, name: str, monkeypatch) -> None:
-    monkeypatch.setattr(single_instance, "ANSWER_MS", 50)
+    monkeypatch.setattr(single_instance, "REPLY_TIMEOUT_MS", 50)
     code = "import socket, sys\ns = socket.socket(socket.AF_UNIX)\ns.bind(sys.argv[1])\ns.listen()\n"
     code += "print('up', flush=True)\nc, _ = s.accept()\nsys.stdin.read()\n"
     process = subprocess.Popen(
@@ -268,7 +268,7 @@ def test_unresponsive_instance_does_not_block_a_start(qtbot, name: str, monkeypa
     )
     assert process.stdout is not None
     assert process.stdout.readline() == b"up\n"
-    assert hand_over(name, StartRequest()) is False
+    assert send_request(name, StartRequest()) is False
     process.kill()
     process.communicate()
 

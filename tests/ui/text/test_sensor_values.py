@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from app.robots.description.description import Robot
-from app.ui.panels.behaviour.live_values import live_words
+from app.ui.panels.behaviour.live_values import sensor_texts
 from tests.blocks.samples import robot
 
 SENSORS = [("Pepper", "battery"), ("Pepper", "pose"), ("Pepper", "sees_face"), ("NAO", "battery")]
@@ -29,16 +29,16 @@ TOLD = {"battery": 84, "pose": {"x": 1.25, "y": None}, "sees_face": True}
 
 
 def test_sensors_and_their_fields_are_formatted_with_units() -> None:
-    words, old = live_words(Fleet(Pepper=Link(values=TOLD)), SENSORS)
+    words, old = sensor_texts(Fleet(Pepper=Link(values=TOLD)), SENSORS)
     assert words == {"Pepper/battery": "84 %", "Pepper/pose/x": "1.25 m", "Pepper/sees_face": "yes"}
     assert old == set()
 
 
 def test_unknown_sensor_values_are_blank() -> None:
-    assert live_words(Fleet(Pepper=Link()), [("Pepper", "battery")]) == ({"Pepper/battery": ""}, set())
+    assert sensor_texts(Fleet(Pepper=Link()), [("Pepper", "battery")]) == ({"Pepper/battery": ""}, set())
 
 
 def test_values_of_a_silent_robot_are_stale_and_a_disconnected_robot_has_none() -> None:
-    _, old = live_words(Fleet(Pepper=Link(values=TOLD, state="silent")), SENSORS)
+    _, old = sensor_texts(Fleet(Pepper=Link(values=TOLD, state="silent")), SENSORS)
     assert old == {"Pepper/battery", "Pepper/pose/x", "Pepper/sees_face"}
-    assert live_words(Fleet(Pepper=Link(values=TOLD, connected=False)), SENSORS) == ({}, set())
+    assert sensor_texts(Fleet(Pepper=Link(values=TOLD, connected=False)), SENSORS) == ({}, set())

@@ -15,7 +15,7 @@ from PySide6.QtSvg import QSvgRenderer
 from app import resources
 from app.blocks import Problem
 from app.blocks.toolbox.catalogue import Catalogue
-from app.core.documents.problems import Listed
+from app.core.documents.problems import ProblemLine
 from app.ui.panels.problems import ProblemRow
 from app.ui.shell.commands.table import COMMANDS
 from app.ui.theme import icons
@@ -106,7 +106,7 @@ def test_every_shape_is_an_svg_that_paints_something(qapp) -> None:
 def test_problem_row_is_painted_for_every_block_type(qtbot, theme: Theme, caplog) -> None:
     for block in Catalogue([robot()]).blocks.values():
         problem = Problem("error", "a", block.style, "it", "Something is wrong with it.", icon=block.icon)
-        row = ProblemRow(theme, Listed(problem, ()), large=True)
+        row = ProblemRow(theme, ProblemLine(problem, ()), large=True)
         qtbot.addWidget(row)
         row.resize(400, 60)
         assert not row.grab().isNull(), block.type
@@ -145,9 +145,9 @@ def test_repeatedly_painted_icon_is_rendered_once_and_looks_the_same(qapp) -> No
 
     place, colour = QRectF(3, 3, 14, 14), QColor("#204080")
     direct = painted(lambda painter: icons.paint_icon(painter, place, "braces", colour))
-    icons._drawn.cache_clear()
-    again = [painted(lambda p: icons.paint_icon_again(p, place, "braces", colour)) for _ in range(3)]
-    assert icons._drawn.cache_info().misses == 1
+    icons._cached_pixmap.cache_clear()
+    again = [painted(lambda p: icons.paint_cached_icon(p, place, "braces", colour)) for _ in range(3)]
+    assert icons._cached_pixmap.cache_info().misses == 1
     for image in again:
         far = max(
             abs(image.pixelColor(x, y).red() - direct.pixelColor(x, y).red())
@@ -155,5 +155,5 @@ def test_repeatedly_painted_icon_is_rendered_once_and_looks_the_same(qapp) -> No
             for y in range(40)
         )
         assert far <= 2
-    other = painted(lambda p: icons.paint_icon_again(p, place, "braces", QColor("#802020")))
+    other = painted(lambda p: icons.paint_cached_icon(p, place, "braces", QColor("#802020")))
     assert other != again[0]

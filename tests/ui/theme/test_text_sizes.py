@@ -54,10 +54,10 @@ VIEWS = (
         "Turtle did not reply",
         "Pepper stopped (38 ms). Switch Turtle off by hand.",
         "Turtle did not reply; switch it off by hand",
-        stop_word="Stop again",
+        stop_label="Stop again",
         result="1 of 2 robots stopped",
         result_status="error",
-        confirm="Turtle isn't moving",
+        confirm_label="Turtle isn't moving",
     ),
 )
 OVER = ("palette.open", "help.shortcuts", "settings.open", "layout.keep", "help.about", "file.earlier")
@@ -116,13 +116,13 @@ def test_action_is_readable_and_can_be_tried_without_horizontal_scrolling(
     with qtbot.waitExposed(dock):  # a panel that nobody can see shows nothing new
         dock.show()
     dock.front = True
-    qtbot.waitUntil(dock.shown)
+    qtbot.waitUntil(dock.is_displayed)
     session.tick()
     dock.refresh()
     assert isinstance(widget, robots.RobotsPanel)
     assert widget.cards
     for card in widget.cards.values():
-        card.set_folded(False)
+        card.set_collapsed(False)
         card.form.more.setChecked(True)
     settle(qtbot, dock, longer=False)
     assert sideways(dock) == []
@@ -180,8 +180,10 @@ def test_window_clips_no_text(
     look("start page")
     alerts = window.session.alerts
     title, detail = "The camera of Pepper has sent nothing for 4 s.", "The behaviour waits for a face."
-    alerts.put("one", "error", title, detail, button="Open the connection doctor", action="panel:topics")
-    alerts.put("two", "error", "Another one.", button="Look", action="panel:topics")
+    alerts.raise_alert(
+        "one", "error", title, detail, button="Open the connection doctor", action="panel:topics"
+    )
+    alerts.raise_alert("two", "error", "Another one.", button="Look", action="panel:topics")
     for layout, bar in (("behaviour", window.run_bar), ("developer", window.tool_bar)):
         commands.run(f"layout.{layout}")
         window.tick()
@@ -198,7 +200,7 @@ def test_window_clips_no_text(
         for stop in window.findChildren(StopButton):
             body = QRect(stop.mapTo(window, QPoint()), stop.size())
             assert not stop.isVisible() or not body.intersects(shown[0].geometry()), f"{name} covers Stop"
-        shown[0].shut()
+        shown[0].dismiss()
     assert faults == []
 
 

@@ -7,32 +7,36 @@ from collections.abc import Iterator
 import pytest
 
 from app.ui.shell.commands.table import COMMANDS, MENUS
-from app.ui.widgets.letters import key_of, letters_of, marked, plain_words
+from app.ui.widgets.letters import key_of, mnemonic_positions, strip_mnemonic, with_mnemonics
 from nep import i18n
 
 
 @pytest.fixture(params=["en", *sorted(i18n.known_languages())])
 def language(request: pytest.FixtureRequest) -> Iterator[str]:
-    i18n.begin(request.param)
+    i18n.set_initial_language(request.param)
     yield request.param
-    i18n.begin("en")
+    i18n.set_initial_language("en")
 
 
 def keys(texts: list[str]) -> list[str]:
-    return [key_of(text[place]) for text, place in zip(texts, letters_of(texts), strict=True) if place >= 0]
+    return [
+        key_of(text[place])
+        for text, place in zip(texts, mnemonic_positions(texts), strict=True)
+        if place >= 0
+    ]
 
 
 def test_initial_letters_come_first_and_no_letter_is_used_twice() -> None:
     assert keys(["Cut", "Copy", "Copy as image", "Paste", "Última", "42"]) == ["C", "O", "A", "P", "U"]
-    assert letters_of(["aa", "aA", ""]) == [0, -1, -1]
+    assert mnemonic_positions(["aa", "aA", ""]) == [0, -1, -1]
 
 
 def test_ampersand_and_shortcut_are_stripped_from_menu_texts() -> None:
-    assert plain_words("C&ut\tCtrl+X") == "Cut"
+    assert strip_mnemonic("C&ut\tCtrl+X") == "Cut"
 
 
 def test_menu_bar_has_a_unique_ascii_letter_for_every_menu(language: str) -> None:
-    titles = marked([i18n.gettext(name) for name in MENUS])
+    titles = with_mnemonics([i18n.gettext(name) for name in MENUS])
     chosen = [title[title.index("&") + 1].upper() for title in titles]
     assert len(set(chosen)) == len(MENUS), titles
     assert all(each.isascii() and each.isalpha() for each in chosen), titles
@@ -40,7 +44,7 @@ def test_menu_bar_has_a_unique_ascii_letter_for_every_menu(language: str) -> Non
 
 def test_no_letter_is_used_twice_within_a_menu(language: str) -> None:
     for menu in MENUS:
-        entries = [command.words for command in COMMANDS if command.menu == menu and not command.under]
-        entries += {i18n.gettext(each.under) for each in COMMANDS if each.menu == menu and each.under}
+        entries = [command.label for command in COMMANDS if command.menu == menu and not command.submenu]
+        entries += {i18n.gettext(each.submenu) for each in COMMANDS if each.menu == menu and each.submenu}
         found = keys(entries)
         assert len(found) == len(set(found)) == len(entries), f"{menu}: {found}"

@@ -7,30 +7,30 @@ import itertools
 import pytest
 from PySide6.QtCore import QPointF, QRectF, QSizeF
 
-from app.ui.pictures.placement import MAX_SIZE, PicturePlace
+from app.ui.pictures.placement import MAX_SIZE, PicturePlacement
 
 VIEW, PICTURE = QSizeF(400, 300), QSizeF(800, 400)
 
 
-def place_of(place: PicturePlace, at: QPointF) -> tuple[float, float]:
+def place_of(place: PicturePlacement, at: QPointF) -> tuple[float, float]:
     found = place.to_picture(at, place.area(VIEW, PICTURE))
     return round(found.x(), 6), round(found.y(), 6)
 
 
 def test_image_is_fitted_and_centred_by_default_and_may_fill_the_view() -> None:
-    place = PicturePlace()
+    place = PicturePlacement()
     assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
     assert place.area(VIEW, PICTURE, fill=True) == QRectF(0, 50, 400, 200)  # too much would be cut
     assert place.area(VIEW, QSizeF(640, 420), fill=True).height() == 300
-    place.turn(90)
+    place.rotate(90)
     assert place.area(VIEW, PICTURE) == QRectF(125, 0, 150, 300)
 
 
 @pytest.mark.parametrize("turned", [0, 90, 180, 270])
 @pytest.mark.parametrize(("across", "down"), list(itertools.product([False, True], repeat=2)))
 def test_zoom_keeps_the_point_under_the_mouse_in_every_orientation(turned, across, down) -> None:
-    place = PicturePlace()
-    place.turn(turned)
+    place = PicturePlacement()
+    place.rotate(turned)
     for wanted, flip in ((across, True), (down, False)):
         if wanted:
             place.flip(across=flip)
@@ -44,7 +44,7 @@ def test_zoom_keeps_the_point_under_the_mouse_in_every_orientation(turned, acros
 
 
 def test_panning_moves_the_image_with_the_mouse_up_to_its_edge() -> None:
-    place = PicturePlace()
+    place = PicturePlacement()
     place.set_zoom(2.0)
     before = place_of(place, QPointF(100, 100))
     place.move(50, -20, VIEW, PICTURE)
@@ -56,13 +56,13 @@ def test_panning_moves_the_image_with_the_mouse_up_to_its_edge() -> None:
 
 
 def test_image_that_fits_cannot_be_panned() -> None:
-    place = PicturePlace()
+    place = PicturePlacement()
     place.move(30, 30, VIEW, PICTURE)
     assert place.area(VIEW, PICTURE) == QRectF(0, 50, 400, 200)
 
 
 def test_zoom_has_limits() -> None:
-    place = PicturePlace()
+    place = PicturePlacement()
     middle = QPointF(200, 150)
     place.zoom_at(1e9, middle, VIEW, PICTURE)
     assert place.zoom == MAX_SIZE
@@ -73,11 +73,11 @@ def test_zoom_has_limits() -> None:
 
 @pytest.mark.parametrize("turns", range(1, 4))
 def test_rotation_direction_is_the_same_when_flipped(turns: int) -> None:
-    upright, flipped = PicturePlace(), PicturePlace()
+    upright, flipped = PicturePlacement(), PicturePlacement()
     flipped.flip(across=True)
     corner = QPointF(0, 0)
     for place in (upright, flipped):
-        place.turn(90 * turns)
+        place.rotate(90 * turns)
     # a quarter to the right brings the upper left corner to the upper right
     seen = [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0)][turns - 1]
     mapped = upright.orientation().map(corner)
@@ -87,30 +87,30 @@ def test_rotation_direction_is_the_same_when_flipped(turns: int) -> None:
 
 
 def test_four_quarter_turns_and_two_flips_are_the_identity() -> None:
-    place = PicturePlace()
+    place = PicturePlacement()
     place.set_zoom(2.0)
     place.move(40, 30, VIEW, PICTURE)
-    before = place.saved()
+    before = place.to_json()
     for _ in range(4):
-        place.turn(90)
-    place.turn(180)
-    place.turn(-180)
+        place.rotate(90)
+    place.rotate(180)
+    place.rotate(-180)
     for across in (True, False, True, False):
         place.flip(across=across)
-    after = place.saved()
+    after = place.to_json()
     assert after.pop("centre") == pytest.approx(before.pop("centre"))
     assert after == before
 
 
 def test_placement_is_restored_with_the_layout_and_invalid_state_is_ignored() -> None:
-    place = PicturePlace()
+    place = PicturePlacement()
     place.zoom_at(4.0, QPointF(10, 90), VIEW, PICTURE)
-    place.turn(270)
+    place.rotate(270)
     place.flip(across=False)
-    again = PicturePlace()
-    again.restore(place.saved())
+    again = PicturePlacement()
+    again.restore(place.to_json())
     assert again == place
     for broken in (None, [], {"zoom": True, "turned": 45, "centre": "x"}, {"zoom": -1, "centre": [1]}):
-        fresh = PicturePlace()
+        fresh = PicturePlacement()
         fresh.restore(broken)
-        assert fresh == PicturePlace()
+        assert fresh == PicturePlacement()

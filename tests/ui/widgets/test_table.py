@@ -9,7 +9,7 @@ from PySide6.QtTest import QSignalSpy, QTest
 from PySide6.QtWidgets import QTableView
 
 from app.ui.theme.theme import Theme
-from app.ui.widgets.table.cells import REMEMBERED
+from app.ui.widgets.table.cells import MAX_CACHED_CELLS
 from app.ui.widgets.table.columns import ColumnChoice
 from app.ui.widgets.table.model import CELL_ROLE, Cell, Column, Order, TableModel
 from app.ui.widgets.table.view import TableView
@@ -24,7 +24,7 @@ class Row:
 COLUMNS = (
     Column("name", "Name", 100, lambda row: Cell(row.name, mono=True), lambda row: row.name, stretch=True),
     Column("rate", "Rate", 60, lambda row: Cell("" if row.rate is None else f"{row.rate:.1f}"),
-           lambda row: row.rate, figures=True, tip=lambda row: f"{row.rate} a second"),
+           lambda row: row.rate, is_numeric=True, tip=lambda row: f"{row.rate} a second"),
 )  # fmt: skip
 
 
@@ -68,7 +68,7 @@ def test_cell_provides_data_for_delegate_tooltip_and_screen_reader(model) -> Non
 
 def test_unknown_values_are_sorted_last_in_both_directions() -> None:
     rows = [Row("none"), Row("two", 2.0), Row("one", 1.0)]
-    rising, falling = Order(COLUMNS[1]), Order(COLUMNS[1], falling=True)
+    rising, falling = Order(COLUMNS[1]), Order(COLUMNS[1], is_descending=True)
     assert [row.name for row in rising.sort(rows)] == ["one", "two", "none"]
     assert [row.name for row in falling.sort(rows)] == ["two", "one", "none"]
     assert [row.name for row in Order().sort(rows)] == ["none", "two", "one"]
@@ -84,11 +84,11 @@ def view(qtbot, model) -> TableView[Row]:
 
 
 def test_selected_row_is_kept_when_rows_are_added_and_the_order_changes(view, model) -> None:
-    view.choose("a")
+    view.select_key("a")
     model.set_rows([Row("0"), Row("b"), Row("a"), Row("c")])
-    assert view.chosen_key() == "a"
+    assert view.selected_key() == "a"
     model.set_rows([Row("c"), Row("b"), Row("a")])
-    assert view.chosen_key() == "a"
+    assert view.selected_key() == "a"
 
 
 def test_click_and_return_open_a_row_and_slash_requests_the_filter(qtbot, view) -> None:
@@ -98,16 +98,16 @@ def test_click_and_return_open_a_row_and_slash_requests_the_filter(qtbot, view) 
     QTest.keyClick(view, Qt.Key.Key_Down)
     QTest.keyClick(view, Qt.Key.Key_Return)
     assert opened == ["a", "c"]
-    with qtbot.waitSignal(view.filter_wanted):
+    with qtbot.waitSignal(view.filter_requested):
         QTest.keyClicks(view, "/")
 
 
 def test_click_on_a_header_sorts_and_another_click_reverses_the_order(qtbot, view) -> None:
     with qtbot.waitSignal(view.order_changed):
         view.horizontalHeader().sectionClicked.emit(1)
-    assert (view.order.column, view.order.falling) == (COLUMNS[1], True)  # figures: the largest first
+    assert (view.order.column, view.order.is_descending) == (COLUMNS[1], True)  # figures: the largest first
     view.horizontalHeader().sectionClicked.emit(1)
-    assert view.order.falling is False
+    assert view.order.is_descending is False
 
 
 def test_only_visible_rows_are_updated_with_one_signal(qapp, view, model) -> None:
@@ -115,7 +115,7 @@ def test_only_visible_rows_are_updated_with_one_signal(qapp, view, model) -> Non
     qapp.processEvents()  # the view lays out its rows
     told = QSignalSpy(model.dataChanged)
     view.scrollTo(model.index(5000, 0))
-    view.tell_visible_changed()
+    view.refresh_visible()
     assert told.count() == 1
     first, last = told.at(0)[0], told.at(0)[1]
     assert 4990 <= first.row() <= last.row() <= 5020
@@ -146,11 +146,11 @@ def brush(qapp, view) -> Brush:
 
 
 def test_only_changed_cells_are_repainted(qapp, view, model, brush) -> None:
-    view.tell_visible_changed()
+    view.refresh_visible()
     qapp.processEvents()
     assert brush.painted.isEmpty()
     model.row_at(model.index(1, 0)).rate = 7.5
-    view.tell_visible_changed()
+    view.refresh_visible()
     qapp.processEvents()
     assert brush.painted == QRegion(view.visualRect(model.index(1, 1)))
 
@@ -161,18 +161,18 @@ def test_cell_that_changed_during_another_repaint_is_repainted(qapp, view, model
     view.viewport().repaint()
     row.rate = 2.0  # as the view was told it last
     brush.painted = QRegion()
-    view.tell_visible_changed()
+    view.refresh_visible()
     qapp.processEvents()
     assert brush.painted == QRegion(view.visualRect(model.index(0, 1)))
 
 
 def test_cache_of_painted_cells_is_bounded(qapp, view, model) -> None:
-    model.set_rows([Row(f"{number:05}", 1.0) for number in range(REMEMBERED)])
-    for first in range(0, REMEMBERED, 5):
+    model.set_rows([Row(f"{number:05}", 1.0) for number in range(MAX_CACHED_CELLS)])
+    for first in range(0, MAX_CACHED_CELLS, 5):
         view.scrollTo(model.index(first, 0), QTableView.ScrollHint.PositionAtTop)
         view.viewport().repaint()
-        view.tell_visible_changed()
-    assert len(view._cells._painted) <= REMEMBERED + 50
+        view.refresh_visible()
+    assert len(view._cells._painted) <= MAX_CACHED_CELLS + 50
 
 
 def test_stretch_column_takes_the_remaining_width(view) -> None:
@@ -190,24 +190,24 @@ def test_row_height_follows_the_density(view) -> None:
 def test_column_chosen_by_the_user_is_not_hidden_when_space_is_short(view) -> None:
     columns = (
         COLUMNS[0],
-        replace(COLUMNS[1], yields=1),
-        Column("own", "Own", 60, lambda _row: Cell(), off=True),
+        replace(COLUMNS[1], hide_order=1),
+        Column("own", "Own", 60, lambda _row: Cell(), is_hidden_by_default=True),
     )
     choice = ColumnChoice(columns)
-    assert choice.fit([100, 60, 60], 300) == {0, 1}
-    assert choice.fit([100, 60, 60], 120) == {0}
+    assert choice.fitting_columns([100, 60, 60], 300) == {0, 1}
+    assert choice.fitting_columns([100, 60, 60], 120) == {0}
     choice.show("own", True)
-    assert choice.fit([100, 60, 60], 120) == {0, 2}
+    assert choice.fitting_columns([100, 60, 60], 120) == {0, 2}
     choice.show("name", False)
-    assert choice.fit([100, 60, 60], 300) == {0, 1, 2}  # the first names the row
+    assert choice.fitting_columns([100, 60, 60], 300) == {0, 1, 2}  # the first names the row
 
 
 def test_column_choice_is_saved_and_invalid_state_is_ignored() -> None:
     choice = ColumnChoice(COLUMNS)
     choice.show("rate", False)
     again = ColumnChoice(COLUMNS)
-    again.restore({**choice.saved(), "gone": True, "name": "yes"})
-    assert again.saved() == {"rate": False}
+    again.restore({**choice.saved_state(), "gone": True, "name": "yes"})
+    assert again.saved_state() == {"rate": False}
     again.restore("nonsense")
     assert not again.changed
 

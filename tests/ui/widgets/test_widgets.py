@@ -30,8 +30,8 @@ from app.ui.widgets import (
 )
 from app.ui.widgets.indicators import paint_sparkline
 from app.ui.widgets.inputs.slider import decimals_of
-from app.ui.widgets.keyboard import stops_of
-from app.ui.widgets.lists.scroll_areas import ScrollColumn, Scrolled
+from app.ui.widgets.keyboard import tab_stops_of
+from app.ui.widgets.lists.scroll_areas import ContentScrollArea, ScrollColumn
 
 pytest_plugins = ["tests.ui.shell_fixtures"]
 
@@ -179,7 +179,7 @@ def test_icon_button_names_its_action_and_shortcut(theme: Theme) -> None:
 def test_run_button_keeps_its_width_when_its_text_is_resume(theme: Theme) -> None:
     button = RunButton(theme, "Run", "play", widest="Resume")
     before = button.sizeHint()
-    button.set_word("Resume")
+    button.set_label("Resume")
     assert button.sizeHint() == before
 
 
@@ -244,7 +244,7 @@ def test_empty_state_button_runs_its_action(qtbot, theme: Theme) -> None:
         "bot",
         "No robot",
         "Connect one.",
-        [EmptyAction("Apply", lambda: done.append("used"), primary=True)],
+        [EmptyAction("Apply", lambda: done.append("used"), is_primary=True)],
     )
     shown(qtbot, made)
     QTest.mouseClick(made.findChildren(Button)[0], Qt.MouseButton.LeftButton)
@@ -363,7 +363,7 @@ def test_scroll_area_grows_with_longer_text(qtbot) -> None:
     qtbot.addWidget(window)
     words = QLabel("short")
     words.setWordWrap(True)
-    about = Scrolled(words)
+    about = ContentScrollArea(words)
     column = QVBoxLayout(window)
     column.addWidget(QWidget(), 1)
     column.addWidget(about)
@@ -385,7 +385,7 @@ def test_tab_moves_through_rows_and_not_into_a_combo_box_popup(qtbot) -> None:
     dropped = choice.view()
     column.column.insertWidget(0, choice)  # a warning of Qt fails the test
     assert dropped.window() is not choice.window()
-    assert stops_of(choice) == [choice]
+    assert tab_stops_of(choice) == [choice]
 
 
 def test_steady_label_is_laid_out_again_only_for_wider_text(qtbot) -> None:

@@ -21,14 +21,14 @@ __all__ = [
     "ten_to_the",
 ]  # fmt: skip
 
-_MAX_ROUNDS = 10**9
-_MAX_PLACES = 15
+_MAX_ITERATIONS = 10**9
+_MAX_DECIMAL_PLACES = 15
 _MAX_EXACT_INTEGER = 2**53
 
 
 def square_root(value: object) -> int | float:
     """Return the square root."""
-    return _applied(math.sqrt, value, lazy("“square root”"))
+    return _apply(math.sqrt, value, lazy("“square root”"))
 
 
 def absolute(value: object) -> int | float:
@@ -44,30 +44,30 @@ def sign(value: object) -> int:
 
 def sine(degrees: object) -> int | float:
     """Return the sine of an angle in degrees."""
-    return _rounded_result(math.sin(_angle(degrees, lazy("“sin”"))))
+    return _rounded_result(math.sin(_to_radians(degrees, lazy("“sin”"))))
 
 
 def cosine(degrees: object) -> int | float:
     """Return the cosine of an angle in degrees."""
-    return _rounded_result(math.cos(_angle(degrees, lazy("“cos”"))))
+    return _rounded_result(math.cos(_to_radians(degrees, lazy("“cos”"))))
 
 
 def tangent(degrees: object) -> int | float:
     """Return the tangent of an angle in degrees. Raises BehaviourError at 90 degrees."""
     what = lazy("“tan”")
     if abs(number(degrees, what)) % 180 == 90:
-        raise _no_result(what, degrees)
-    return _rounded_result(math.tan(_angle(degrees, what)))
+        raise _no_result_error(what, degrees)
+    return _rounded_result(math.tan(_to_radians(degrees, what)))
 
 
 def arc_sine(value: object) -> int | float:
     """Return the angle in degrees with this sine."""
-    return _rounded_result(math.degrees(_applied(math.asin, value, lazy("“asin”"))))
+    return _rounded_result(math.degrees(_apply(math.asin, value, lazy("“asin”"))))
 
 
 def arc_cosine(value: object) -> int | float:
     """Return the angle in degrees with this cosine."""
-    return _rounded_result(math.degrees(_applied(math.acos, value, lazy("“acos”"))))
+    return _rounded_result(math.degrees(_apply(math.acos, value, lazy("“acos”"))))
 
 
 def arc_tangent(value: object) -> int | float:
@@ -77,12 +77,12 @@ def arc_tangent(value: object) -> int | float:
 
 def natural_logarithm(value: object) -> int | float:
     """Return the logarithm to the base e."""
-    return _applied(math.log, value, lazy("“ln”"))
+    return _apply(math.log, value, lazy("“ln”"))
 
 
 def logarithm(value: object) -> int | float:
     """Return the logarithm to the base 10."""
-    return _applied(math.log10, value, lazy("“log”"))
+    return _apply(math.log10, value, lazy("“log”"))
 
 
 def e_to_the(power: object) -> float:
@@ -99,7 +99,7 @@ def rounded_to(value: object, places: object) -> int | float:
     """Round to a number of decimal places, halves up; negative places round to tens, hundreds and so on."""
     found = number(value, lazy("“round”"))
     wanted = number(places, lazy("“decimal places”"))
-    digits = max(-_MAX_PLACES, min(_MAX_PLACES, round(wanted)))
+    digits = max(-_MAX_DECIMAL_PLACES, min(_MAX_DECIMAL_PLACES, round(wanted)))
     if abs(found) >= _MAX_EXACT_INTEGER:  # floats of this size have no fraction
         return found
     halves = ROUND_HALF_UP if found > 0 else ROUND_HALF_DOWN
@@ -174,7 +174,7 @@ def counting(first: object, last: object, step: object) -> Iterator[int | float]
         raise BehaviourError(_("{name} needs a step other than 0.").format(name=_(what)))
     wide = abs(wide) if end >= begin else -abs(wide)
     # Tolerance for rounding errors: 0 to 0.3 by 0.1 has four numbers.
-    rounds = min(math.floor((end - begin) / wide + 1e-9), _MAX_ROUNDS)
+    rounds = min(math.floor((end - begin) / wide + 1e-9), _MAX_ITERATIONS)
     whole = isinstance(begin, int) and isinstance(wide, int)
     return (
         begin + at * wide if whole else _rounded_result(begin + at * wide, places=12)
@@ -182,19 +182,19 @@ def counting(first: object, last: object, step: object) -> Iterator[int | float]
     )
 
 
-def _angle(degrees: object, what: str) -> float:
+def _to_radians(degrees: object, what: str) -> float:
     return math.radians(math.fmod(number(degrees, what), 360))
 
 
-def _applied(work_out: Callable[[float], float], value: object, what: str) -> int | float:
+def _apply(work_out: Callable[[float], float], value: object, what: str) -> int | float:
     found = number(value, what)
     try:
         return _rounded_result(work_out(found), places=None)
     except ValueError:
-        raise _no_result(what, found) from None
+        raise _no_result_error(what, found) from None
 
 
-def _no_result(what: str, value: object) -> BehaviourError:
+def _no_result_error(what: str, value: object) -> BehaviourError:
     return BehaviourError(_("{name} has no result for {number}.").format(name=_(what), number=text(value)))
 
 

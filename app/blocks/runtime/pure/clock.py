@@ -23,10 +23,10 @@ _DAYS = (
 
 def now(part: str) -> object:
     """Return one part of the current date and time; Monday is day 1 of the week."""
-    return part_of_moment(_now(), part)
+    return date_part(_now(), part)
 
 
-def part_of_moment(moment: datetime, part: str) -> object:
+def date_part(moment: datetime, part: str) -> object:
     """Return one part of a date and time."""
     if part in ("year", "month", "day", "hour", "minute", "second"):
         return getattr(moment, part)
@@ -39,10 +39,10 @@ def part_of_moment(moment: datetime, part: str) -> object:
 
 def seconds_since(moment: object) -> float:
     """Return the seconds since a time of today, a date, or both; negative if it is in the future."""
-    return round((_now() - read_moment(text(moment), _now())).total_seconds(), 3)
+    return round((_now() - parse_moment(text(moment), _now())).total_seconds(), 3)
 
 
-def read_moment(written: str, today: datetime) -> datetime:
+def parse_moment(written: str, today: datetime) -> datetime:
     """Parse “14:30”, “2026-11-23” or “2026-11-23 14:30:05”. Raises BehaviourError."""
     words = written.strip()
     if ":" in words and "-" not in words:

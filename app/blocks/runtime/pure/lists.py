@@ -11,8 +11,8 @@ import random
 import statistics
 from collections.abc import Sequence
 
-from app.blocks.runtime.errors import BehaviourError, kind
-from app.blocks.runtime.values import MAX_TEXT_LENGTH, letters, number, text
+from app.blocks.runtime.errors import BehaviourError, type_name
+from app.blocks.runtime.values import MAX_TEXT_LENGTH, grapheme_clusters, number, text
 from nep.i18n import _, lazy, ngettext
 
 __all__ = [
@@ -27,7 +27,7 @@ FIRST, LAST, RANDOM = "first", "last", "random"
 
 def new_list(*items: object) -> list[object]:
     """Return a list of these values."""
-    return _copied_list(items)
+    return _copy_list(items)
 
 
 def item(of: object, where: object) -> object:
@@ -40,7 +40,7 @@ def set_item(of: object, where: object, value: object) -> None:
     """Replace the item at a position."""
     items = _mutable_list(of)
     place = _index(items, where)
-    items[place] = _checked_value(items, value)
+    items[place] = _copy_if_room(items, value)
 
 
 def insert_item(of: object, where: object, value: object) -> None:
@@ -52,13 +52,13 @@ def insert_item(of: object, where: object, value: object) -> None:
         place = 0
     else:
         place = _index(items, where)
-    items.insert(place, _checked_value(items, value))
+    items.insert(place, _copy_if_room(items, value))
 
 
 def add_item(of: object, value: object) -> None:
     """Append a value."""
     items = _mutable_list(of)
-    items.append(_checked_value(items, value))
+    items.append(_copy_if_room(items, value))
 
 
 def remove_item(of: object, where: object) -> object:
@@ -71,12 +71,12 @@ def contains(where: object, value: object) -> bool:
     """Return True if a list has an equal item, or a text contains this text."""
     if isinstance(where, str):
         return text(value) in where
-    return any(_same(each, value) for each in _as_list(where))
+    return any(_are_equal(each, value) for each in _as_list(where))
 
 
 def position(of: object, value: object) -> int:
     """Return the number of the first equal item, or 0."""
-    return next((place for place, each in enumerate(_as_list(of), 1) if _same(each, value)), 0)
+    return next((place for place, each in enumerate(_as_list(of), 1) if _are_equal(each, value)), 0)
 
 
 def each(of: object) -> list[object]:
@@ -100,7 +100,7 @@ def join_items(of: object, between: object) -> str:
 def split_text(words: object, at: object) -> list[object]:
     """Split a text at a separator; into single characters if the separator is empty."""
     whole, joint = text(words), text(at)
-    pieces = whole.split(joint) if joint else letters(whole)
+    pieces = whole.split(joint) if joint else grapheme_clusters(whole)
     if len(pieces) > MAX_ITEMS:
         raise _full_error()
     return [*pieces]
@@ -109,7 +109,7 @@ def split_text(words: object, at: object) -> list[object]:
 def part_of_list(of: object, first: object, last: object) -> list[object]:
     """Return the items from one number to another, inclusive; numbers outside of the list are ignored."""
     begin, end = (math.floor(number(each, lazy("“items”"))) for each in (first, last))
-    return _copied_list(_as_list(of)[max(begin, 1) - 1 : max(end, 0)])
+    return _copy_list(_as_list(of)[max(begin, 1) - 1 : max(end, 0)])
 
 
 def is_empty_list(of: object) -> bool:
@@ -124,12 +124,12 @@ def clear_list(of: object) -> None:
 
 def copy_of(of: object) -> list[object]:
     """Return a copy of the list."""
-    return _copied_list(_as_list(of))
+    return _copy_list(_as_list(of))
 
 
 def sorted_up(of: object) -> list[object]:
     """Return the items in ascending order: numbers, then texts ignoring case, then the rest."""
-    return sorted(_copied_list(_as_list(of)), key=_sort_key)
+    return sorted(_copy_list(_as_list(of)), key=_sort_key)
 
 
 def sorted_down(of: object) -> list[object]:
@@ -139,12 +139,12 @@ def sorted_down(of: object) -> list[object]:
 
 def turned_round(of: object) -> list[object]:
     """Return the items in reverse order."""
-    return _copied_list(_as_list(of))[::-1]
+    return _copy_list(_as_list(of))[::-1]
 
 
 def shuffled(of: object) -> list[object]:
     """Return the items in random order."""
-    items = _copied_list(_as_list(of))
+    items = _copy_list(_as_list(of))
     random.shuffle(items)
     return items
 
@@ -199,7 +199,7 @@ def _as_list(of: object) -> Sequence[object]:
     said = _("This needs a list, not {kind}.")
     if of == 0 and isinstance(of, int):
         said = _("This needs a list, not {kind}. Set the variable to an empty list first.")
-    raise BehaviourError(said.format(kind=kind(of)))
+    raise BehaviourError(said.format(kind=type_name(of)))
 
 
 def _mutable_list(of: object) -> list[object]:
@@ -233,37 +233,37 @@ def _index(items: Sequence[object], where: object) -> int:
     return int(place) - 1
 
 
-def _same(one: object, other: object) -> bool:
+def _are_equal(one: object, other: object) -> bool:
     return one == other and isinstance(one, bool) == isinstance(other, bool)
 
 
-def _checked_value(items: list[object], value: object) -> object:
+def _copy_if_room(items: list[object], value: object) -> object:
     if len(items) >= MAX_ITEMS:
         raise _full_error()
     if not isinstance(value, (list, tuple)):
         return value
-    room = MAX_ITEMS - _size(items, MAX_ITEMS)
-    if room <= 0 or _size(value, room) > room:
+    room = MAX_ITEMS - _count_items(items, MAX_ITEMS)
+    if room <= 0 or _count_items(value, room) > room:
         raise _full_error()
-    return _copied(value)
+    return _deep_copy(value)
 
 
-def _copied_list(items: Sequence[object]) -> list[object]:
+def _copy_list(items: Sequence[object]) -> list[object]:
     room = MAX_ITEMS - len(items)
     for one in items:
-        room -= _size(one, MAX_ITEMS)
+        room -= _count_items(one, MAX_ITEMS)
         if room < 0:
             raise _full_error()
-    return [_copied(one) for one in items]
+    return [_deep_copy(one) for one in items]
 
 
-def _copied(value: object) -> object:
+def _deep_copy(value: object) -> object:
     if isinstance(value, (list, tuple)):
-        return [_copied(each) for each in value]
+        return [_deep_copy(each) for each in value]
     return value
 
 
-def _size(value: object, enough: int) -> int:
+def _count_items(value: object, enough: int) -> int:
     if not isinstance(value, (list, tuple)):
         return 0
     found, waiting = 0, [value]

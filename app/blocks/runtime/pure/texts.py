@@ -12,7 +12,7 @@ import re
 import unicodedata
 
 from app.blocks.runtime.errors import BehaviourError
-from app.blocks.runtime.values import MAX_TEXT_LENGTH, letters, number, text
+from app.blocks.runtime.values import MAX_TEXT_LENGTH, grapheme_clusters, number, text
 from nep.i18n import _, lazy, ngettext
 
 __all__ = [
@@ -28,7 +28,7 @@ _MAX_DIGITS = 300
 
 def letter(of: object, where: object) -> str:
     """Return the character at a position: its number, "first", "last" or "random"."""
-    all_of_it = letters(text(of))
+    all_of_it = grapheme_clusters(text(of))
     if not all_of_it:
         raise BehaviourError(_("The text is empty."))
     if where == "random":
@@ -56,14 +56,14 @@ def part_of_text(of: object, first: object, last: object) -> str:
     Numbers outside of the text are ignored.
     """
     begin, end = (math.floor(number(each, lazy("“letters”"))) for each in (first, last))
-    return "".join(letters(text(of))[max(begin, 1) - 1 : max(end, 0)])
+    return "".join(grapheme_clusters(text(of))[max(begin, 1) - 1 : max(end, 0)])
 
 
 def position_in_text(of: object, piece: object) -> int:
     """Return the position of the first occurrence of a text, or 0."""
     whole, wanted = text(of), text(piece)
     found = whole.find(wanted) if wanted else -1
-    return 0 if found < 0 else len(letters(whole[:found])) + 1
+    return 0 if found < 0 else len(grapheme_clusters(whole[:found])) + 1
 
 
 def has_in_it(of: object, piece: object) -> bool:
@@ -83,7 +83,7 @@ def ends_with(of: object, piece: object) -> bool:
 
 def same_words(one: object, other: object) -> bool:
     """Return True if both texts are equal, ignoring case and surrounding white space."""
-    return _folded(one) == _folded(other)
+    return _normalize(one) == _normalize(other)
 
 
 def is_empty(value: object) -> bool:
@@ -108,7 +108,7 @@ def without_spaces_around(value: object) -> str:
 
 def backwards(value: object) -> str:
     """Return the text reversed."""
-    return "".join(reversed(letters(text(value))))
+    return "".join(reversed(grapheme_clusters(text(value))))
 
 
 def replaced(of: object, old: object, new: object) -> str:
@@ -125,20 +125,20 @@ def replaced(of: object, old: object, new: object) -> str:
 
 def has_number(value: object) -> bool:
     """Return True if the text contains a number."""
-    return _written(value) is not None
+    return _parse_number(value) is not None
 
 
 def number_in(value: object) -> int | float:
     """Return the first number in a text; a number is returned unchanged."""
     if isinstance(value, (int, float)) or value is None:
         return number(value, lazy("“number in”"))
-    found = _written(value)
+    found = _parse_number(value)
     if found is None:
         raise BehaviourError(_("“{text}” has no number in it.").format(text=text(value)[:60]))
     return found
 
 
-def _written(value: object) -> int | float | None:
+def _parse_number(value: object) -> int | float | None:
     # “12”, “2,5” and “1,000” are numbers: a comma before three digits separates thousands.
     match = _NUMBER.search(text(value))
     if match is None or len(match[0]) > _MAX_DIGITS:
@@ -151,5 +151,5 @@ def _written(value: object) -> int | float | None:
     return -found if minus else found
 
 
-def _folded(value: object) -> str:
+def _normalize(value: object) -> str:
     return unicodedata.normalize("NFKC", text(value)).casefold().strip()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from app.core.documents.background_worker import BackgroundWorker
 from app.core.recording.replay.spans import RecordedSpans, spans_of
 from nep.errors import NepError, RecordingError
-from nep.recordings.formats.figures import TopicFigures
+from nep.recordings.formats.figures import TopicStats
 from nep.recordings.reader import Recording
 
 MAX_MARKS = 2_000
@@ -40,7 +40,7 @@ class LossMark:
 
 
 @dataclass(frozen=True, slots=True)
-class _Made:
+class _Result:
     density: Density | None = None
     losses: Mapping[str, tuple[LossMark, ...]] | None = None
     spans: RecordedSpans | None = None
@@ -54,22 +54,22 @@ class Densities:
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._worker: BackgroundWorker[_Made] = BackgroundWorker("studio-density")
+        self._worker: BackgroundWorker[_Result] = BackgroundWorker("studio-density")
         self.newest: Density | None = None
         self.problem = ""
         self.losses: Mapping[str, tuple[LossMark, ...]] = {}
         self.spans = RecordedSpans()
         self._wanted: tuple[int, int, int] | None = None
-        self._worker.ask("losses", lambda: _Made(losses=losses_of(recording)))
-        self._worker.ask("spans", lambda: _Made(spans=spans_of(recording)))
+        self._worker.submit("losses", lambda: _Result(losses=losses_of(recording)))
+        self._worker.submit("spans", lambda: _Result(spans=spans_of(recording)))
 
-    def want(self, start_ns: int, end_ns: int, buckets: int) -> None:
+    def request(self, start_ns: int, end_ns: int, buckets: int) -> None:
         """Request the message counts of the visible range. Repeating a request has no effect."""
         wanted = (start_ns, end_ns, buckets)
         if wanted == self._wanted or buckets < 1 or end_ns <= start_ns:
             return
         self._wanted = wanted
-        self._worker.ask("density", lambda: _Made(density=density_of(self._recording, *wanted)))
+        self._worker.submit("density", lambda: _Result(density=density_of(self._recording, *wanted)))
 
     def collect_results(self) -> bool:
         """Store finished results; return True if there were any. `problem` is the reason of a failure."""
@@ -82,7 +82,7 @@ class Densities:
             self.spans = spans.spans or RecordedSpans()
         return density is not None or losses is not None or spans is not None
 
-    def _pop(self, owner: str) -> _Made | None:
+    def _pop(self, owner: str) -> _Result | None:
         try:
             return self._worker.pop_result(owner)
         except NepError as error:
@@ -108,26 +108,26 @@ def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
     """
     found: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}
-    for at_ns, figures in _figures_that_grow(recording):
+    for at_ns, figures in _changing_stats(recording):
         for topic, each in figures.items():
-            missing = _missing(each)
+            missing = _missing_count(each)
             grown = missing - before.get(topic, 0)
             before[topic] = missing
             marks = found.setdefault(topic, [])
             if grown <= 0:
-                _take_back(marks, -grown)
+                _subtract_late(marks, -grown)
             elif len(marks) < MAX_MARKS:
                 marks.append(LossMark(at_ns, grown))
             else:
                 marks[-1] = LossMark(marks[-1].at_ns, marks[-1].count + grown)
     if recording.is_complete:  # not all counts were read
-        before = {topic: _missing(each) for topic, each in recording.figures().items()}
+        before = {topic: _missing_count(each) for topic, each in recording.stats().items()}
     for topic, marks in found.items():
-        _take_back(marks, sum(mark.count for mark in marks) - before.get(topic, 0))
+        _subtract_late(marks, sum(mark.count for mark in marks) - before.get(topic, 0))
     return {topic: tuple(marks) for topic, marks in found.items() if marks}
 
 
-def _take_back(marks: list[LossMark], count: int) -> None:
+def _subtract_late(marks: list[LossMark], count: int) -> None:
     # Late messages are subtracted from the newest marks.
     while marks and count > 0:
         newest = marks.pop()
@@ -136,29 +136,31 @@ def _take_back(marks: list[LossMark], count: int) -> None:
         count -= newest.count
 
 
-def _figures_that_grow(recording: Recording) -> Iterator[tuple[int, Mapping[str, TopicFigures]]]:
+def _changing_stats(recording: Recording) -> Iterator[tuple[int, Mapping[str, TopicStats]]]:
     # Found by bisection. The counts only increase, except for late messages, and the final ones are in the
     # file: nothing is read between two times with equal counts. So a long recording with few losses is read
     # little; one that was not closed completely.
     if not recording.is_complete:
-        yield from recording.figures_over_time()
+        yield from recording.stats_over_time()
         return
-    pieces = recording.figure_pieces()
-    told: dict[int, list[tuple[int, dict[str, TopicFigures]]]] = {}
-    final = {topic: _missing(each) for topic, each in recording.figures().items()}
+    pieces = recording.stats_chunks()
+    told: dict[int, list[tuple[int, dict[str, TopicStats]]]] = {}
+    final = {topic: _missing_count(each) for topic, each in recording.stats().items()}
     spans: list[tuple[int, int, Mapping[str, int], Mapping[str, int]]] = [(-1, len(pieces), {}, final)]
     while spans:
         first, last, least, most = spans.pop()
         if last - first < 2 or all(least.get(topic, 0) >= count for topic, count in most.items()):
             continue
         middle = (first + last) // 2
-        told[middle] = list(recording.figures_over_time((pieces[middle],)))
-        there = {topic: _missing(each) for _at_ns, figures in told[middle] for topic, each in figures.items()}
+        told[middle] = list(recording.stats_over_time((pieces[middle],)))
+        there = {
+            topic: _missing_count(each) for _at_ns, figures in told[middle] for topic, each in figures.items()
+        }
         spans.append((first, middle, least, {**most, **there}))
         spans.append((middle, last, {**least, **there}, most))
     for number in sorted(told):
         yield from told[number]
 
 
-def _missing(figures: TopicFigures) -> int:
+def _missing_count(figures: TopicStats) -> int:
     return (figures.lost or 0) + figures.unkept

@@ -10,7 +10,7 @@ from app.core.recording.opener import LocalOpener, RecordingOpener
 from nep.errors import RecordingError
 from nep.i18n import _
 from nep.recordings.bookmarks import Bookmarks
-from nep.recordings.formats.figures import TopicFigures
+from nep.recordings.formats.figures import TopicStats
 from nep.recordings.reader import Recording
 
 MAX_TOPICS = 10_000
@@ -24,24 +24,24 @@ class OpenedRecording:
 
     recording: Recording
     bookmarks: Bookmarks
-    figures: dict[str, TopicFigures]
+    stats: dict[str, TopicStats]
 
 
 def open_recording(path: Path, progress: Progress, opener: RecordingOpener | None = None) -> OpenedRecording:
     """Open a recording for replay. Raises `RecordingError` if no message can be read."""
 
-    def told(done: int, whole: int) -> None:
+    def report_progress(done: int, whole: int) -> None:
         progress(done / max(1, whole))
 
     progress(0.0)
-    recording = (opener or LocalOpener()).open(path, progress=told)
+    recording = (opener or LocalOpener()).open(path, progress=report_progress)
     try:
         if len(recording.topics) > MAX_TOPICS:
             template = _("it has {count} topics; at most {most} can be shown")
             raise RecordingError(str(path), template.format(count=len(recording.topics), most=MAX_TOPICS))
         if not recording.message_count:
             raise RecordingError(str(path), _("it has no message that can be decoded"))
-        return OpenedRecording(recording, Bookmarks(recording), recording.figures())
+        return OpenedRecording(recording, Bookmarks(recording), recording.stats())
     except BaseException:
         recording.close()
         raise

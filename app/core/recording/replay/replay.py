@@ -18,7 +18,7 @@ from app.core.recording.opener import RecordingOpener
 from app.core.recording.replay.density import Densities
 from app.core.recording.replay.opening import OpenedRecording
 from app.core.recording.replay.sending import ReplaySending
-from app.core.recording.replay.source import Handed, ReplaySource, ReplayStatus
+from app.core.recording.replay.source import ReplayResults, ReplaySource, ReplayStatus
 from app.core.run.acting.acting import SessionActing
 from app.core.series.feed import SeriesFeed
 from app.core.storage.settings import Settings
@@ -27,8 +27,8 @@ from nep.messages.message import Message
 from nep.nodes.log_handler import LAST_ERRORS_TOPIC, LOG_TOPIC
 from nep.protocol.graph_view import GraphView, PublisherInfo, TopicInfo
 from nep.recordings.bookmarks import Bookmark
-from nep.recordings.formats.damage import damage_words
-from nep.recordings.formats.figures import TopicFigures
+from nep.recordings.formats.damage import corruption_text
+from nep.recordings.formats.figures import TopicStats
 from nep.recordings.player import SPEED_MAX, SPEED_MIN, Playback, PlayerStatus
 from nep.recordings.reader import RecordedTopic
 
@@ -36,7 +36,7 @@ FAILED, NOT_CLOSED, DAMAGED = "recording:failed", "recording:not-closed", "recor
 """Ids of the alerts of a replay."""
 SHOW_FILE = "recording.folder"
 """Window command that shows the folder of a file; the path follows the name of the command."""
-LOGS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
+LOG_TOPICS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
 
 
@@ -63,20 +63,20 @@ class Replay:
         # nothing can be sent.
         self.path = path
         self.opened: OpenedRecording | None = None
-        self._watches = Watches(self._begin_watch, self._end_watch)
+        self._watches = Watches(self._start_watch, self._stop_watch)
         self.topics, self.nodes = Topics(("", 0)), Nodes()
         self.networks = Networks(settings, (), lambda _event: None, alerts)
         self.images = Images(self.watch, clock)
         self.images.now_ns = self._position_ns
         self.source = ReplaySource(path, self.images, clock=clock, opener=opener)
-        self.series = SeriesFeed(self.watch, self._position_ns, self.source.set_deep)
+        self.series = SeriesFeed(self.watch, self._position_ns, self.source.set_history_capacity)
         self.console = Console(lambda: self._position_ns() / 1e9)
         self.graph: GraphView | None = None
         self.densities: Densities | None = None
         self.chosen = ""
         self.sending = ReplaySending(acting) if acting is not None else None
         if self.sending is not None:
-            self.sending.on_change = self._forward
+            self.sending.on_change = self._update_forwarding
         self._logs: list[Watch] = []
         self._alerts, self._has_failed, self._damaged = alerts, False, 0
         for id in (FAILED, NOT_CLOSED, DAMAGED):
@@ -90,11 +90,11 @@ class Replay:
         """Watch a topic until the watch is closed. Messages arrive in ``topics``."""
         return self._watches.open([topic])
 
-    def end(self) -> None:
+    def request_stop(self) -> None:
         """Stop publishing and signal the threads to stop, without waiting for them; `close` waits."""
         if self.sending is not None:
-            self.sending.end()
-        self.source.end()
+            self.sending.stop()
+        self.source.request_stop()
 
     @property
     def has_ended(self) -> bool:
@@ -138,19 +138,19 @@ class Replay:
         return self.opened.recording.end_ns if self.opened is not None else 0
 
     @property
-    def recorded(self) -> Mapping[str, RecordedTopic]:
+    def recorded_topics(self) -> Mapping[str, RecordedTopic]:
         """Topics in the file."""
         return self.opened.recording.topics if self.opened is not None else {}
 
     @property
-    def figures(self) -> Mapping[str, TopicFigures]:
+    def stats(self) -> Mapping[str, TopicStats]:
         """Recording statistics by topic, as far as known."""
-        return self.opened.figures if self.opened is not None else {}
+        return self.opened.stats if self.opened is not None else {}
 
     @property
     def lost(self) -> int:
         """Number of messages missing in the recording, counted for topics with known statistics."""
-        return sum((each.lost or 0) + each.unkept for each in self.figures.values())
+        return sum((each.lost or 0) + each.unkept for each in self.stats.values())
 
     @property
     def bookmarks(self) -> Sequence[Bookmark]:
@@ -168,11 +168,11 @@ class Replay:
         player = self.player
         if player is not None and player.is_at_end:
             self.seek(player.loop[0] if player.loop is not None else self.start_ns)
-        self.source.order("play", lambda playback: playback.play())
+        self.source.queue_change("play", lambda playback: playback.play())
 
     def pause(self) -> None:
         """Pause."""
-        self.source.order("play", lambda playback: playback.pause())
+        self.source.queue_change("play", lambda playback: playback.pause())
 
     def toggle(self) -> None:
         """Play or pause."""
@@ -184,21 +184,23 @@ class Replay:
     def seek(self, at_ns: int) -> None:
         """Seek to a time, limited to the recording."""
         at_ns = max(self.start_ns, min(at_ns, self.end_ns))
-        self.source.order("seek", lambda playback: playback.seek(at_ns))
+        self.source.queue_change("seek", lambda playback: playback.seek(at_ns))
 
     def move(self, by_ns: int) -> None:
         """Seek by an offset relative to the playhead."""
-        self.source.order("move", lambda playback: playback.seek(playback.status().position_ns + by_ns))
+        self.source.queue_change(
+            "move", lambda playback: playback.seek(playback.status().position_ns + by_ns)
+        )
 
     def step(self, *, forward: bool) -> None:
         """Seek to the next or previous message of the chosen topic, and pause."""
         topic = self.chosen
-        if topic in self.recorded:
-            self.source.order("step", lambda playback: playback.step(topic, forward=forward))
+        if topic in self.recorded_topics:
+            self.source.queue_change("step", lambda playback: playback.step(topic, forward=forward))
 
-    def choose(self, topic: str) -> None:
+    def select_topic(self, topic: str) -> None:
         """Choose the topic whose messages `step` steps through."""
-        if topic in self.recorded:
+        if topic in self.recorded_topics:
             self.chosen = topic
 
     def set_speed(self, speed: float) -> None:
@@ -208,7 +210,7 @@ class Replay:
         def change(playback: Playback) -> None:
             playback.speed = wanted
 
-        self.source.order("speed", change)
+        self.source.queue_change("speed", change)
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
         """Loop a range; without arguments, the whole recording. An empty range is ignored."""
@@ -216,11 +218,11 @@ class Replay:
             start_ns, end_ns = max(start_ns, self.start_ns), min(end_ns, self.end_ns)
             if start_ns >= end_ns:
                 return
-        self.source.order("loop", lambda playback: playback.loop(start_ns, end_ns))
+        self.source.queue_change("loop", lambda playback: playback.loop(start_ns, end_ns))
 
     def end_loop(self) -> None:
         """Stop looping; playback continues beyond the end of the range."""
-        self.source.order("loop", lambda playback: playback.end_loop())
+        self.source.queue_change("loop", lambda playback: playback.clear_loop())
 
     def toggle_loop(self) -> None:
         """Start looping the chosen range or the whole recording, or stop looping."""
@@ -253,7 +255,7 @@ class Replay:
         else:
             self.seek(max((mark for mark in marks if mark < at_ns), default=self.start_ns))
 
-    def bookmark_here(self) -> Bookmark | None:
+    def current_bookmark(self) -> Bookmark | None:
         """Return the bookmark at the playhead; None if there is none."""
         at_ns = self._position_ns()
         return next((mark for mark in self.bookmarks if mark.at_ns == at_ns), None)
@@ -270,7 +272,7 @@ class Replay:
         if self.opened is not None:
             self.opened.bookmarks.rename(bookmark, name)
 
-    def put_back_bookmark(self, bookmark: Bookmark) -> None:
+    def restore_bookmark(self, bookmark: Bookmark) -> None:
         """Restore a removed bookmark. Raises `RecordingError`."""
         if self.opened is not None:
             self.opened.bookmarks.add(bookmark.at_ns, bookmark.name)
@@ -285,50 +287,50 @@ class Replay:
     def tick(self, now: float) -> None:
         """Apply the messages read since the last tick; ``now`` is monotonic seconds."""
         if self.opened is None and self.source.opened is not None and self.player is not None:
-            self._opened(self.source.opened, now)
+            self._on_opened(self.source.opened, now)
         self._alert_problems()
         handed = self.source.pop_results()
-        if handed.jump is not None:
-            self._take_jump(handed.jump, now)
-        self._take_history(handed, now)
+        if handed.seek_messages is not None:
+            self._apply_seek(handed.seek_messages, now)
+        self._apply_history(handed, now)
         for topic, batch in handed.drained.batches.items():
-            if topic in LOGS:
+            if topic in LOG_TOPICS:
                 self.console.add_messages(batch.messages, batch.dropped)
             self._add(topic, batch, now)
         self.series.add(handed.drained.batches)
-        if handed.figures:
-            self.topics.set_figures({name: (x.rate_hz, x.newest_ns) for name, x in handed.figures.items()})
-        self.topics.age(now, self._position_ns())
+        if handed.stats:
+            self.topics.set_stats({name: (x.rate_hz, x.newest_ns) for name, x in handed.stats.items()})
+        self.topics.update_ages(now, self._position_ns())
         if self.player is None or not self.player.is_playing:
-            self.images.stand_still()
+            self.images.restart_silence()
         if self.sending is not None:
             self.sending.tick()
 
-    def _forward(self) -> None:
+    def _update_forwarding(self) -> None:
         if self.sending is not None:
             outbox = self.sending.outbox
-            self.source.forward({sent.route.recorded for sent in outbox.going}, outbox.offer)
+            self.source.forward({sent.route.recorded for sent in outbox.active_topics}, outbox.offer)
 
-    def _opened(self, opened: OpenedRecording, now: float) -> None:
+    def _on_opened(self, opened: OpenedRecording, now: float) -> None:
         self.opened = opened
         recording = opened.recording
         self.series.origin_ns = recording.start_ns
         if self.sending is not None:
             self.sending.open(opened)
-        self.graph = graph_of(recording.topics, opened.figures)
+        self.graph = graph_of(recording.topics, opened.stats)
         self.topics.update(self.graph, now)
         self.chosen = next(iter(recording.topics), "")
         self.densities = Densities(recording)
-        for topic in LOGS:
+        for topic in LOG_TOPICS:
             if topic in recording.topics:
-                self.source.set_deep(topic, CAPACITY)
+                self.source.set_history_capacity(topic, CAPACITY)
                 self._logs.append(self.watch(topic))
 
         self._alert_not_closed(opened)
 
     def _alert_problems(self) -> None:
         status = self.status
-        reason = status.sentence if status.stage == "failed" else ""
+        reason = status.message if status.stage == "failed" else ""
         if not reason and self.densities is not None:
             reason = self.densities.problem
         if reason and not self._has_failed:
@@ -336,12 +338,14 @@ class Replay:
             title = _("{name} can't be played.").format(name=self.name)
             sentence = f"{reason[:1].upper()}{reason[1:]}."
             action = f"{SHOW_FILE}:{self.path}"
-            self._alerts.put(FAILED, "error", title, sentence, button=_("Show the file"), action=action)
-        if len(status.damage) > self._damaged:
-            self._damaged = len(status.damage)
+            self._alerts.raise_alert(
+                FAILED, "error", title, sentence, button=_("Show the file"), action=action
+            )
+        if len(status.corruption) > self._damaged:
+            self._damaged = len(status.corruption)
             title = _("{name} is damaged.").format(name=self.name)
-            detail = damage_words(status.damage, self.start_ns)
-            self._alerts.put(DAMAGED, "warn", title, f"{detail[:1].upper()}{detail[1:]}.")
+            detail = corruption_text(status.corruption, self.start_ns)
+            self._alerts.raise_alert(DAMAGED, "warn", title, f"{detail[:1].upper()}{detail[1:]}.")
 
     def _alert_not_closed(self, opened: OpenedRecording) -> None:
         # Of a file that was cut off, or whose program was killed.
@@ -352,17 +356,17 @@ class Replay:
             name=self.name, seconds=number(recording.duration_s, ".1f")
         )
         detail = _("To make a repaired copy: nep recording repair {file}").format(file=self.path)
-        self._alerts.put(NOT_CLOSED, "info", title, detail)
+        self._alerts.raise_alert(NOT_CLOSED, "info", title, detail)
 
-    def _take_jump(self, messages: Sequence[Message], now: float) -> None:
+    def _apply_seek(self, messages: Sequence[Message], now: float) -> None:
         self.topics.rewind()
         self.series.rewind()
         self.console.rewind()
         for message in messages:
             self._add(message.topic, Batch([message]), now)
 
-    def _take_history(self, handed: Handed, now: float) -> None:
-        log_messages = [message for topic in LOGS for message in handed.history.get(topic, ())]
+    def _apply_history(self, handed: ReplayResults, now: float) -> None:
+        log_messages = [message for topic in LOG_TOPICS for message in handed.history.get(topic, ())]
         self.console.add_messages(sorted(log_messages, key=lambda message: message.stamp_ns or 0))
         for topic, messages in handed.history.items():
             batch = Batch(list(messages))
@@ -371,22 +375,22 @@ class Replay:
             self.series.add({topic: batch})
 
     def _add(self, topic: str, batch: Batch, now: float) -> None:
-        if self._watches.watched(topic):
+        if self._watches.is_watched(topic):
             self.topics.add(topic, batch, now)
-            self.topics[topic].watched = True
+            self.topics[topic].is_watched = True
 
-    def _begin_watch(self, topic: str) -> None:
+    def _start_watch(self, topic: str) -> None:
         self.source.watch(topic)
         known = self.topics.get(topic)
         if known is not None:
-            known.watched = True
+            known.is_watched = True
 
-    def _end_watch(self, topic: str) -> None:
+    def _stop_watch(self, topic: str) -> None:
         self.source.unwatch(topic)
         self.topics.unwatch(topic)
 
 
-def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicFigures]) -> GraphView:
+def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicStats]) -> GraphView:
     """Return the graph of a recording: topics, number of publishers of each, and losses."""
     found = {}
     for name, topic in topics.items():

@@ -27,7 +27,7 @@ class TimeScale:
     end_ns: int
 
     @classmethod
-    def whole(cls, first_ns: int, last_ns: int) -> TimeScale:
+    def full(cls, first_ns: int, last_ns: int) -> TimeScale:
         """Return the scale that shows a whole recording; at least one millisecond."""
         last_ns = max(last_ns, first_ns + MIN_SPAN_NS)
         return cls(first_ns, last_ns, first_ns, last_ns)
@@ -38,11 +38,11 @@ class TimeScale:
         return self.end_ns - self.begin_ns
 
     @property
-    def is_whole(self) -> bool:
+    def is_full(self) -> bool:
         """True if the scale shows the whole recording."""
         return (self.begin_ns, self.end_ns) == (self.first_ns, self.last_ns)
 
-    def share(self, at_ns: int) -> float:
+    def relative_position(self, at_ns: int) -> float:
         """Return the position of a time: 0 at the left edge, 1 at the right edge."""
         return (at_ns - self.begin_ns) / self.span_ns
 
@@ -55,7 +55,7 @@ class TimeScale:
         """Return a zoomed scale (out for a factor above 1), with ``at_ns`` at the same position."""
         whole = self.last_ns - self.first_ns
         span = max(MIN_SPAN_NS, min(whole, round(self.span_ns * factor)))
-        return self._placed(at_ns - round(self.share(at_ns) * span), span)
+        return self._placed(at_ns - round(self.relative_position(at_ns) * span), span)
 
     def moved(self, by_ns: int) -> TimeScale:
         """Return the scale shifted by a duration."""
@@ -91,7 +91,7 @@ def offset_ns(at_ns: int) -> int:
     return -(time.localtime(at_ns // 1_000_000_000).tm_gmtoff or 0) * 1_000_000_000
 
 
-def span_words(ns: int, *, digits: int = 3) -> str:
+def duration_text(ns: int, *, digits: int = 3) -> str:
     """Format a duration: "7:26.412", "0:00", "1:02:03"."""
     sign, ns = ("-", -ns) if ns < 0 else ("", ns)
     unit = 10 ** (9 - digits)
@@ -102,7 +102,7 @@ def span_words(ns: int, *, digits: int = 3) -> str:
     return f"{sign}{words}.{rest:0{digits}d}" if digits else f"{sign}{words}"
 
 
-def clock_words(at_ns: int, *, digits: int = 3) -> str:
+def clock_text(at_ns: int, *, digits: int = 3) -> str:
     """Format a local time of day: "15:09:37.412"."""
     seconds, rest = divmod(at_ns, 1_000_000_000)
     then = time.localtime(seconds)
@@ -110,6 +110,6 @@ def clock_words(at_ns: int, *, digits: int = 3) -> str:
     return f"{words}.{rest // 10 ** (9 - digits):0{digits}d}" if digits else words
 
 
-def date_words(at_ns: int) -> str:
+def date_text(at_ns: int) -> str:
     """Format a local date: "2026-11-17"."""
     return time.strftime("%Y-%m-%d", time.localtime(at_ns // 1_000_000_000))

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from app.core.documents.background_worker import BackgroundWorker
-from app.core.faults import error_words
+from app.core.faults import error_text
 from app.core.network.source import Job
 from app.core.recording.replay.opening import OpenedRecording
 from app.core.robots.motion.gate import MotionGate
 from app.core.run.acting.acting import SessionActing
-from app.core.run.acting.arming import MAX_NAMES, Arming, Target
+from app.core.run.acting.arming import MAX_TARGETS, Arming, Target
 from nep.errors import BadTopicError, NepError
 from nep.i18n import _, ngettext
 from nep.messages.message import Message
@@ -63,7 +63,7 @@ class SentTopic:
     turn: int
     is_latched: bool
     publishers: dict[str, Publisher] = field(default_factory=dict)
-    asked: set[str] = field(default_factory=set)
+    requested_types: set[str] = field(default_factory=set)
     node: Node | None = None
     checked: dict[Publisher, int] = field(default_factory=dict)
     is_ready: bool = False
@@ -91,27 +91,27 @@ class ReplayOutbox:
         self._active: dict[str, SentTopic] = {}
 
     @property
-    def going(self) -> tuple[SentTopic, ...]:
+    def active_topics(self) -> tuple[SentTopic, ...]:
         """Topics that are currently published."""
         with self._lock:
             return tuple(self._active.values())
 
-    def begin(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
+    def start(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
         """Publish a topic as soon as its publisher is ready, while the arming with number ``turn`` lasts."""
         sent = SentTopic(route, turn, is_latched)
         with self._lock:
             old = self._active.get(route.recorded)
             self._active[route.recorded] = sent
         if old is not None:
-            self._close_later(old)
+            self._submit_close(old)
         self._create_publisher(sent, msg_type)
 
-    def end(self, recorded: str) -> SentTopic | None:
+    def stop(self, recorded: str) -> SentTopic | None:
         """Stop publishing a topic; return its final state."""
         with self._lock:
             ended = self._active.pop(recorded, None)
         if ended is not None:
-            self._close_later(ended)
+            self._submit_close(ended)
         return ended
 
     def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
@@ -128,26 +128,26 @@ class ReplayOutbox:
         publisher = sent.publishers.get(kind)
         if publisher is None:
             self._create_publisher(sent, kind)
-        if publisher is None or late_s > MAX_DELAY_S or self._is_refused(sent, publisher):
+        if publisher is None or late_s > MAX_DELAY_S or self._is_rejected(sent, publisher):
             sent.skipped += 1
             return
         data, extension = bytes(message.data), dict(message.extension) or None
         try:
-            if self._arming.if_armed(
+            if self._arming.run_if_armed(
                 sent.turn, sent.route.target, lambda: publisher.publish_bytes(data, extension)
             ):
                 sent.count += 1
         except Exception as error:  # noqa: BLE001 - other topics, and the panels, continue
-            sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
+            sent.problem = str(error) if isinstance(error, NepError) else error_text(error)
 
-    def _is_refused(self, sent: SentTopic, publisher: Publisher) -> bool:
+    def _is_rejected(self, sent: SentTopic, publisher: Publisher) -> bool:
         # A robot without permission may have connected just now.
         if self._gate is None or sent.node is None:
             return False
         heard, name = publisher.subscribers, sent.route.name
         if heard == sent.checked.get(publisher):
-            return bool(self._gate.refusal(name))
-        is_refused = bool(self._gate.refusal_now(sent.node, name))
+            return bool(self._gate.rejection_reason(name))
+        is_refused = bool(self._gate.current_rejection_reason(sent.node, name))
         if not is_refused:
             sent.checked[publisher] = heard
         return is_refused
@@ -155,32 +155,32 @@ class ReplayOutbox:
     # ---- in the network thread
 
     def _create_publisher(self, sent: SentTopic, msg_type: str) -> None:
-        if msg_type in sent.asked or len(sent.asked) >= MAX_TYPES:
+        if msg_type in sent.requested_types or len(sent.requested_types) >= MAX_TYPES:
             return
-        sent.asked.add(msg_type)
+        sent.requested_types.add(msg_type)
 
         def make(node: Node) -> None:
-            if not self._is_going(sent):
+            if not self._is_active(sent):
                 return
             try:
                 publisher = node.new_pub(sent.route.name, msg_type, latched=sent.is_latched)
             except Exception as error:  # noqa: BLE001 - reported as a problem of this topic
-                sent.problem = str(error) if isinstance(error, NepError) else error_words(error)
+                sent.problem = str(error) if isinstance(error, NepError) else error_text(error)
                 return
             sent.node = node
             # a new dict, because another thread reads it
             sent.publishers = {**sent.publishers, msg_type: publisher}
             sent.is_ready = True
-            if not self._is_going(sent):
+            if not self._is_active(sent):
                 self._close(sent)
 
         self._submit("", make)
 
-    def _is_going(self, sent: SentTopic) -> bool:
+    def _is_active(self, sent: SentTopic) -> bool:
         with self._lock:
             return self._active.get(sent.route.recorded) is sent
 
-    def _close_later(self, sent: SentTopic) -> None:
+    def _submit_close(self, sent: SentTopic) -> None:
         self._submit("", lambda _node: self._close(sent))
 
     @staticmethod
@@ -216,26 +216,26 @@ class ReplaySending:
         self._opened = opened
 
     @property
-    def is_known(self) -> bool:
+    def is_analyzed(self) -> bool:
         """True if `learn` has determined which topics move robots."""
         return self._moving is not None
 
-    def learn(self) -> None:
+    def analyze(self) -> None:
         """Determine in the background which topics move robots."""
         if self._opened is None or self._worker is not None:
             return
         recording = self._opened.recording
         self._worker = BackgroundWorker("studio-moving")
-        self._worker.ask("topics", lambda: _moving_and_latched_topics(recording))
+        self._worker.submit("topics", lambda: _moving_and_latched_topics(recording))
 
-    def moves(self, recorded: str, name: str) -> bool:
+    def moves_robot(self, recorded: str, name: str) -> bool:
         """Return True if messages of a topic move a robot, under the recorded or the given name."""
         known = self._moving
-        if known is not None and (known.moved_by(recorded) or known.moved_by(name)):
+        if known is not None and (known.robots_moved_by(recorded) or known.robots_moved_by(name)):
             return True
         return bool(self._acting.gate.moved_by(name))
 
-    def choose(self, recorded: str, name: str | None) -> str:
+    def select(self, recorded: str, name: str | None) -> str:
         """Choose a topic for publishing under a name ("" for the recorded one); None deselects the topic.
 
         Chosen topics are published once they are armed. Returns the reason why the topic can't be chosen, or
@@ -248,7 +248,7 @@ class ReplaySending:
             self.routes.pop(recorded, None)
             return ""
         wanted = name.strip() or recorded
-        if recorded not in self.routes and len(self.routes) >= MAX_NAMES:
+        if recorded not in self.routes and len(self.routes) >= MAX_TARGETS:
             return _("No more topics can be sent. Remove one first.")
         try:
             check_topic(wanted)
@@ -267,29 +267,31 @@ class ReplaySending:
         opened = self._opened
         if opened is None or not self.routes:
             return _("Choose a topic first.")
-        if not self.is_known:
+        if not self.is_analyzed:
             return _("Still checking which topics move robots. Try again in a moment.")
         why_not = self._acting.arm(for_replay=True)
         if why_not:
             return why_not
         wanted = [ReplayRoute(recorded, name) for recorded, name in self.routes.items()]
-        for sent in self.outbox.going:
+        for sent in self.outbox.active_topics:
             if sent.route not in wanted:
-                self._end(sent)
+                self._stop(sent)
                 self._acting.forbid(sent.route.target)
         self._acting.recorded_commands |= {
-            route.name for route in wanted if self.moves(route.recorded, route.name)
+            route.name for route in wanted if self.moves_robot(route.recorded, route.name)
         }
-        going = {sent.route for sent in self.outbox.going}
+        going = {sent.route for sent in self.outbox.active_topics}
         missing = [route for route in wanted if route not in going]
-        self._pending_routes = sorted(missing, key=lambda route: self._acting.asks(route.target))
-        return self._begin_next()
+        self._pending_routes = sorted(
+            missing, key=lambda route: self._acting.needs_confirmation(route.target)
+        )
+        return self._start_next()
 
-    def _begin_next(self) -> str:
+    def _start_next(self) -> str:
         self._is_asking = False
         while self._pending_routes:
             route, turn = self._pending_routes[0], self._acting.arming.turn
-            not_armed = self._acting.ready(route.target, self._begin_next)
+            not_armed = self._acting.ready(route.target, self._start_next)
             if not_armed:
                 self._pending_routes = []
                 return not_armed
@@ -297,35 +299,35 @@ class ReplaySending:
                 self._is_asking = bool(self._pending_routes)
                 break
             self._pending_routes.remove(route)
-            self._begin(route, turn)
+            self._start(route, turn)
         return ""
 
-    def _begin(self, route: ReplayRoute, turn: int) -> None:
+    def _start(self, route: ReplayRoute, turn: int) -> None:
         opened = self._opened
         if opened is None:
             return
         topic = opened.recording.topics[route.recorded]
-        self._acting.tell_moved(route.target, "replay")
-        self.outbox.begin(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
+        self._acting.notify_moved(route.target, "replay")
+        self.outbox.start(route, turn, topic.msg_type, is_latched=route.recorded in self._latched)
         self._log(route, _("sent during playback"))
         self._changed()
 
-    def end(self) -> None:
+    def stop(self) -> None:
         """Stop publishing, because the recording is closed."""
-        if self.outbox.going or self._pending_routes:
+        if self.outbox.active_topics or self._pending_routes:
             self._acting.disarm()
-        self._end_all()
+        self._stop_all()
         if self._worker is not None:
             self._worker.close()
 
-    def _end_all(self) -> None:
+    def _stop_all(self) -> None:
         self._pending_routes = []
-        for sent in self.outbox.going:
-            self._end(sent)
+        for sent in self.outbox.active_topics:
+            self._stop(sent)
 
-    def _end(self, sent: SentTopic) -> None:
-        if self.outbox.end(sent.route.recorded) is not None:
-            words = ", ".join(filter(None, (sent.problem, sent_words(sent))))
+    def _stop(self, sent: SentTopic) -> None:
+        if self.outbox.stop(sent.route.recorded) is not None:
+            words = ", ".join(filter(None, (sent.problem, sent_text(sent))))
             self._log(sent.route, words, sent.count, is_bad=bool(sent.problem))
             self._changed()
 
@@ -343,23 +345,23 @@ class ReplaySending:
 
         Called at each tick.
         """
-        self._apply_facts()
+        self._apply_result()
         arming = self._acting.arming
         if not arming.is_on:
             self._pending_routes = []
-        for sent in self.outbox.going:
+        for sent in self.outbox.active_topics:
             target = sent.route.target
             if sent.problem or sent.turn != arming.turn or not arming.allows(target):
-                self._end(sent)
-            elif not self._acting.may_go_on(target):
-                self._end(sent)
+                self._stop(sent)
+            elif not self._acting.may_continue(target):
+                self._stop(sent)
                 self._pending_routes.append(sent.route)
         if self._pending_routes and not self._acting.is_asking:
             if self._is_asking:  # the answer was no
                 del self._pending_routes[0]
-            self._begin_next()
+            self._start_next()
 
-    def _apply_facts(self) -> None:
+    def _apply_result(self) -> None:
         if self._worker is None or self._moving is not None or self._opened is None:
             return
         try:
@@ -375,13 +377,13 @@ def _moving_and_latched_topics(recording: Recording) -> tuple[MovingTopics, froz
     return moving_topics(recording), latched_topics(recording, recording.topics)
 
 
-def sent_words(sent: SentTopic) -> str:
+def sent_text(sent: SentTopic) -> str:
     """Format the message counts of a topic: "412 sent, 3 left out, being late"."""
     words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
-    return f"{words}, {late_words(sent.skipped)}" if sent.skipped else words
+    return f"{words}, {late_text(sent.skipped)}" if sent.skipped else words
 
 
-def late_words(count: int) -> str:
+def late_text(count: int) -> str:
     """Format the number of skipped messages: "3 late messages skipped"."""
     template = ngettext("{count} late message skipped", "{count} late messages skipped", count)
     return template.format(count=count)

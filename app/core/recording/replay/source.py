@@ -15,32 +15,32 @@ from itertools import groupby
 from pathlib import Path
 from typing import Literal, Protocol
 
-from app.core.faults import error_words
+from app.core.faults import error_text
 from app.core.network.mailbox import Drained, Mailbox
 from app.core.recording.opener import LocalOpener, RecordingOpener
 from app.core.recording.replay.opening import OpenedRecording, open_recording
 from nep.errors import NepError, RecordingError
 from nep.messages.message import Message, new_message
-from nep.recordings.formats.index import Damage
-from nep.recordings.player import Due, Playback, PlayerStatus
+from nep.recordings.formats.index import CorruptRange
+from nep.recordings.player import DueMessages, Playback, PlayerStatus
 from nep.recordings.reader import Recording
 
-RATE_S = 2.0
+RATE_WINDOW_S = 2.0
 STATISTICS_INTERVAL_S = 0.5
 TOPICS_AT_ONCE = 100
-FIGURES_SHARE = 10.0
+STATS_PAUSE_FACTOR = 10.0
 """Minimum pause between two readings of statistics, as a multiple of their duration."""
 HISTORY_S = (5.0, 20.0, 60.0, 180.0)
 """Ranges before the playhead (s) that are read for topics with history, in this order."""
 HISTORY_TIMEOUT_S = 0.25
 """Time limit for reading history."""
 MAX_HISTORY_MESSAGES = 8192
-OWN_BYTES = 65_536
+MAX_COPIED_BYTES = 65_536
 """Maximum size up to which messages are copied, so that a small message doesn't hold a whole block in memory.
 """
 
 ReplayStage = Literal["reading", "there", "failed"]
-Order = Callable[[Playback], object]
+PlaybackChange = Callable[[Playback], object]
 Forward = Callable[[Sequence[Message], Sequence[float]], object]
 """Called in the replay's thread with played messages and their delays in seconds."""
 
@@ -67,13 +67,13 @@ class ReplayStatus:
 
     stage: ReplayStage
     progress: float = 0.0
-    sentence: str = ""
+    message: str = ""
     player: PlayerStatus | None = None
-    damage: Sequence[Damage] = ()
+    corruption: Sequence[CorruptRange] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class ReplayFigures:
+class ReplayStats:
     """Statistics of a topic at the playhead; None if unknown.
 
     Attributes:
@@ -86,7 +86,7 @@ class ReplayFigures:
 
 
 @dataclass(slots=True)
-class Handed:
+class ReplayResults:
     """Messages returned by one call of `ReplaySource.pop_results`, to be applied in the order of the fields.
 
     Attributes:
@@ -95,10 +95,10 @@ class Handed:
         drained: Messages played since.
     """
 
-    jump: Sequence[Message] | None = None
+    seek_messages: Sequence[Message] | None = None
     history: dict[str, Sequence[Message]] = field(default_factory=dict)
     drained: Drained = field(default_factory=lambda: Drained({}, [], 0))
-    figures: dict[str, ReplayFigures] = field(default_factory=dict)
+    stats: dict[str, ReplayStats] = field(default_factory=dict)
 
 
 class ReplaySource:
@@ -121,7 +121,7 @@ class ReplaySource:
         self.opened: OpenedRecording | None = None
         self._pictures, self._clock = pictures, clock
         self._changed = threading.Condition()
-        self._changes: list[tuple[str, Order]] = []
+        self._changes: list[tuple[str, PlaybackChange]] = []
         self._watched: set[str] = set()
         self._deep: dict[str, int] = {}
         self._chosen: frozenset[str] = frozenset()
@@ -129,7 +129,7 @@ class ReplaySource:
         self._played: frozenset[str] = frozenset()
         self._forward: Forward | None = None
         self._mailbox = Mailbox()
-        self._results = Handed()
+        self._results = ReplayResults()
         self._status = ReplayStatus("reading")
         self._closing = False
         self._playback: Playback | None = None
@@ -148,7 +148,7 @@ class ReplaySource:
         """Start the thread, which opens the file and plays it."""
         self._thread.start()
 
-    def order(self, kind: str, change: Order) -> None:
+    def queue_change(self, kind: str, change: PlaybackChange) -> None:
         """Queue a change of the playback.
 
         A pending change of the same kind at the end of the queue is replaced, so that dragging the playhead
@@ -165,40 +165,40 @@ class ReplaySource:
         """Watch a topic."""
         with self._changed:
             self._watched.add(topic)
-        self.order("choose", self._choose)
+        self.queue_change("choose", self._update_selection)
 
     def unwatch(self, topic: str) -> None:
         """Stop watching a topic."""
         with self._changed:
             self._watched.discard(topic)
-        self.order("choose", self._choose)
+        self.queue_change("choose", self._update_selection)
 
-    def set_deep(self, topic: str, room: int | None) -> None:
+    def set_history_capacity(self, topic: str, room: int | None) -> None:
         """Request history of a topic, and room for ``room`` messages per tick; None ends that."""
         with self._changed:
             if room is None:
                 self._deep.pop(topic, None)
             else:
                 self._deep[topic] = room
-            self._mailbox.set_room(topic, room)
+            self._mailbox.set_capacity(topic, room)
             is_watched = topic in self._watched
         if room is not None and is_watched:  # otherwise its history is read when it is watched
-            self.order(f"history {topic}", lambda playback: self._read_history(playback, [topic]))
+            self.queue_change(f"history {topic}", lambda playback: self._read_history(playback, [topic]))
 
     def forward(self, topics: Collection[str], to: Forward | None) -> None:
         """Pass played messages of these topics also to ``to``, except the messages delivered by a seek."""
         with self._changed:
             self._sent, self._forward = frozenset(topics), to
-        self.order("choose", self._choose)
+        self.queue_change("choose", self._update_selection)
 
-    def pop_results(self) -> Handed:
+    def pop_results(self) -> ReplayResults:
         """Return and clear the results since the last call."""
         with self._changed:
-            handed, self._results = self._results, Handed()
+            handed, self._results = self._results, ReplayResults()
             handed.drained = self._mailbox.drain()
         return handed
 
-    def end(self) -> None:
+    def request_stop(self) -> None:
         """Signal the thread to stop, without waiting for it."""
         with self._changed:
             self._closing = True
@@ -212,7 +212,7 @@ class ReplaySource:
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Stop the thread and close the file. Idempotent."""
-        self.end()
+        self.request_stop()
         if self._thread.is_alive():
             self._thread.join(timeout_s)
         elif self.opened is not None:
@@ -224,7 +224,7 @@ class ReplaySource:
         try:
             self.open()
             while True:
-                wait_s = self.turn()
+                wait_s = self.process()
                 with self._changed:
                     if not self._closing and not self._changes:
                         self._changed.wait(wait_s)
@@ -236,9 +236,9 @@ class ReplaySource:
             if self._closing:
                 return
             reason = error.reason if isinstance(error, RecordingError) else str(error)
-            self._status = ReplayStatus("failed", sentence=reason)
+            self._status = ReplayStatus("failed", message=reason)
         except Exception as error:  # noqa: BLE001  a file may cause any error, which the window reports
-            self._status = ReplayStatus("failed", sentence=error_words(error))
+            self._status = ReplayStatus("failed", message=error_text(error))
         finally:
             if self.opened is not None:
                 self.opened.recording.close()
@@ -255,7 +255,7 @@ class ReplaySource:
             raise _ClosingError
         self._status = ReplayStatus("reading", progress)
 
-    def turn(self) -> float | None:
+    def process(self) -> float | None:
         """Apply queued changes and play due messages.
 
         Returns the seconds until the next message is due; None if there is none.
@@ -269,46 +269,46 @@ class ReplaySource:
         for _kind, change in orders:
             change(playback)
         if not was_playing and playback.status().is_playing and self._sent:
-            first = playback.shown_first(self._sent)
-            self._forward_on(first, [0.0] * len(first))
+            first = playback.messages_at_start(self._sent)
+            self._forward_messages(first, [0.0] * len(first))
         due = playback.advance()
         if due.is_jump:
-            self._jump(due.messages)
+            self._apply_seek(due.messages)
             self._update_status(playback)
             with self._changed:
                 deep = frozenset(self._deep)
             self._read_history(playback, deep & self._chosen)
         else:
             if self._sent:
-                self._forward_on(due.messages, late_of(due, playback.status()))
-            self._pass_on([each for each in due.messages if each.topic in self._chosen])
+                self._forward_messages(due.messages, delays_of(due, playback.status()))
+            self._post_messages([each for each in due.messages if each.topic in self._chosen])
             self._update_status(playback)
         is_due = playback.status().is_playing and not self._figures and self._clock() >= self._next_figures
         if due.is_jump or is_due:
-            self._schedule_figures(playback)
-        self._read_next_figures()
+            self._schedule_stats(playback)
+        self._read_next_stats()
         return 0.0 if self._figures else due.wait_s
 
     def _update_status(self, playback: Playback) -> None:
-        damage = self.opened.recording.damage if self.opened is not None else ()
-        self._status = ReplayStatus("there", 1.0, player=playback.status(), damage=damage)
+        damage = self.opened.recording.corruption if self.opened is not None else ()
+        self._status = ReplayStatus("there", 1.0, player=playback.status(), corruption=damage)
 
-    def _choose(self, playback: Playback) -> None:
+    def _update_selection(self, playback: Playback) -> None:
         with self._changed:
             wanted, deep, sent = frozenset(self._watched), frozenset(self._deep), self._sent
         seen = wanted - self._chosen  # by a panel, from now on
         new = seen & deep
-        newest = list(playback.choose(wanted | sent))
+        newest = list(playback.select_topics(wanted | sent))
         # topics played only for the network: no panel has their newest message
         played = (seen & self._played) - new
         if played and self.opened is not None:
             before = self.opened.recording.newest(playback.status().position_ns, played)
             newest += [each.message for each in before.values()]
-        self._pass_on([each for each in newest if each.topic in seen - new])
+        self._post_messages([each for each in newest if each.topic in seen - new])
         self._chosen, self._played = wanted, wanted | sent
         self._read_history(playback, new)
 
-    def _pass_on(self, messages: Sequence[Message]) -> None:
+    def _post_messages(self, messages: Sequence[Message]) -> None:
         if not messages:
             return
         own = [_own_copy(message) for message in messages]
@@ -317,14 +317,14 @@ class ReplaySource:
             for topic, some in groupby(sorted(own, key=_topic), key=_topic):
                 self._mailbox.post(topic, list(some))
 
-    def _forward_on(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
+    def _forward_messages(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
         with self._changed:
             topics, to = self._sent, self._forward
         some = [each for each in zip(messages, late_s, strict=True) if each[0].topic in topics]
         if some and to is not None:
             to([message for message, _late in some], [late for _message, late in some])
 
-    def _jump(self, messages: Sequence[Message]) -> None:
+    def _apply_seek(self, messages: Sequence[Message]) -> None:
         own = [_own_copy(message) for message in messages if message.topic in self._chosen]
         pictures = [each for each in own if each.codec == "image"]
         self._pictures.rewind([each.topic for each in pictures])
@@ -332,8 +332,8 @@ class ReplaySource:
         with self._changed:
             self._mailbox = Mailbox()
             for topic, room in self._deep.items():
-                self._mailbox.set_room(topic, room)
-            self._results = Handed(jump=own)
+                self._mailbox.set_capacity(topic, room)
+            self._results = ReplayResults(seek_messages=own)
 
     # -- history -----------------------------------------------------------------------------------
 
@@ -357,7 +357,7 @@ class ReplaySource:
         with self._changed:
             self._results.history.update({topic: list(messages) for topic, messages in found.items()})
             for topic in topics:  # the history includes all pending messages
-                self._mailbox.forget(topic)
+                self._mailbox.discard(topic)
 
     def _prepend_range(
         self, recording: Recording, span: tuple[int, int], found: dict[str, deque[Message]], began: float
@@ -377,32 +377,32 @@ class ReplaySource:
 
     # -- statistics --------------------------------------------------------------------------------
 
-    def _schedule_figures(self, playback: Playback) -> None:
+    def _schedule_stats(self, playback: Playback) -> None:
         # Some topics in each cycle, so that no command waits for all.
         if self.opened is None:
             return
         names, at_ns = list(self.opened.recording.topics), playback.status().position_ns
         self._figures = [(at_ns, names[k : k + TOPICS_AT_ONCE]) for k in range(0, len(names), TOPICS_AT_ONCE)]
-        self._next_figures = self._clock() + max(STATISTICS_INTERVAL_S, FIGURES_SHARE * self._figures_s)
+        self._next_figures = self._clock() + max(STATISTICS_INTERVAL_S, STATS_PAUSE_FACTOR * self._figures_s)
         self._figures_s = 0.0
 
-    def _read_next_figures(self) -> None:
+    def _read_next_stats(self) -> None:
         if not self._figures or self.opened is None:
             return
         began, recording = self._clock(), self.opened.recording
         at_ns, topics = self._figures.pop(0)
-        from_ns = max(recording.start_ns, at_ns - round(RATE_S * 1e9))
+        from_ns = max(recording.start_ns, at_ns - round(RATE_WINDOW_S * 1e9))
         passed_s = (at_ns - from_ns) / 1e9
         counts = recording.densities(from_ns, at_ns + 1, 1, topics) if passed_s > 0 else {}
         newest_ns = recording.newest_times(at_ns, topics)
         figures = {
-            topic: ReplayFigures(
+            topic: ReplayStats(
                 counts.get(topic, (0,))[0] / passed_s if passed_s > 0 else None, newest_ns.get(topic)
             )
             for topic in topics
         }
         with self._changed:
-            self._results.figures.update(figures)
+            self._results.stats.update(figures)
         self._figures_s += self._clock() - began
 
 
@@ -410,7 +410,7 @@ class _ClosingError(Exception):
     """The replay was closed while opening."""
 
 
-def late_of(due: Due, status: PlayerStatus) -> list[float]:
+def delays_of(due: DueMessages, status: PlayerStatus) -> list[float]:
     """Return the delay of each message, in seconds of real time."""
     return [(status.position_ns - at_ns) / 1e9 / status.speed for at_ns in due.log_ns]
 
@@ -421,7 +421,7 @@ def _topic(message: Message) -> str:
 
 def _own_copy(message: Message) -> Message:
     # Copies small messages, so that they don't keep the chunk of the file.
-    if isinstance(message.raw, bytes) or message.size_bytes > OWN_BYTES:
+    if isinstance(message.raw, bytes) or message.size_bytes > MAX_COPIED_BYTES:
         return message
     copied = new_message(Message)
     copied.kind, copied.raw = message.kind, bytes(message.raw)

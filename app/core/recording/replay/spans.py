@@ -35,7 +35,7 @@ class RecordedSpan:
     name: str
     is_over: bool = False
     result: str = ""
-    words: str = ""
+    details: str = ""
     is_error: bool = False
     topic: str = ""
 
@@ -49,7 +49,7 @@ class RecordedSpans:
 
     runs: Sequence[RecordedSpan] = ()
     alarms: Sequence[RecordedSpan] = ()
-    left_out: int = 0
+    omitted_count: int = 0
 
     def starts(self) -> list[int]:
         """Return the start times of all spans."""
@@ -65,29 +65,29 @@ class _Lane:
         self._left_out: set[str] = set()
 
     @property
-    def left_out(self) -> int:
+    def omitted_count(self) -> int:
         return len(self._left_out)
 
     def sorted(self) -> tuple[RecordedSpan, ...]:
         return tuple(sorted(self._by_id.values(), key=lambda span: (span.start_ns, span.end_ns)))
 
-    def put(self, id: str, span: RecordedSpan) -> None:
+    def add(self, id: str, span: RecordedSpan) -> None:
         # The start is the earliest of all records.
         known = self._by_id.get(id)
         if known is None and len(self._by_id) >= MAX_SPANS:
             if len(self._left_out) < MAX_SPANS:
                 self._left_out.add(id)
             return
-        start_ns = self._within(span.start_ns if known is None else min(known.start_ns, span.start_ns))
-        end_ns = max(start_ns, self._within(span.end_ns))
+        start_ns = self._clamp(span.start_ns if known is None else min(known.start_ns, span.start_ns))
+        end_ns = max(start_ns, self._clamp(span.end_ns))
         self._by_id[id] = replace(span, start_ns=start_ns, end_ns=end_ns)
 
     def end(self, id: str, at_ns: int) -> None:
         known = self._by_id.get(id)
         if known is not None:
-            self._by_id[id] = replace(known, end_ns=max(known.start_ns, self._within(at_ns)), is_over=True)
+            self._by_id[id] = replace(known, end_ns=max(known.start_ns, self._clamp(at_ns)), is_over=True)
 
-    def _within(self, at_ns: int) -> int:
+    def _clamp(self, at_ns: int) -> int:
         return max(self._first_ns, min(at_ns, self._last_ns))
 
 
@@ -96,14 +96,14 @@ def spans_of(recording: Recording) -> RecordedSpans:
     first_ns, last_ns = recording.start_ns, recording.end_ns
     runs, alarms = _Lane(first_ns, last_ns), _Lane(first_ns, last_ns)
     for lane, role in ((runs, "runs"), (alarms, "alarms")):
-        for at_ns, entry in recording.said(role):
+        for at_ns, entry in recording.entries(role):
             if isinstance(entry, Mapping) and isinstance(entry.get("id"), str):
-                lane.put(entry["id"], _span(entry, at_ns, last_ns))
+                lane.add(entry["id"], _parse_span(entry, at_ns, last_ns))
     _read_alerts(recording, alarms)
-    return RecordedSpans(runs.sorted(), alarms.sorted(), runs.left_out + alarms.left_out)
+    return RecordedSpans(runs.sorted(), alarms.sorted(), runs.omitted_count + alarms.omitted_count)
 
 
-def _span(told: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
+def _parse_span(told: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
     since, until = told.get("since_ns"), told.get("until_ns")
     is_over = type(until) is int
     result = _text(told, "result")
@@ -122,7 +122,7 @@ def _span(told: Mapping[str, object], at_ns: int, last_ns: int) -> RecordedSpan:
 def _read_alerts(recording: Recording, lane: _Lane) -> None:
     # Each change of the graph's alerts lists all of them.
     present: dict[str, str] = {}
-    for at_ns, entry in recording.said("alerts"):
+    for at_ns, entry in recording.entries("alerts"):
         listed = entry.get("alerts") if isinstance(entry, Mapping) else None
         there = {
             _text(each, "id"): each
@@ -135,7 +135,7 @@ def _read_alerts(recording: Recording, lane: _Lane) -> None:
             if id not in present:
                 present[id] = f"alert-{id}-{at_ns}"
                 _kind, _colon, topic = id.partition(":")
-                lane.put(
+                lane.add(
                     present[id],
                     RecordedSpan(at_ns, recording.end_ns, _text(each, "sentence") or id, topic=topic),
                 )

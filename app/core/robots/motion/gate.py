@@ -10,12 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from app.core.robots.motion.permission import MotionPermission, risky
+from app.core.robots.motion.permission import MotionPermission, risky_actions
 from app.core.robots.robot_link import RobotLink
 from app.robots.description.description import Robot
 from app.robots.identity import controls_of
 from nep.errors import NepError
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 from nep.nodes.node import Node
 from nep.programs.robots.moving import MovingTopics, description_topics, moving_topics
 from nep.protocol.graph_view import GraphView
@@ -27,7 +27,7 @@ class GatedRobots(Protocol):
     """Information about robots that the gate needs."""
 
     @property
-    def moving(self) -> MovingTopics:
+    def moving_topics(self) -> MovingTopics:
         """Topics whose messages move robots; a new object whenever they change."""
 
     @property
@@ -35,7 +35,7 @@ class GatedRobots(Protocol):
         """Robots that can be moved."""
 
     @property
-    def described(self) -> frozenset[str]:
+    def described_topics(self) -> frozenset[str]:
         """Topics of the descriptions of `movable` robots that were parsed."""
 
 
@@ -56,20 +56,20 @@ class MovableRobots:
 
     @property
     def _movable(self) -> tuple[RobotLink, ...]:
-        return tuple(link for link in self._links.values() if link.connected or not link.virtual)
+        return tuple(link for link in self._links.values() if link.is_connected or not link.virtual)
 
     @property
-    def described(self) -> frozenset[str]:
+    def described_topics(self) -> frozenset[str]:
         """Description topics of the connected robots."""
-        there = {link.name for link in self._links.values() if link.connected}
+        there = {link.name for link in self._links.values() if link.is_connected}
         return frozenset(topic for topic, name in self._names.items() if name in there)
 
     @property
-    def moving(self) -> MovingTopics:
+    def moving_topics(self) -> MovingTopics:
         """Topics whose messages move robots; a new object whenever they change."""
         links = self._movable
         now = [(link.robot, link.topics_before, link.identity) for link in links]
-        described = self.described
+        described = self.described_topics
         key = (self.view.epoch, self.view.revision, described, now)
         if key != self._key:
             known = [controls_of(link.robot, link.topics_before) for link in links]
@@ -79,10 +79,10 @@ class MovableRobots:
 
 
 class _Snapshot(NamedTuple):
-    moving: MovingTopics = MovingTopics()
+    moving_topics: MovingTopics = MovingTopics()
     allowed: frozenset[str] = frozenset()
     strangers: frozenset[str] = frozenset()
-    described: frozenset[str] = frozenset()
+    described_topics: frozenset[str] = frozenset()
 
 
 class MotionGate:
@@ -99,14 +99,14 @@ class MotionGate:
 
     def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
         """Return the names of the robots that a message moves; the topic if the robot is unknown."""
-        return self._robots.moving.moved_by(topic, msg_type)
+        return self._robots.moving_topics.robots_moved_by(topic, msg_type)
 
     def is_permitted(self, topic: str, msg_type: str = "") -> bool:
         """Return True if a message may be published without asking the user."""
-        self.follow()
-        return not self.refusal(topic, msg_type)
+        self.update()
+        return not self.rejection_reason(topic, msg_type)
 
-    def permits(
+    def request_permission(
         self, topic: str, go_on: Callable[[], object], msg_type: str = "", *, reason: str = ""
     ) -> bool:
         """Return True if a message may be published now.
@@ -118,41 +118,46 @@ class MotionGate:
         names = self.moved_by(topic, msg_type)
         wanted = [(known[name], _actions(known[name])) for name in names if name in known]
         strangers = [name for name in names if name not in known]
-        is_permitted = self._permission.permits(wanted, go_on, strangers, reason)
-        self.follow()
+        is_permitted = self._permission.request_permission(wanted, go_on, strangers, reason)
+        self.update()
         return is_permitted
 
-    def follow(self) -> None:
+    def update(self) -> None:
         """Update the robots and permissions that `refusal` uses."""
-        now = self._robots.moving, self._permission.revision
+        now = self._robots.moving_topics, self._permission.revision
         if now == self._followed_state:
             return
         known = {robot.name: robot for robot in self._robots.movable}
         allowed = {
             name
             for name, robot in known.items()
-            if self._permission.allowed(robot) or not risky(robot, _actions(robot))
+            if self._permission.is_allowed(robot) or not risky_actions(robot, _actions(robot))
         }
         # a permission counts until the robot is identified
         strangers = self._permission.strangers - known.keys()
-        self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described)
+        self._snapshot = _Snapshot(now[0], strangers | allowed, strangers, self._robots.described_topics)
         self._followed_state = now
 
-    def refusal(self, topic: str, msg_type: str = "") -> str:
+    def rejection_reason(self, topic: str, msg_type: str = "") -> str:
         """Return why a message may not be published now; "" if it may. Thread-safe."""
         known = self._snapshot
-        return _refusal_words(
-            topic, [name for name in known.moving.moved_by(topic, msg_type) if name not in known.allowed]
+        return _rejection_text(
+            topic,
+            [
+                name
+                for name in known.moving_topics.robots_moved_by(topic, msg_type)
+                if name not in known.allowed
+            ],
         )
 
-    def refusal_now(self, node: Node, topic: str, msg_type: str = "") -> str:
+    def current_rejection_reason(self, node: Node, topic: str, msg_type: str = "") -> str:
         """Check like `refusal`, but get the graph from the master first.
 
         For the first message to new subscribers.
 
         Thread-safe. Waits at most 0.5 s for the master.
         """
-        refusal = self.refusal(topic, msg_type)
+        refusal = self.rejection_reason(topic, msg_type)
         if refusal:
             return refusal
         try:
@@ -160,19 +165,19 @@ class MotionGate:
         except NepError:
             return ""  # no node can have joined without the master
         known = self._snapshot
-        newcomers = moving_topics(view, (), description_topics(view) - known.described)
-        return _refusal_words(
+        newcomers = moving_topics(view, (), description_topics(view) - known.described_topics)
+        return _rejection_text(
             topic, [name for name in newcomers.robots_on(topic) if name not in known.strangers]
         )
 
 
-def _refusal_words(topic: str, names: Sequence[str]) -> str:
+def _rejection_text(topic: str, names: Sequence[str]) -> str:
     if not names:
         return ""
     if names == [topic]:
         return _("a message on {topic} would move a robot that is not allowed to move").format(topic=topic)
     template = _("it would move {robots}, which is not allowed")
-    return template.format(robots=listed(list(names)))
+    return template.format(robots=format_list(list(names)))
 
 
 def _actions(robot: Robot) -> Sequence[str]:

@@ -16,10 +16,10 @@ from app.core.storage.settings import ListSettings
 from app.errors import AppError
 from app.robots.description.description import Robot
 from app.robots.identity import Identity
-from nep.i18n import _, listed, ngettext, pgettext
-from nep.programs.robots.moving import RIZE_COMMANDS
+from nep.i18n import _, format_list, ngettext, pgettext
+from nep.programs.robots.moving import RIZE_COMMAND_TOPIC
 
-ALWAYS = "robots.may_move"
+SETTING_KEY = "robots.may_move"
 MAX_NAMED = 4
 
 
@@ -29,7 +29,9 @@ class MayNotMoveError(AppError):
     def __init__(self, names: Sequence[str]) -> None:
         self.names = tuple(names)
         super().__init__(
-            _("{robots} can't move yet; answer the question above first").format(robots=listed(list(names)))
+            _("{robots} can't move yet; answer the question above first").format(
+                robots=format_list(list(names))
+            )
         )
 
 
@@ -45,32 +47,32 @@ class Question:
     """
 
     moves: Mapping[str, tuple[str, ...]]
-    go_on: Callable[[], object]
+    on_allow: Callable[[], object]
     strangers: tuple[str, ...] = ()
     reason: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Display names of all robots in the question."""
-        return (*self.moves, *map(_stranger, self.strangers))
+        return (*self.moves, *map(_stranger_label, self.strangers))
 
     @property
     def title(self) -> str:
         """Title, such as "Allow Rover to move?"."""
-        return _("Allow {robots} to move?").format(robots=listed(list(self.names)))
+        return _("Allow {robots} to move?").format(robots=format_list(list(self.names)))
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """Sentences about the motion and how to stop it."""
         sentences = [self.reason] if self.reason else []
         sentences += [
             ngettext("{actions} moves {robot}.", "{actions} move {robot}.", len(actions)).format(
-                actions=listed(actions), robot=name
+                actions=format_list(actions), robot=name
             )
             for name, actions in self.moves.items()
         ]
         if self.strangers:
-            names = listed([_stranger(each) for each in self.strangers])
+            names = format_list([_stranger_label(each) for each in self.strangers])
             template = _("The message may move {robot}, which Studio doesn't know.")
             sentences.append(template.format(robot=names))
         return _("{moves} Make sure nobody is in the way. Press F12 to stop at any time.").format(
@@ -96,7 +98,7 @@ class MotionPermission:
         """Open question, or None."""
         self.revision = 0
 
-    def allowed(self, robot: Robot) -> bool:
+    def is_allowed(self, robot: Robot) -> bool:
         """Return True if this robot may move without asking the user."""
         return (
             robot.virtual
@@ -104,7 +106,7 @@ class MotionPermission:
             or self._key(robot) in self._always_allowed()
         )
 
-    def permits(
+    def request_permission(
         self,
         wanted: Iterable[tuple[Robot, Sequence[str]]],
         go_on: Callable[[], object],
@@ -115,7 +117,9 @@ class MotionPermission:
 
         If not, the question is opened, and ``go_on`` is called if the user allows the motion. See `Question`.
         """
-        asked = [(robot, risky(robot, actions)) for robot, actions in wanted if not self.allowed(robot)]
+        asked = [
+            (robot, risky_actions(robot, actions)) for robot, actions in wanted if not self.is_allowed(robot)
+        ]
         open_ = [(robot, moves) for robot, moves in asked if moves]
         unknown = tuple(name for name in strangers if name not in self.strangers)
         if not open_ and not unknown:
@@ -139,10 +143,11 @@ class MotionPermission:
         try:
             if always and self._settings is not None:
                 self._settings.set(
-                    ALWAYS, sorted({*self._always_allowed(), *(key for _program_key, key in self._asked)})
+                    SETTING_KEY,
+                    sorted({*self._always_allowed(), *(key for _program_key, key in self._asked)}),
                 )
         finally:
-            question.go_on()
+            question.on_allow()
 
     def withdraw(self) -> None:
         """Close the question without an answer, because Stop was pressed or the robot disconnected."""
@@ -150,18 +155,20 @@ class MotionPermission:
             self.question = None
             self.revision += 1
 
-    def forget(self) -> None:
+    def revoke_all(self) -> None:
         """Revoke all permissions."""
         self._allowed.clear()
         self.strangers = frozenset()
         self.revision += 1
         if self._settings is not None:
-            self._settings.set(ALWAYS, [])
+            self._settings.set(SETTING_KEY, [])
 
     def _key(self, robot: Robot) -> str:
         # Key of *always*: another program that announces this name doesn't match.
         identity = self._identity_of(robot.name)
-        return f"{robot.name} ({robot.model})" + (f", {identity.words}" if identity is not None else "")
+        return f"{robot.name} ({robot.model})" + (
+            f", {identity.display_name}" if identity is not None else ""
+        )
 
     def _program_key(self, robot: Robot) -> str:
         # Key of a permission for this very program until it is restarted.
@@ -169,15 +176,15 @@ class MotionPermission:
         return f"{self._key(robot)} {identity.node_id if identity is not None else ''}"
 
     def _always_allowed(self) -> list[str]:
-        return self._settings.get(ALWAYS, []) if self._settings is not None else []
+        return self._settings.get(SETTING_KEY, []) if self._settings is not None else []
 
 
-def _stranger(name: str) -> str:
+def _stranger_label(name: str) -> str:
     # A robot of which only the name or a topic is known.
-    return _("the robot on {topic}").format(topic=name) if "/" in name or name == RIZE_COMMANDS else name
+    return _("the robot on {topic}").format(topic=name) if "/" in name or name == RIZE_COMMAND_TOPIC else name
 
 
-def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
+def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     """Return the titles of the actions that move the robot, without duplicates; at most the first few."""
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
@@ -186,7 +193,7 @@ def risky(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
     )
 
 
-def wanted_by(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
+def actions_by_robot(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
     """Return the actions that a program invokes on each robot.
 
     Includes all actions of a robot if the program publishes on its topics directly.

@@ -80,18 +80,18 @@ class StopTarget:
 
     robot: Robot
     identity: Identity | None = None
-    earlier: tuple[Identity, ...] = ()
-    topics: tuple[RobotTopics, ...] = ()
+    earlier_programs: tuple[Identity, ...] = ()
+    earlier_topics: tuple[RobotTopics, ...] = ()
     is_expected: bool = True
 
     @property
-    def ways(self) -> tuple[RobotTopics, ...]:
+    def topic_sets(self) -> tuple[RobotTopics, ...]:
         """Topics for the Stop: those of the current description, then those of earlier ones."""
-        return tuple(dict.fromkeys((self.robot.topics, *self.topics)))[:MAX_TOPICS]
+        return tuple(dict.fromkeys((self.robot.topics, *self.earlier_topics)))[:MAX_TOPICS]
 
 
 @dataclass
-class StopWay:
+class StopChannel:
     """Publisher for one command topic of a robot, and the subscriber to the replies."""
 
     topic: str
@@ -128,7 +128,7 @@ class StopLine:
     """Connections to one robot; ``error`` is the reason why one of them could not be opened."""
 
     target: StopTarget
-    ways: dict[RobotTopics, StopWay] = field(default_factory=dict)
+    channels: dict[RobotTopics, StopChannel] = field(default_factory=dict)
     error: str = ""
 
     @property
@@ -137,24 +137,24 @@ class StopLine:
         return self.target.robot.name
 
     @property
-    def answers(self) -> set[str]:
+    def reply_topics(self) -> set[str]:
         """Topics of the robot's replies."""
-        return {way.answer for way in self.target.ways}
+        return {way.answer for way in self.target.topic_sets}
 
     @property
-    def is_whole(self) -> bool:
+    def is_complete(self) -> bool:
         """True if all connections are open."""
-        return self.ways.keys() >= set(self.target.ways)
+        return self.channels.keys() >= set(self.target.topic_sets)
 
     @property
-    def unconnected(self) -> str:
+    def connection_problem(self) -> str:
         """Why the robot can't have received anything; "" once a connection was established."""
-        if any(way.was_connected for way in self.ways.values()):
+        if any(way.was_connected for way in self.channels.values()):
             return ""
         return _("{robot} is not connected yet").format(robot=self.name)
 
     @property
-    def untold(self) -> str:
+    def send_problem(self) -> str:
         """Why the Stop can't be sent to the robot."""
         why = self.error or _("not connected yet; press Stop again")
         return _("Stop can't be sent to {robot}: {why}").format(robot=self.name, why=why)

@@ -19,12 +19,12 @@ from nep.i18n import _, lazy
 
 OnMoved: TypeAlias = Callable[[Sequence[str], str], object]
 """Called before a message is sent, with the robots that it moves and the kind of the sender."""
-UNKNOWN: tuple[str, str] = ("action", "stop")
+UNKNOWN_SENDERS: tuple[str, str] = ("action", "stop")
 """Kinds of motions without a known sender: an action that the robot could not end, and an unproven Stop."""
 MAX_MOTIONS = 64
 """Maximum number of motions of one robot that are tracked by id; further ones end only with a Stop."""
 
-_SENTENCES = {
+_MESSAGES = {
     "form": lazy("{robot} received a command from a form and has not responded since"),
     "behaviour": lazy("{robot} received a command from a behaviour and has not responded since"),
     "shelf": lazy("{robot} received a command from a saved message and has not responded since"),
@@ -38,7 +38,7 @@ _SENTENCES = {
     "stop": lazy("{robot} has not confirmed Stop"),
 }
 """Reason for each kind of sender; `_OTHER` is used for unknown kinds."""
-_OTHER = lazy("{robot} received a command and has not responded since")
+_OTHER_MESSAGE = lazy("{robot} received a command and has not responded since")
 
 
 def ignore_moved(_names: Sequence[str], _by: str) -> None:
@@ -59,7 +59,7 @@ class UnprovenMotion:
 
     number: int
     robot: str
-    by: str
+    sender: str
     since_s: float
     program: Identity | None
     id: str = ""
@@ -67,12 +67,12 @@ class UnprovenMotion:
     @property
     def is_known(self) -> bool:
         """True if the sender of the command is known."""
-        return self.by not in UNKNOWN
+        return self.sender not in UNKNOWN_SENDERS
 
     @property
-    def sentence(self) -> str:
+    def reason(self) -> str:
         """Reason why the robot may still move, as a sentence without a full stop."""
-        return _(_SENTENCES.get(self.by, _OTHER)).format(robot=self.robot)
+        return _(_MESSAGES.get(self.sender, _OTHER_MESSAGE)).format(robot=self.robot)
 
 
 class MovedRobots:
@@ -111,7 +111,7 @@ class MovedRobots:
         return self._count
 
     @property
-    def sent_to(self) -> tuple[str, ...]:
+    def recently_commanded(self) -> tuple[str, ...]:
         """Robots that received a command since the last but one graph."""
         return tuple(self._sent)
 
@@ -138,7 +138,9 @@ class MovedRobots:
         }
         return tuple(others.values())
 
-    def note(self, names: Iterable[str], by: str, *, id: str = "", program: Identity | None = None) -> None:
+    def record_command(
+        self, names: Iterable[str], by: str, *, id: str = "", program: Identity | None = None
+    ) -> None:
         """Record that robots are about to receive a command that may move them; call this before sending it.
 
         Args:
@@ -155,14 +157,14 @@ class MovedRobots:
             if not id or len(found) >= MAX_MOTIONS:  # of motions that end together only the newest is kept
                 motion = replace(motion, id="")
                 found[:] = [
-                    each for each in found if each.id or (each.by, each.program) != (by, motion.program)
+                    each for each in found if each.id or (each.sender, each.program) != (by, motion.program)
                 ]
             found.append(motion)
             if program is None:
                 self._sent[name] = motion
-                self._note_others(name, by, found)
+                self._record_others(name, by, found)
 
-    def _note_others(self, name: str, by: str, found: list[UnprovenMotion]) -> None:
+    def _record_others(self, name: str, by: str, found: list[UnprovenMotion]) -> None:
         # Other programs of the same robot received the command too: a frozen one may execute it when it
         # resumes.
         known = {motion.program for motion in found if not motion.id}
@@ -170,7 +172,7 @@ class MovedRobots:
             if other not in known and len(found) < MAX_MOTIONS:
                 found.append(UnprovenMotion(self._count, name, by, self._clock(), other))
 
-    def take_newcomers(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
+    def record_new_programs(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
         """Record commands that newly listed programs may have received.
 
         A program can receive a command before the graph lists it. Call this once for each graph. A graph is
@@ -192,18 +194,18 @@ class MovedRobots:
         self._sent = {name: sent for name, sent in self._sent.items() if sent.number > last}
         self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
 
-    def ended(self, name: str, id: str, program: Identity | None = None) -> None:
+    def end_motion(self, name: str, id: str, program: Identity | None = None) -> None:
         """End a motion of one program of the robot, because that program sent the final reply."""
 
-        def stays(motion: UnprovenMotion) -> bool:
+        def remains(motion: UnprovenMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
                 return motion.id != id
             return program.node_id != motion.program.node_id
 
         if id:
-            self._retain(name, stays)
+            self._retain(name, remains)
 
-    def stood_still(self, name: str, programs: Collection[str], mark: int) -> None:
+    def record_stopped(self, name: str, programs: Collection[str], mark: int) -> None:
         """End the motions of programs that confirmed a Stop; motions of other programs remain.
 
         Args:
@@ -226,13 +228,13 @@ class MovedRobots:
 
     def apply_report(self, report: StopReport, mark: int) -> None:
         """Apply the report of a Stop that started at ``mark``, for both proven and unproven robots."""
-        self.note((name for name in report.silent if name not in self), "stop")
-        for name in report.still:
-            self.stood_still(name, report.programs(name), mark)
-        for name in set(report.names) - {*report.silent, *report.still}:
-            self.note_stop_received(name, mark)
+        self.record_command((name for name in report.unconfirmed_names if name not in self), "stop")
+        for name in report.stopped_names:
+            self.record_stopped(name, report.programs(name), mark)
+        for name in set(report.names) - {*report.unconfirmed_names, *report.stopped_names}:
+            self.record_stop_received(name, mark)
 
-    def note_stop_received(self, name: str, mark: int) -> None:
+    def record_stop_received(self, name: str, mark: int) -> None:
         """End the motions of a robot that can't confirm (RIZE) and to which a Stop was sent at ``mark``."""
         self._retain(name, lambda motion: motion.number > mark)
         if name in self._sent and self._sent[name].number <= mark:

@@ -12,7 +12,7 @@ from app.core.robots.robot_link import RobotLink
 from app.core.robots.stop.lines import StopTarget
 from app.core.robots.stop.moved_robots import MovedRobots
 from app.robots.description.description import Robot, RobotTopics, SafeStop, topic_of
-from app.robots.identity import hearing, identity_of, publishing
+from app.robots.identity import identity_of, publisher_nodes, subscriber_nodes
 from nep.protocol.graph_view import GraphView
 
 MAX_UNLISTED = 256
@@ -29,26 +29,26 @@ def targets_of(
     """Return the targets of a Stop. Replies of disconnected robots that are not moving are not awaited."""
     here, absent = [], []
     for link in links:
-        is_expected = link.connected or link.name in moved
+        is_expected = link.is_connected or link.name in moved
         earlier = moved.other_programs(link.name, link.identity)
         target = StopTarget(link.robot, link.identity, earlier, link.topics_before, is_expected)
         if is_expected:
             here.append(target)
-        elif link.has_proven_stop or link.answered_s is not None:
+        elif link.has_proven_stop or link.replied_s is not None:
             absent.append(target)
     names = {target.robot.name for target in here}
     others = [target for target in unlisted if target.robot.name not in names]
-    unknown = [_unknown(topic) for topic in moved.names if "/" in topic]
+    unknown = [_unknown_target(topic) for topic in moved.names if "/" in topic]
     return (*here, *unknown, *absent[:MAX_ABSENT], *others[:MAX_UNLISTED])
 
 
-def _unknown(topic: str) -> StopTarget:
+def _unknown_target(topic: str) -> StopTarget:
     # Target for a command topic that moved a robot without a description.
     home = topic.rpartition("/")[0]
-    return StopTarget(_bare(topic, RobotTopics(f"{home}/description", topic, f"{home}/answer")))
+    return StopTarget(_placeholder_robot(topic, RobotTopics(f"{home}/description", topic, f"{home}/answer")))
 
 
-def _bare(name: str, topics: RobotTopics) -> Robot:
+def _placeholder_robot(name: str, topics: RobotTopics) -> Robot:
     return Robot(name, "", name, False, "native", (), (), (), _STOP, (), topics, {})
 
 
@@ -62,14 +62,14 @@ def unlisted_targets(
     wanted = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
     if not wanted:
         return ()
-    heard, answered = _by_node(view, _COMMAND), _by_node(view, _ANSWER)
+    heard, answered = _topics_by_node(view, _COMMAND), _topics_by_node(view, _ANSWER)
     found = []
     for topic in wanted:
-        name, nodes = _name_of(topic), publishing(view, topic)
+        name, nodes = _name_of(topic), publisher_nodes(view, topic)
         node = nodes[0] if nodes else ""
         home = topic_of(name, "command")
         own = [each for each in heard.get(node, ()) if each != home]
-        commands = [*([home] if hearing(view, home) else []), *own]
+        commands = [*([home] if subscriber_nodes(view, home) else []), *own]
         answers = answered.get(node, ())
         answer = topic_of(name, "answer")
         answer = answer if answer in answers or not answers else answers[0]
@@ -77,7 +77,14 @@ def unlisted_targets(
         if ways:
             identity = identity_of(view, node) if node else None
             others = tuple(ways[1:])
-            found.append(StopTarget(_bare(name, ways[0]), identity, topics=others, is_expected=is_expected))
+            found.append(
+                StopTarget(
+                    _placeholder_robot(name, ways[0]),
+                    identity,
+                    earlier_topics=others,
+                    is_expected=is_expected,
+                )
+            )
     return tuple(found)
 
 
@@ -85,12 +92,12 @@ def _name_of(topic: str) -> str:
     return topic.removesuffix("/description").strip("/")
 
 
-def _by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
+def _topics_by_node(view: GraphView, msg_type: str) -> Mapping[str, list[str]]:
     # Topics of a type that each node subscribes to (commands) or publishes (replies).
     found: dict[str, list[str]] = {}
     for topic, info in view.topics.items():
         if info.msg_type == msg_type:
-            nodes = hearing(view, topic) if msg_type == _COMMAND else publishing(view, topic)
+            nodes = subscriber_nodes(view, topic) if msg_type == _COMMAND else publisher_nodes(view, topic)
             for node in nodes:
                 found.setdefault(node, []).append(topic)
     return found

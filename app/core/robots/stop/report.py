@@ -8,7 +8,7 @@ from typing import Literal
 
 from nep.i18n import _
 
-STOPPING_SHOWN_AFTER_S = 0.1
+STOPPING_DISPLAY_DELAY_S = 0.1
 StopStatus = Literal["ok", "off", "error"]
 """Status of a Stop in the window; only ``ok`` is shown with a green check mark."""
 
@@ -31,53 +31,53 @@ class RobotStop:
     """
 
     name: str
-    answered: bool
+    is_confirmed: bool
     elapsed_ms: float | None
     can_confirm: bool = True
     error: str = ""
-    refused: bool = False
+    is_refused: bool = False
     program: str = ""
-    waits: bool = False
+    is_waiting: bool = False
     node: str = ""
     waited_ms: float = 0.0
     is_pending: bool = False
 
     @property
-    def who(self) -> str:
+    def full_name(self) -> str:
         """Name of the robot, followed by the name of the program if that is not the robot's own."""
         return f"{self.name} (“{self.program}”)" if self.program else self.name
 
     @property
-    def wrong(self) -> str:
+    def problem(self) -> str:
         """Problem, without a full stop: "Pepper did not answer"; "" if the robot stopped."""
-        if self.answered or not self.can_confirm:
+        if self.is_confirmed or not self.can_confirm:
             return ""
-        if self.program and self.refused:
+        if self.program and self.is_refused:
             return _("{error} (from “{program}”)").format(error=self.error, program=self.program)
-        return self.error or _("{robot} did not reply").format(robot=self.who)
+        return self.error or _("{robot} did not reply").format(robot=self.full_name)
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """Result as a sentence: "Pepper stopped (41 ms)"."""
-        if self.answered and self.waited_ms:
+        if self.is_confirmed and self.waited_ms:
             words = _("{robot} stopped ({elapsed} ms, including {waited} ms without a connection)")
             return words.format(
-                robot=self.who, elapsed=f"{self.elapsed_ms or 0:.0f}", waited=f"{self.waited_ms:.0f}"
+                robot=self.full_name, elapsed=f"{self.elapsed_ms or 0:.0f}", waited=f"{self.waited_ms:.0f}"
             )
-        if self.answered:
+        if self.is_confirmed:
             return _("{robot} stopped ({elapsed} ms)").format(
-                robot=self.who, elapsed=f"{self.elapsed_ms or 0:.0f}"
+                robot=self.full_name, elapsed=f"{self.elapsed_ms or 0:.0f}"
             )
         if self.program and not self.can_confirm:
-            return _("{robot} also receives the commands and can't confirm").format(robot=self.who)
+            return _("{robot} also receives the commands and can't confirm").format(robot=self.full_name)
         if not self.can_confirm:
             return _("{robot}: Stop sent; this robot can't confirm").format(robot=self.name)
-        return _("{wrong}. Switch it off by hand.").format(wrong=self.wrong)
+        return _("{wrong}. Switch it off by hand.").format(wrong=self.problem)
 
     @property
     def status(self) -> StopStatus:
         """``ok`` if confirmed, ``off`` if the robot can't confirm, else ``error``."""
-        return "off" if not self.can_confirm else "ok" if self.answered else "error"
+        return "off" if not self.can_confirm else "ok" if self.is_confirmed else "error"
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class StopReport:
     strangers: tuple[tuple[str, str], ...] = ()
 
     @property
-    def proven(self) -> bool:
+    def is_proven(self) -> bool:
         """True if there was a robot to stop and every robot that can confirm has confirmed."""
         return bool(self.robots) and not self.unproven
 
@@ -106,15 +106,15 @@ class StopReport:
         """
         if self.unproven:
             return "error"
-        return "ok" if self.robots and set(self.names) == set(self.still) else "off"
+        return "ok" if self.robots and set(self.names) == set(self.stopped_names) else "off"
 
     @property
     def unproven(self) -> tuple[RobotStop, ...]:
         """Results of the robots that should have confirmed and did not."""
-        return tuple(robot for robot in self.robots if robot.can_confirm and not robot.answered)
+        return tuple(robot for robot in self.robots if robot.can_confirm and not robot.is_confirmed)
 
     @property
-    def silent(self) -> tuple[str, ...]:
+    def unconfirmed_names(self) -> tuple[str, ...]:
         """Names of the robots that did not confirm, without duplicates."""
         return tuple(dict.fromkeys(robot.name for robot in self.unproven))
 
@@ -124,13 +124,13 @@ class StopReport:
         worst: dict[str, RobotStop] = {}
         for robot in self.robots:
             before = worst.get(robot.name)
-            if before is None or (robot.wrong and not (before.wrong and not before.program)):
+            if before is None or (robot.problem and not (before.problem and not before.program)):
                 worst[robot.name] = robot
         return worst
 
     def programs(self, name: str) -> frozenset[str]:
         """Return the node ids of the programs of a robot that confirmed."""
-        return frozenset(robot.node for robot in self.robots if robot.name == name and robot.answered)
+        return frozenset(robot.node for robot in self.robots if robot.name == name and robot.is_confirmed)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -138,13 +138,13 @@ class StopReport:
         return tuple(dict.fromkeys(robot.name for robot in self.robots))
 
     @property
-    def still(self) -> tuple[str, ...]:
+    def stopped_names(self) -> tuple[str, ...]:
         """Names of robots that are proven to have stopped: all their programs confirmed."""
-        silent = self.silent
-        confirmed = (robot.name for robot in self.robots if robot.can_confirm and robot.answered)
+        silent = self.unconfirmed_names
+        confirmed = (robot.name for robot in self.robots if robot.can_confirm and robot.is_confirmed)
         return tuple(dict.fromkeys(name for name in confirmed if name not in silent))
 
-    def with_asked(self, names: Iterable[str], why: str = "") -> StopReport:
+    def with_unreached(self, names: Iterable[str], why: str = "") -> StopReport:
         """Return a report extended by a line for each of these robots that was not reached."""
         there = {robot.name for robot in self.robots}
         missing = [not_reached(name, why) for name in dict.fromkeys(names) if name not in there]
@@ -175,7 +175,7 @@ class StopDone:
 
 
 @dataclass(frozen=True, slots=True)
-class RobotAnswered:
+class RobotReplied:
     """Event: one robot replied while replies of others are pending."""
 
     number: int
@@ -183,7 +183,7 @@ class RobotAnswered:
 
 
 @dataclass(frozen=True, slots=True)
-class OneStopped:
+class RobotStopped:
     """Event: one robot was stopped while no behaviour was running.
 
     ``mark`` is the value of `MovedRobots.mark` when the Stop started.
@@ -194,7 +194,7 @@ class OneStopped:
 
 
 @dataclass(frozen=True, slots=True)
-class LateAnswer:
+class LateReply:
     """Event: a robot replied after the timeout, or confirmed after having refused.
 
     ``number`` is the number of the Stop; None for the Stop of one robot, which started at ``mark``.

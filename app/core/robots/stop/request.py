@@ -12,9 +12,9 @@ from app.robots.held_messages import HeldMessages
 from nep.errors import NepError
 from nep.messages.message import Message
 
-MAX_ANSWER_BYTES = 65_536
+MAX_REPLY_BYTES = 65_536
 """Maximum size of a reply to a Stop; larger messages are ignored."""
-SHOWN_WAIT_MS = 20.0
+MIN_DISPLAYED_WAIT_MS = 20.0
 """Minimum time until a robot was connected that is reported."""
 
 
@@ -35,47 +35,47 @@ class StopRequest:
     line: StopLine
     id: str
     sent_s: float
-    late: Callable[[RobotStop], object] | None
+    on_late: Callable[[RobotStop], object] | None
     ends: str | None = None
     error: str = ""
     serving: dict[str, RobotStop | None] = field(default_factory=dict)
     programs: dict[str, str] = field(default_factory=dict)
-    unknown: HeldMessages = field(default_factory=HeldMessages)
-    foreign: dict[str, HeldMessages] = field(default_factory=dict)
-    delivered: set[RobotTopics] = field(default_factory=set)
+    unknown_replies: HeldMessages = field(default_factory=HeldMessages)
+    foreign_replies: dict[str, HeldMessages] = field(default_factory=dict)
+    delivered_topics: set[RobotTopics] = field(default_factory=set)
     delivered_s: float | None = None
     is_over: bool = False
 
     @property
     def is_settled(self) -> bool:
         """True if no further reply is awaited."""
-        return bool(self.error) or self.is_answered
+        return bool(self.error) or self.has_all_replies
 
     @property
-    def is_answered(self) -> bool:
+    def has_all_replies(self) -> bool:
         """True if all programs have replied."""
         return bool(self.serving) and None not in self.serving.values()
 
     @property
     def is_proven(self) -> bool:
         """True if all programs have confirmed that the robot has stopped."""
-        return bool(self.serving) and all(each and each.answered for each in self.serving.values())
+        return bool(self.serving) and all(each and each.is_confirmed for each in self.serving.values())
 
-    def sent(self, way: RobotTopics, now: float) -> None:
+    def record_sent(self, way: RobotTopics, now: float) -> None:
         """Record that the command was sent on a connected topic."""
-        self.delivered.add(way)
+        self.delivered_topics.add(way)
         if self.delivered_s is None:
             self.delivered_s = now
 
-    def news(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
+    def new_replies(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
         """Return the replies by node that are not in ``told``."""
         found, waits = self.serving.items(), None in self.serving.values()
         said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
-        return [(node, replace(each, waits=waits)) for node, each in said]
+        return [(node, replace(each, is_waiting=waits)) for node, each in said]
 
     def results(self) -> list[RobotStop]:
         """Return a result for each program; programs without a reply are unproven."""
-        unconnected = self.line.unconnected
+        unconnected = self.line.connection_problem
         silent = RobotStop(
             self.line.name, False, None, error=self.error or unconnected, is_pending=bool(unconnected)
         )
@@ -92,12 +92,12 @@ class StopRequest:
         A refusal may be followed by a confirmation; any other reply is final. ``words`` formats the robot's
         error as a sentence.
         """
-        reply = answer_in(message)
+        reply = reply_in(message)
         state = None if reply is None else reply.get("state")
         if reply is None or reply.get("id") != self.id or state not in ("succeeded", "failed"):
             return False
         before, is_still = self.serving[node], state == "succeeded"
-        if before is not None and (before.answered or not is_still):
+        if before is not None and (before.is_confirmed or not is_still):
             return False
         waited_ms = 0.0 if self.delivered_s is None else (self.delivered_s - self.sent_s) * 1000
         self.serving[node] = RobotStop(
@@ -105,10 +105,10 @@ class StopRequest:
             is_still,
             (now - self.sent_s) * 1000,
             error="" if is_still else words(reply.get("error")),
-            refused=not is_still,
+            is_refused=not is_still,
             program=self.programs.get(node, ""),
             node=node,
-            waited_ms=waited_ms if waited_ms > SHOWN_WAIT_MS else 0.0,
+            waited_ms=waited_ms if waited_ms > MIN_DISPLAYED_WAIT_MS else 0.0,
         )
         return True
 
@@ -116,16 +116,16 @@ class StopRequest:
         """Return the nodes that replied to this Stop although they do not serve the robot."""
         return [
             node
-            for node, held in self.foreign.items()
+            for node, held in self.foreign_replies.items()
             if any(
-                (told := answer_in(each)) is not None and told.get("id") == self.id for each in held.pop_all()
+                (told := reply_in(each)) is not None and told.get("id") == self.id for each in held.pop_all()
             )
         ]
 
 
-def answer_in(message: Message) -> Mapping[str, object] | None:
+def reply_in(message: Message) -> Mapping[str, object] | None:
     """Return the reply to a Stop contained in a message; None if there is none."""
-    if message.size_bytes > MAX_ANSWER_BYTES:
+    if message.size_bytes > MAX_REPLY_BYTES:
         return None
     try:
         payload = message.payload

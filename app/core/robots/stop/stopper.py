@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 
-from app.core.faults import error_words
-from app.core.robots.stop.lines import StopLine, StopNode, StopTarget, StopWay
+from app.core.faults import error_text
+from app.core.robots.stop.lines import StopChannel, StopLine, StopNode, StopTarget
 from app.core.robots.stop.report import RobotStop, StopReport
 from app.core.robots.stop.request import StopRequest
 from app.robots import rize
@@ -23,11 +23,11 @@ from app.robots.description.description import Robot, RobotTopics
 from app.robots.held_messages import HeldMessages
 from app.robots.identity import (
     Senders,
-    first_to_announce,
-    hearing,
+    first_announcer,
     identity_of,
-    publishing,
-    said_of_stop,
+    publisher_nodes,
+    stop_error_text,
+    subscriber_nodes,
 )
 from nep.errors import NepError
 from nep.i18n import _, lazy, ngettext
@@ -39,10 +39,10 @@ RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
 LATE_REPLY_S = 120.0
 """Time after a Stop during which late replies are accepted."""
-LATE_KEPT = 64
+MAX_LATE_REQUESTS = 64
 MAX_SERVING = 32
 """Maximum number of programs of one robot whose replies are awaited."""
-MAX_LISTENING = 4
+MAX_NAMED_LISTENERS = 4
 """Maximum number of reported programs that only subscribe to a robot's commands."""
 POLL_S = 0.02
 """Interval at which the state of a connection is checked."""
@@ -58,7 +58,7 @@ MARGIN_S = 0.5
 MAX_STOP_S = 10.0
 
 
-def patience_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_S) -> float:
+def stop_timeout_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_S) -> float:
     """Return the time limit for these robots, which is longer than that of their drivers."""
     needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
     return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
@@ -88,12 +88,12 @@ class RobotStopper:
         self._graph_queried_s = 0.0
         self._senders = Senders()
 
-    def see(self, view: GraphView) -> None:
+    def update_graph(self, view: GraphView) -> None:
         """Apply a new graph, which determines whose replies count and which programs serve a robot."""
         with self._changed:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
-            self._senders.learn(view, {way.answer for target in targets for way in target.ways})
+            self._senders.update(view, {way.answer for target in targets for way in target.topic_sets})
             late = [
                 reply for asked in self._asked.values() for reply in self._apply_held_replies_locked(asked)
             ]
@@ -101,7 +101,7 @@ class RobotStopper:
         for tell, reply in late:
             tell(reply)
 
-    def expect(self, targets: Iterable[StopTarget]) -> None:
+    def set_expected(self, targets: Iterable[StopTarget]) -> None:
         """Set the current robots without connecting to them yet; `set_robots` connects.
 
         A Stop waits for the connections.
@@ -117,37 +117,39 @@ class RobotStopper:
         """
         targets = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
         wanted = {target.robot.name: target for target in targets}
-        left: list[StopWay] = []
+        left: list[StopChannel] = []
         with self._changed:
             for name in self._lines.keys() - wanted.keys():
-                left += self._lines.pop(name).ways.values()
+                left += self._lines.pop(name).channels.values()
             for name, target in wanted.items():
                 line = self._lines.setdefault(name, StopLine(target))
-                left += [line.ways.pop(topics) for topics in line.ways.keys() - set(target.ways)]
+                left += [
+                    line.channels.pop(topics) for topics in line.channels.keys() - set(target.topic_sets)
+                ]
                 line.target = target
             lines = list(self._lines.values())
         for way in left:
             way.close()
         with self._opening_lock:
             for line in lines:
-                self._open_missing_ways(line)
+                self._open_missing_channels(line)
         with self._changed:
             view = self._view
         if view is not None:
-            self.see(view)
+            self.update_graph(view)
 
     @property
     def robots(self) -> tuple[str, ...]:
         """Names of the robots with a connection."""
         with self._changed:
-            lines = [line for line in self._lines.values() if line.target.is_expected and line.is_whole]
+            lines = [line for line in self._lines.values() if line.target.is_expected and line.is_complete]
             return tuple(line.name for line in lines)
 
-    def reaches(self, name: str) -> bool:
+    def is_reachable(self, name: str) -> bool:
         """Return True if the robot's program is connected, so that a Stop would arrive now."""
         with self._changed:
             line = self._lines.get(name)
-            way = None if line is None else line.ways.get(line.target.robot.topics)
+            way = None if line is None else line.channels.get(line.target.robot.topics)
             return line is not None and way is not None and self._is_connected_locked(line, way)
 
     def deliver(self) -> None:
@@ -163,7 +165,7 @@ class RobotStopper:
         for each in waiting:
             self._deliver(each)
 
-    def forget_late(self, names: Iterable[str]) -> None:
+    def discard_late(self, names: Iterable[str]) -> None:
         """Discard pending Stops of robots that have stopped according to the user."""
         known = set(names)
         with self._changed:
@@ -183,8 +185,8 @@ class RobotStopper:
         ``ends`` is the key of a program (`app.robots.identity`) whose further commands robots reject. Robots
         that don't support that (RIZE) need another Stop after the program has ended.
         """
-        for line in self._chosen(names):
-            self._send(line, _id(), ends)
+        for line in self._select_lines(names):
+            self._send(line, _new_id(), ends)
 
     def stop_all(
         self,
@@ -211,21 +213,21 @@ class RobotStopper:
         """
         names = None if names is None else tuple(names)
         began = self._clock()
-        lines = self._chosen(names)
-        asked = [self._ask(line, ends, on_late) for line in lines]
+        lines = self._select_lines(names)
+        asked = [self._start_request(line, ends, on_late) for line in lines]
         if is_for_all:
-            for line in self._unexpected():
-                self._send(line, _id(), ends)
-        self._retry_missing_ways(asked)
+            for line in self._unexpected_lines():
+                self._send(line, _new_id(), ends)
+        self._retry_missing_channels(asked)
         if timeout_s is None:
-            timeout_s = patience_s((line.target.robot for line in lines), self._longest_s)
+            timeout_s = stop_timeout_s((line.target.robot for line in lines), self._longest_s)
         if asked:
-            self._add_newcomers(asked)
-        reported = self._wait_for_answers(asked, began + timeout_s, on_answer)
+            self._add_new_programs(asked)
+        reported = self._wait_for_replies(asked, began + timeout_s, on_answer)
         elapsed_ms = (self._clock() - began) * 1000
-        return self._report(asked, reported, elapsed_ms, on_answer).with_asked(names or ())
+        return self._report(asked, reported, elapsed_ms, on_answer).with_unreached(names or ())
 
-    def _wait_for_answers(
+    def _wait_for_replies(
         self,
         asked: Sequence[StopRequest],
         deadline_s: float,
@@ -239,11 +241,13 @@ class RobotStopper:
             with self._changed:
                 remaining_s = deadline_s - self._clock()
                 pause_s = (
-                    min(remaining_s, GRAPH_POLL_S) if any(each.unknown for each in asked) else remaining_s
+                    min(remaining_s, GRAPH_POLL_S)
+                    if any(each.unknown_replies for each in asked)
+                    else remaining_s
                 )
                 pause_s = min(pause_s, POLL_S) if undelivered else pause_s
-                self._changed.wait_for(lambda: self._is_news(asked, reported), max(0.0, pause_s))
-                news = [(each, node, result) for each in asked for node, result in each.news(reported)]
+                self._changed.wait_for(lambda: self._has_news(asked, reported), max(0.0, pause_s))
+                news = [(each, node, result) for each in asked for node, result in each.new_replies(reported)]
             for each, node, result in news:
                 reported.add((each.id, node))
                 if on_answer is not None:
@@ -261,12 +265,12 @@ class RobotStopper:
 
     # ---- connections
 
-    def _open_missing_ways(self, line: StopLine) -> None:
+    def _open_missing_channels(self, line: StopLine) -> None:
         # Opens missing connections; a failure becomes the line's error. Call with `_opening_lock` held.
         error = ""
-        for topics in line.target.ways:
+        for topics in line.target.topic_sets:
             with self._changed:
-                is_there = topics in line.ways or self._lines.get(line.name) is not line
+                is_there = topics in line.channels or self._lines.get(line.name) is not line
             if is_there:
                 continue
             try:
@@ -275,97 +279,97 @@ class RobotStopper:
                 error = f"{failed}"
                 continue
             with self._changed:
-                is_wanted = self._lines.get(line.name) is line and topics in line.target.ways
+                is_wanted = self._lines.get(line.name) is line and topics in line.target.topic_sets
                 if is_wanted:
-                    line.ways[topics] = way
+                    line.channels[topics] = way
             if not is_wanted:
                 way.close()
         with self._changed:
             line.error = error
 
-    def _connect(self, robot: Robot, topics: RobotTopics) -> StopWay:
+    def _connect(self, robot: Robot, topics: RobotTopics) -> StopChannel:
         if robot.dialect == RIZE:
-            return StopWay(topics.command, self._node.new_pub(topics.command, "json", batch=False), None)
+            return StopChannel(topics.command, self._node.new_pub(topics.command, "json", batch=False), None)
         publisher = self._node.new_pub(topics.command, "robot/command", batch=False)
         try:
-            subscriber = self._node.new_sub(topics.answer, "robot/answer", sink=self._answers)
-            return StopWay(topics.command, publisher, subscriber)
+            subscriber = self._node.new_sub(topics.answer, "robot/answer", sink=self._on_replies)
+            return StopChannel(topics.command, publisher, subscriber)
         except NepError:
             publisher.close()
             raise
 
-    def _retry_missing_ways(self, asked: Sequence[StopRequest]) -> None:
+    def _retry_missing_channels(self, asked: Sequence[StopRequest]) -> None:
         # Retries failed connections in a thread, so that the Stop of other robots is not delayed.
-        missing = [each for each in asked if not each.line.is_whole]
+        missing = [each for each in asked if not each.line.is_complete]
         if not missing:
             return
 
         def make() -> None:
             for each in missing:
-                before = set(each.line.ways)
+                before = set(each.line.channels)
                 with self._opening_lock:
-                    self._open_missing_ways(each.line)
-                new = each.line.ways.keys() - before
-                error = self._send(each.line, each.id, each.ends, new) if new else each.line.untold
+                    self._open_missing_channels(each.line)
+                new = each.line.channels.keys() - before
+                error = self._send(each.line, each.id, each.ends, new) if new else each.line.send_problem
                 with self._changed:
                     each.error = error if not before else each.error
                     self._changed.notify_all()
 
         for each in missing:
-            each.error = "" if not each.line.ways else each.error
+            each.error = "" if not each.line.channels else each.error
         self._openers = [thread for thread in self._openers if thread.is_alive()]
         self._openers.append(threading.Thread(target=make, name="studio-stop-line", daemon=True))
         self._openers[-1].start()
 
-    def _chosen(self, names: Iterable[str] | None) -> list[StopLine]:
+    def _select_lines(self, names: Iterable[str] | None) -> list[StopLine]:
         with self._changed:
             if names is None:
                 return [line for line in self._lines.values() if line.target.is_expected]
             return [self._lines[name] for name in dict.fromkeys(names) if name in self._lines]
 
-    def _ask(
+    def _start_request(
         self, line: StopLine, ends: str | None, late: Callable[[RobotStop], object] | None
     ) -> StopRequest:
-        asked = StopRequest(line, _id(), self._clock(), late, ends)
+        asked = StopRequest(line, _new_id(), self._clock(), late, ends)
         with self._changed:
             self._evict_expired()
             self._asked[asked.id] = asked
             if self._view is not None and line.target.robot.dialect != RIZE:
-                asked.serving |= self._serving(asked)
-            for topics, way in line.ways.items():
+                asked.serving |= self._serving_programs(asked)
+            for topics, way in line.channels.items():
                 if self._is_connected_locked(line, way):
-                    asked.sent(topics, asked.sent_s)
+                    asked.record_sent(topics, asked.sent_s)
         asked.error = self._send(line, asked.id, ends)
         return asked
 
-    def _unexpected(self) -> list[StopLine]:
+    def _unexpected_lines(self) -> list[StopLine]:
         with self._changed:
             return [line for line in self._lines.values() if not line.target.is_expected]
 
-    def _is_connected_locked(self, line: StopLine, way: StopWay) -> bool:
+    def _is_connected_locked(self, line: StopLine, way: StopChannel) -> bool:
         # Call with `_changed` held.
         hearers = self._hearers.get(way.topic)
         if hearers is None:
-            hearers = frozenset(hearing(self._view or GraphView(0, 0), way.topic))
+            hearers = frozenset(subscriber_nodes(self._view or GraphView(0, 0), way.topic))
             self._hearers[way.topic] = hearers
         return way.is_connected(line.target, hearers)
 
     def _deliver(self, asked: StopRequest) -> bool:
         # Sends the command on newly connected topics; returns whether nothing is left to deliver.
         with self._changed:
-            if asked.is_answered or asked.line.target.robot.dialect == RIZE:
+            if asked.has_all_replies or asked.line.target.robot.dialect == RIZE:
                 return True
-            ways = dict(asked.line.ways)
+            ways = dict(asked.line.channels)
             new = [
                 topics
                 for topics, way in ways.items()
-                if topics not in asked.delivered and self._is_connected_locked(asked.line, way)
+                if topics not in asked.delivered_topics and self._is_connected_locked(asked.line, way)
             ]
             for topics in new:
-                asked.sent(topics, self._clock())
+                asked.record_sent(topics, self._clock())
         if new:
             self._send(asked.line, asked.id, asked.ends, new)
-        return bool(asked.delivered or asked.error)
+        return bool(asked.delivered_topics or asked.error)
 
     def _send(
         self, line: StopLine, id: str, ends: str | None, only: Iterable[RobotTopics] | None = None
@@ -380,8 +384,8 @@ class RobotStopper:
             if ends is not None:
                 command["ends"] = ends
         with self._changed:
-            ways = [way for topics, way in line.ways.items() if only is None or topics in only]
-        sent, error = False, line.untold
+            ways = [way for topics, way in line.channels.items() if only is None or topics in only]
+        sent, error = False, line.send_problem
         for way in ways:
             try:
                 way.publisher.publish(command)
@@ -392,15 +396,18 @@ class RobotStopper:
 
     # ---- replies
 
-    def _is_news(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
-        if any(each.news(told) for each in asked) or all(each.is_settled for each in asked):
+    def _has_news(self, asked: Sequence[StopRequest], told: set[tuple[str, str]]) -> bool:
+        if any(each.new_replies(told) for each in asked) or all(each.is_settled for each in asked):
             return True
-        return any(each.unknown for each in asked) and self._clock() - self._graph_queried_s >= GRAPH_POLL_S
+        return (
+            any(each.unknown_replies for each in asked)
+            and self._clock() - self._graph_queried_s >= GRAPH_POLL_S
+        )
 
     def _query_graph_if_needed(self, asked: Sequence[StopRequest]) -> None:
         # Queries the graph while the programs of a robot or the publisher of a reply are unknown.
         with self._changed:
-            waits = self._view is None or any(each.unknown for each in asked)
+            waits = self._view is None or any(each.unknown_replies for each in asked)
             now = self._clock()
             looks = waits and (self._view is None or now - self._graph_queried_s >= GRAPH_POLL_S)
             if looks:
@@ -410,60 +417,62 @@ class RobotStopper:
         with self._changed:
             for each in asked:
                 if not each.serving:
-                    each.serving |= self._serving(each)
+                    each.serving |= self._serving_programs(each)
                     self._apply_held_replies_locked(each)  # not late: the Stop was sent just now
 
-    def _add_newcomers(self, asked: Sequence[StopRequest]) -> None:
+    def _add_new_programs(self, asked: Sequence[StopRequest]) -> None:
         # Programs newer than the last graph received the Stop too.
         self._refresh_view()
         with self._changed:
             for each in asked:
                 known = {node: reply for node, reply in each.serving.items() if node != _UNKNOWN_PROGRAM}
-                each.serving = self._serving(each) | known
+                each.serving = self._serving_programs(each) | known
 
     def _refresh_view(self) -> None:
         # Without a reply of the master the previous graph stays valid.
         with suppress(NepError):
-            self.see(self._node.graph(GRAPH_TIMEOUT_S))
+            self.update_graph(self._node.graph(GRAPH_TIMEOUT_S))
 
-    def _serving(self, asked: StopRequest) -> dict[str, RobotStop | None]:
+    def _serving_programs(self, asked: StopRequest) -> dict[str, RobotStop | None]:
         # The programs that must reply, by node: the robot's own, then others that serve it. Programs that
         # receive its commands but can't reply are named.
         target, view = asked.line.target, self._view or GraphView(0, 0)
         if target.robot.dialect == RIZE:
             # RIZE never replies; a robot that could not be reached is not among them.
             return {} if asked.error else {"": RobotStop(asked.line.name, False, None, can_confirm=False)}
-        identity = target.identity or first_to_announce(view, target.robot.topics.description)
+        identity = target.identity or first_announcer(view, target.robot.topics.description)
         own = identity.node_id if identity is not None else _UNKNOWN_PROGRAM
         found: dict[str, RobotStop | None] = {own: None}
-        answering = {node for way in target.ways for node in publishing(view, way.answer)}
-        heard = dict.fromkeys(node for way in target.ways for node in hearing(view, way.command))
+        answering = {node for way in target.topic_sets for node in publisher_nodes(view, way.answer)}
+        heard = dict.fromkeys(
+            node for way in target.topic_sets for node in subscriber_nodes(view, way.command)
+        )
         others = [node for node in heard if node not in (own, self._node.id)]
         for node in [node for node in others if node in answering][:MAX_SERVING]:
             asked.programs[node] = identity_of(view, node).node or node
             found[node] = None
         listening = [node for node in others if node not in answering]
-        programs = [identity_of(view, node).node or node for node in listening[:MAX_LISTENING]]
-        if len(listening) > MAX_LISTENING:
+        programs = [identity_of(view, node).node or node for node in listening[:MAX_NAMED_LISTENERS]]
+        if len(listening) > MAX_NAMED_LISTENERS:
             programs = [
                 ngettext("{count} program", "{count} programs", len(listening)).format(count=len(listening))
             ]
         for node, program in zip(listening, programs, strict=False):
             found[node] = RobotStop(target.robot.name, False, None, can_confirm=False, program=program)
-        for before in target.earlier:
+        for before in target.earlier_programs:
             if before.node_id not in found:
                 asked.programs[before.node_id] = before.node or before.node_id
                 found[before.node_id] = None
         return found
 
-    def _answers(self, messages: Sequence[Message]) -> None:
+    def _on_replies(self, messages: Sequence[Message]) -> None:
         # Checks the sender first: only messages of programs that must answer are decoded.
         late: list[tuple[Callable[[RobotStop], object], RobotStop]] = []
         with self._changed:
             for message in messages:
                 node = self._senders.node_of(message)
                 for asked in self._asked.values():
-                    if message.topic in asked.line.answers:
+                    if message.topic in asked.line.reply_topics:
                         late += self._apply_reply_locked(asked, node, message)
             self._changed.notify_all()
         for tell, said in late:
@@ -475,7 +484,7 @@ class RobotStopper:
         # Processes held replies whose publishers are known now; returns late ones with their callbacks, which
         # the caller invokes after releasing the lock. Replies that are still unknown are discarded: their
         # publisher has not registered, or the master is missing, and then nothing can be proven.
-        held = asked.unknown.pop_all()
+        held = asked.unknown_replies.pop_all()
         known = [(node, message) for message in held if (node := self._senders.node_of(message)) is not None]
         return [late for node, message in known for late in self._apply_reply_locked(asked, node, message)]
 
@@ -484,18 +493,18 @@ class RobotStopper:
     ) -> list[tuple[Callable[[RobotStop], object], RobotStop]]:
         # Applies a reply of a program that must reply; returns the callback if it is late.
         if node is None or not asked.serving:
-            asked.unknown.put(message)
+            asked.unknown_replies.add(message)
             return []
         if node not in asked.serving:
-            if node in asked.foreign or len(asked.foreign) < MAX_SERVING:
-                asked.foreign.setdefault(node, HeldMessages(publishers=1)).put(message)
+            if node in asked.foreign_replies or len(asked.foreign_replies) < MAX_SERVING:
+                asked.foreign_replies.setdefault(node, HeldMessages(publishers=1)).add(message)
             return []
         name = asked.line.name
-        is_news = asked.accept(node, message, self._clock(), partial(said_of_stop, name))
+        is_news = asked.accept(node, message, self._clock(), partial(stop_error_text, name))
         reply = asked.serving[node]
-        if not is_news or reply is None or not asked.is_over or asked.late is None:
+        if not is_news or reply is None or not asked.is_over or asked.on_late is None:
             return []
-        return [(asked.late, reply)]
+        return [(asked.on_late, reply)]
 
     def _report(
         self,
@@ -531,15 +540,15 @@ class RobotStopper:
         over = [id for id, each in self._asked.items() if each.is_over]
         for place, id in enumerate(over):
             each = self._asked[id]
-            if each.is_proven or place < len(over) - LATE_KEPT or now - each.sent_s > LATE_REPLY_S:
+            if each.is_proven or place < len(over) - MAX_LATE_REQUESTS or now - each.sent_s > LATE_REPLY_S:
                 del self._asked[id]
 
 
-def _id() -> str:
+def _new_id() -> str:
     return f"stop-{uuid.uuid4().hex[:12]}"
 
 
-def report_of(
+def stop_and_report(
     stopper: RobotStopper | None,
     names: tuple[str, ...],
     *,
@@ -557,5 +566,5 @@ def report_of(
             )
         except Exception as error:  # noqa: BLE001 - reported as unproven for these robots
             _log.exception("can't stop the robots")
-            why = error_words(error)
-    return StopReport((), 0.0).with_asked(names, why)
+            why = error_text(error)
+    return StopReport((), 0.0).with_unreached(names, why)

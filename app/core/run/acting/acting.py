@@ -21,27 +21,27 @@ from app.core.robots.fleet import Fleet
 from app.core.robots.stop.moved_robots import OnMoved, ignore_moved
 from app.core.run.acting.arming import ARMED_S, Arming, Target
 from app.core.run.acting.calling import CallRecord, ServiceCalls
-from app.core.run.acting.json_text import read_json
+from app.core.run.acting.json_text import parse_json_text
 from app.core.run.acting.sending import Outbox, SendOrder, SendResult
-from app.core.run.acting.sent_log import Asker, SentLog, SentRecord
+from app.core.run.acting.sent_log import SendOrigin, SentLog, SentRecord
 from app.core.run.acting.shelf import (
     MAX_BYTES,
-    KeptMessage,
     NewerShelfError,
+    SavedMessage,
     Shelf,
+    encode_shelf,
     new_message_id,
-    read_shelf,
-    shelf_text,
+    parse_shelf,
 )
-from app.core.run.acting.templates import is_plain, is_written
+from app.core.run.acting.templates import is_editable, is_plain
 from app.core.storage.atomic_file import write_atomically
-from app.core.storage.kept_file import read_kept
+from app.core.storage.kept_file import read_stored
 from app.core.storage.settings import Settings
 from nep.errors import NepError
-from nep.i18n import _, listed, ngettext
+from nep.i18n import _, format_list, ngettext
 
 FILE = "messages.json"
-_MOVED_BY: Mapping[Asker, str] = {"publish": "shelf"}
+_MOVED_BY: Mapping[SendOrigin, str] = {"publish": "shelf"}
 
 
 class ActingSession(Protocol):
@@ -52,7 +52,7 @@ class ActingSession(Protocol):
     console: Console
     source: Source
     fleet: Fleet
-    sources_shown: int
+    source_revision: int
 
     @property
     def is_replaying(self) -> bool:
@@ -65,16 +65,16 @@ class ArmQuestion:
 
     topic: str
     robots: tuple[str, ...]
-    go_on: Callable[[], object]
+    on_allow: Callable[[], object]
 
     @property
-    def sentence(self) -> str:
+    def message(self) -> str:
         """Sentence about the motion; robots that Studio doesn't know are not named."""
         template = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
         if not self.robots:
             template = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")
             return template.format(topic=self.topic)
-        return template.format(topic=self.topic, robots=listed(list(self.robots)))
+        return template.format(topic=self.topic, robots=format_list(list(self.robots)))
 
 
 class SessionActing:
@@ -111,7 +111,7 @@ class SessionActing:
         self.sent_at_s: dict[str, float] = {}
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-shelf")
         self._is_newer = False
-        self._source_seen = session.sources_shown
+        self._source_seen = session.source_revision
         self.path: Path | None = session.settings.path.with_name(FILE)
         self.shelf = self._read(self.path)
         self._written = self.shelf.revision
@@ -138,7 +138,7 @@ class SessionActing:
         """Switch off and stop all sending; nothing is sent after this returns. Thread-safe."""
         was_on = self.arming.disarm()
         self.question, self.recorded_commands = None, frozenset()
-        self.outbox.end_all()
+        self.outbox.stop_all()
         if was_on:
             self.revision += 1
             self._log_to_console("info", words := _("no longer armed"))
@@ -151,10 +151,10 @@ class SessionActing:
 
         For a topic that moves robots, `question` is opened first, unless ``is_sure`` is True.
         """
-        if not is_sure and self.asks(target):
-            names = tuple(name for name in self._moved(target) if name != target.name)
+        if not is_sure and self.needs_confirmation(target):
+            names = tuple(name for name in self._moved_robots(target) if name != target.name)
             self.question = ArmQuestion(
-                target.name, names, partial(self._allow_surely, target, self.arming.turn, then)
+                target.name, names, partial(self._allow_confirmed, target, self.arming.turn, then)
             )
             self.revision += 1
             return ""
@@ -165,7 +165,7 @@ class SessionActing:
             then()
         return ""
 
-    def _allow_surely(self, target: Target, turn: int, then: Callable[[], object] | None) -> None:
+    def _allow_confirmed(self, target: Target, turn: int, then: Callable[[], object] | None) -> None:
         if turn == self.arming.turn:
             self.allow(target, then, is_sure=True)
 
@@ -174,69 +174,69 @@ class SessionActing:
         question, self.question = self.question, None
         self.revision += 1
         if question is not None and let:
-            question.go_on()
+            question.on_allow()
 
     def forbid(self, target: Target) -> None:
         """Disallow sending to a target."""
         self.arming.forbid(target)
         for each in self.outbox.all_repeated:
             if each.order.target == target:
-                self.outbox.end(each.order.id)
+                self.outbox.stop(each.order.id)
         self.revision += 1
 
-    def asks(self, target: Target) -> bool:
+    def needs_confirmation(self, target: Target) -> bool:
         """Return True if the user must be asked before sending to a target, because that moves a robot."""
         if target.kind != "topic" or self.arming.is_confirmed(target.name):
             return False
-        return target.name in self.recorded_commands or bool(self._moved(target))
+        return target.name in self.recorded_commands or bool(self._moved_robots(target))
 
     @property
     def is_asking(self) -> bool:
         """True if a question is open: `question`, or the one before a real robot moves for the first time."""
         return self.question is not None or self._session.fleet.permission.question is not None
 
-    def _moved(self, target: Target) -> tuple[str, ...]:
+    def _moved_robots(self, target: Target) -> tuple[str, ...]:
         return self.gate.moved_by(target.name) if target.kind == "topic" else ()
 
-    def may_go_on(self, target: Target) -> bool:
+    def may_continue(self, target: Target) -> bool:
         """Return True if repeated sending may continue.
 
         False if the topic now moves a robot, because one has connected.
         """
         is_permitted = target.kind != "topic" or self.gate.is_permitted(target.name)
-        return is_permitted and not self.asks(target)
+        return is_permitted and not self.needs_confirmation(target)
 
-    def tell_moved(self, target: Target, asker: Asker) -> None:
+    def notify_moved(self, target: Target, asker: SendOrigin) -> None:
         """Report the robots that a message moves to `on_moved`. Call this before sending."""
-        moved = self._moved(target)
+        moved = self._moved_robots(target)
         if moved:
             self.on_moved(moved, _MOVED_BY.get(asker, asker))
 
     # ---- messages
 
-    def new_message(self, topic: str, msg_type: str, text: str) -> KeptMessage | None:
+    def new_message(self, topic: str, msg_type: str, text: str) -> SavedMessage | None:
         """Add a message to the shelf; return None if the shelf is full."""
         name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
-        message = KeptMessage(new_message_id(), name, topic, msg_type or "json", text)
-        return message if self.shelf.put(message) else None
+        message = SavedMessage(new_message_id(), name, topic, msg_type or "json", text)
+        return message if self.shelf.set_message(message) else None
 
-    def problem_of(self, message: KeptMessage) -> str:
+    def problem_of(self, message: SavedMessage) -> str:
         """Return why a message can't be sent, or "" if it can be sent once armed."""
-        if not is_written(message.msg_type):
+        if not is_editable(message.msg_type):
             template = _("Messages of type {type} can't be edited by hand.")
             return template.format(type=message.msg_type)
-        read = None if is_plain(message.msg_type) else read_json(message.text)
+        read = None if is_plain(message.msg_type) else parse_json_text(message.text)
         if read is not None and read.fault is not None:
-            return read.fault.sentence  # checked before the topic, so that the invalid line is shown
+            return read.fault.message  # checked before the topic, so that the invalid line is shown
         if not message.topic.strip():
             return _("Choose a topic first.")
         if read is None:
             return ""
         typed = {name for name, value in message.values if value.strip()}
-        missing = [name for name in read.to_fill if name not in typed]
+        missing = [name for name in read.manual_placeholders if name not in typed]
         return _("Fill in “{name}” first.").format(name=missing[0]) if missing else ""
 
-    def send(self, message: KeptMessage, *, rate_hz: float = 0.0) -> str:
+    def send(self, message: SavedMessage, *, rate_hz: float = 0.0) -> str:
         """Send a message once or at a rate; return the reason why that isn't possible, or "".
 
         If sending is switched off, it is switched on for this topic alone; for a robot's topic the user is
@@ -252,21 +252,21 @@ class SessionActing:
 
     def send_order(self, order: SendOrder, *, rate_hz: float = 0.0) -> str:
         """Send an order in the same way as `send`; return the reason why that isn't possible, or ""."""
-        not_now = self._replay_obstacle()
+        not_now = self._replay_problem()
         if not_now:
             return not_now
         not_armed = self.ready(order.target, partial(self.send_order, order, rate_hz=rate_hz))
         if not_armed is not None:
             return not_armed
-        self.tell_moved(order.target, order.asker)
+        self.notify_moved(order.target, order.origin)
         if not rate_hz:
             self.outbox.send(order)
-        elif not self.outbox.begin(order, rate_hz):
+        elif not self.outbox.start(order, rate_hz):
             return _("No more messages can be sent repeatedly. Stop one first.")
         self.revision += 1
         return ""
 
-    def _replay_obstacle(self) -> str:
+    def _replay_problem(self) -> str:
         return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
     def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
@@ -278,30 +278,30 @@ class SessionActing:
             why_not = self.arm()
             if why_not:
                 return why_not
-        if not self.arming.allows(target) or self.asks(target):
+        if not self.arming.allows(target) or self.needs_confirmation(target):
             return self.allow(target, go_on)
         turn = self.arming.turn
 
-        def still() -> None:
+        def resume_if_unchanged() -> None:
             if turn == self.arming.turn:
                 go_on()
 
         if target.kind != "topic":
             return None
-        return None if self.gate.permits(target.name, still) else ""
+        return None if self.gate.request_permission(target.name, resume_if_unchanged) else ""
 
     def repeat(self, number: int) -> str:
         """Repeat an entry of `sent` while its target is armed; return why that isn't possible, or ""."""
         record = self.sent.get(number)
-        if record is None or record.again is None:
+        if record is None or record.repeat is None:
             return _("This can't be sent again.")
         if not self.arming.allows(record.target):
             return _("Sending to {name} is not armed. Arm it first.").format(name=record.name)
-        return record.again()
+        return record.repeat()
 
-    def end(self, message_id: str) -> None:
+    def stop_sending(self, message_id: str) -> None:
         """Stop sending a message."""
-        self.outbox.end(message_id)
+        self.outbox.stop(message_id)
         self.revision += 1
 
     # ---- services
@@ -312,10 +312,10 @@ class SessionActing:
         Sending is switched on for this service if necessary.
         """
         try:
-            request = read_json(text).filled({})
+            request = parse_json_text(text).fill({})
         except NepError as error:
             return str(error)
-        not_now = self._replay_obstacle()
+        not_now = self._replay_problem()
         if not_now:
             return not_now
         not_armed = self.ready(Target("service", service), partial(self.call, service, text, timeout_s))
@@ -325,7 +325,7 @@ class SessionActing:
             self.calls.call(service, request, text, timeout_s)
         except NepError as error:
             return str(error)
-        self.shelf.remember(service, text)
+        self.shelf.set_request(service, text)
         self.revision += 1
         return ""
 
@@ -333,22 +333,22 @@ class SessionActing:
 
     def tick(self) -> None:
         """Process results. Switch off when the time has elapsed or another source is shown."""
-        if self._session.sources_shown != self._source_seen:
-            self._source_seen = self._session.sources_shown
+        if self._session.source_revision != self._source_seen:
+            self._source_seen = self._session.source_revision
             self.disarm()
         if self.arming.is_over:
             self.disarm()
         for each in self.outbox.all_repeated:  # a robot that this topic moves may have connected
             target = each.order.target
-            if not self.may_go_on(target):
-                self.outbox.end(each.order.id)
+            if not self.may_continue(target):
+                self.outbox.stop(each.order.id)
                 self.ready(target, _ignore)
         for result in self.outbox.pop_results():
             self._apply_result(result)
         for record in self.calls.tick():
             self.revision += 1
             level = "info" if record.state == "answered" else "warn"
-            self._log_to_console(level, f"{record.service}: {call_words(record)}")
+            self._log_to_console(level, f"{record.service}: {call_text(record)}")
             self._log_call(record)
 
     def _apply_result(self, result: SendResult) -> None:
@@ -361,22 +361,22 @@ class SessionActing:
                 del known[gone]
         self.revision += 1
         is_bad = result.kind == "failed"
-        words = f"{order.name}, {result_words(result)}"
+        words = f"{order.name}, {result_text(result)}"
         self._log_to_console("warn" if is_bad else "info", f"{order.topic}: {words}")
         was_once = result.kind == "sent"
         again = partial(self.send_order, order) if was_once or (is_bad and not result.count) else None
         self._add_record(
-            order.asker, order.topic, words,
+            order.origin, order.topic, words,
             sent=1 if was_once else result.count, is_bad=is_bad, text=result.text, source=order.source,
             again=again,
         )  # fmt: skip
-        if order.told is not None:
-            order.told(result)
+        if order.on_result is not None:
+            order.on_result(result)
 
     def _log_call(self, record: CallRecord) -> None:
         self._add_record(
-            "service", record.service, call_words(record),
-            sent=1 if record.was_begun else 0, is_bad=record.state != "answered",
+            "service", record.service, call_text(record),
+            sent=1 if record.was_started else 0, is_bad=record.state != "answered",
             text=record.request, source=record.request,
             again=partial(self.call, record.service, record.request, record.timeout_s),
         )  # fmt: skip
@@ -388,10 +388,11 @@ class SessionActing:
         self._add_record("replay", target.name, words, sent=sent, is_bad=level == "warn")
 
     def _add_record(
-        self, asker: Asker, name: str, words: str, *, sent: int = 0, is_bad: bool = False, text: str = "",
+        self, asker: SendOrigin, name: str, words: str, *, sent: int = 0, is_bad: bool = False,
+        text: str = "",
         source: str = "", again: Callable[[], str] | None = None,
     ) -> None:  # fmt: skip
-        self.sent.put(SentRecord(self._clock_s(), asker, name, words, is_bad, text, source, again), sent)
+        self.sent.add(SentRecord(self._clock_s(), asker, name, words, is_bad, text, source, again), sent)
 
     def _log_to_console(self, level: str, words: str) -> None:
         self._session.console.add(level, "studio", words)
@@ -406,7 +407,7 @@ class SessionActing:
             self._written = -1  # retried at the next check
             detail = _("They are kept until Studio closes: {reason}.").format(reason=error.strerror or error)
             title = _("Changes to saved messages can't be saved.")
-            self._session.alerts.put("messages:kept", "warn", title, detail, count=0)
+            self._session.alerts.raise_alert("messages:kept", "warn", title, detail, count=0)
 
     def close(self) -> None:
         """Stop all sending and save the shelf."""
@@ -427,43 +428,43 @@ class SessionActing:
         kept = Shelf(self.shelf.messages, self.shelf.requests)
 
         def write() -> bool:
-            write_atomically(path, shelf_text(kept), durable=False, private=True)
+            write_atomically(path, encode_shelf(kept), durable=False, private=True)
             return True
 
-        self._worker.ask(FILE, write)
+        self._worker.submit(FILE, write)
 
     def _read(self, path: Path) -> Shelf:
         def parse(data: bytes) -> tuple[Shelf, str]:
-            shelf, unread = read_shelf(data)
+            shelf, unread = parse_shelf(data)
             template = ngettext("{count} message can't be read", "{count} messages can't be read", unread)
             return shelf, template.format(count=unread) if unread else ""
 
-        kept = read_kept(path, parse, NewerShelfError, MAX_BYTES)
+        kept = read_stored(path, parse, NewerShelfError, MAX_BYTES)
         self._is_newer = kept.is_newer
         if kept.problem:
             title = _("Saved messages could not be read.")
-            self._session.alerts.put("messages:file", "warn", title, kept.problem)
+            self._session.alerts.raise_alert("messages:file", "warn", title, kept.problem)
         return kept.value if kept.value is not None else Shelf()
 
 
 def _ignore() -> None: ...
 
 
-def result_words(result: SendResult) -> str:
+def result_text(result: SendResult) -> str:
     """Format a result: "received by 2", "412 sent, 3 left out, being late"."""
     if result.kind == "sent":
-        return heard_words(result.heard)
+        return subscribers_text(result.subscriber_count)
     if result.kind == "began":
         return _("started")
     words = ngettext("{count} sent", "{count} sent", result.count).format(count=result.count)
     if result.skipped:
         left_out = ngettext("{count} late message skipped", "{count} late messages skipped", result.skipped)
         words = f"{words}, {left_out.format(count=result.skipped)}"
-    parts = (words if result.count else "", result.sentence)
+    parts = (words if result.count else "", result.message)
     return ", ".join(filter(None, parts)) or words
 
 
-def heard_words(count: int) -> str:
+def subscribers_text(count: int) -> str:
     """Format the number of subscribers: "received by 2", "no subscribers"."""
     return (
         ngettext("received by {count}", "received by {count}", count).format(count=count)
@@ -472,14 +473,14 @@ def heard_words(count: int) -> str:
     )
 
 
-def call_words(record: CallRecord) -> str:
+def call_text(record: CallRecord) -> str:
     """Format the result of a call, such as the time until the reply."""
     if record.state == "answered":
-        return _("replied in {time}").format(time=time_words(record.took_s))
-    return record.sentence
+        return _("replied in {time}").format(time=duration_text(record.duration_s))
+    return record.error
 
 
-def time_words(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Format a measured duration: "412 ms", "1.42 s"."""
     if seconds < 1:
         return _("{count} ms").format(count=max(1, round(seconds * 1000)))

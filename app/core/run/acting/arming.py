@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 ARMED_S = 300.0
 MIN_S, MAX_S = 60.0, 3600.0
-MAX_NAMES = 20
+MAX_TARGETS = 20
 
 
 class Target(NamedTuple):
@@ -45,7 +45,7 @@ class Arming:
         return self._is_on and self._clock() >= self._until_s
 
     @property
-    def left_s(self) -> float:
+    def remaining_s(self) -> float:
         """Remaining time in seconds."""
         return max(0.0, self._until_s - self._clock()) if self._is_on else 0.0
 
@@ -74,7 +74,7 @@ class Arming:
         ``is_confirmed`` is True if the user has confirmed that this moves a robot.
         """
         with self._lock:
-            if not self.is_on or (target not in self._targets and len(self._targets) >= MAX_NAMES):
+            if not self.is_on or (target not in self._targets and len(self._targets) >= MAX_TARGETS):
                 return False
             if target not in self._targets:
                 self._targets = (*self._targets, target)
@@ -104,7 +104,7 @@ class Arming:
                 self.revision += 1
             return was_on
 
-    def if_armed(self, turn: int, target: Target, do: Callable[[], object]) -> bool:
+    def run_if_armed(self, turn: int, target: Target, do: Callable[[], object]) -> bool:
         """Call ``do`` if the target is allowed and the turn is still ``turn``; return True if it was called.
 
         The lock is held meanwhile, so ``do`` must not block.

@@ -11,10 +11,10 @@ from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from app.core.faults import error_words
+from app.core.faults import error_text
 from app.core.network.source import Job
 from app.core.run.acting.arming import Arming, Target
-from app.core.run.acting.json_text import pretty
+from app.core.run.acting.json_text import format_json
 from nep.errors import NepError, NoServerError, ServiceError, WaitTimeoutError
 from nep.i18n import _, number
 from nep.nodes.node import Node
@@ -22,10 +22,10 @@ from nep.patterns.services.client import Client
 
 TIMEOUT_S = 2.0
 MIN_S, MAX_S = 0.1, 120.0
-HISTORY_KEPT = 200
-ANSWERS_KEPT = 20
+MAX_RECORDS = 200
+MAX_REPLIES = 20
 """Number of newest calls whose replies are stored."""
-ANSWER_LETTERS = 1_000_000
+MAX_REPLY_LENGTH = 1_000_000
 MAX_CLIENTS = 20
 
 State = Literal["waiting", "answered", "failed", "canceled"]
@@ -50,13 +50,13 @@ class CallRecord:
     at_s: float
     timeout_s: float
     state: State = "waiting"
-    took_s: float = 0.0
-    sentence: str = ""
-    answer: object = None
+    duration_s: float = 0.0
+    error: str = ""
+    reply: object = None
     text: str = ""
-    is_cut: bool = False
-    is_kept: bool = True
-    was_begun: bool = False
+    is_truncated: bool = False
+    is_retained: bool = True
+    was_started: bool = False
     """True if the request was sent."""
 
 
@@ -66,20 +66,20 @@ class _CallInFlight:
 
     number: int
     turn: int
-    asked_s: float
+    requested_s: float
     future: Future[object] | None = None
     is_over: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class _Ended:
+class _CallResult:
     number: int
     state: State
-    took_s: float
-    sentence: str = ""
-    answer: object = None
+    duration_s: float
+    error: str = ""
+    reply: object = None
     text: str = ""
-    is_cut: bool = False
+    is_truncated: bool = False
 
 
 class ServiceCalls:
@@ -98,9 +98,9 @@ class ServiceCalls:
         # `submit` runs a job with Studio's node (`app.core.network.source.Source.submit`).
         self._arming, self._submit, self._clock, self._clock_s = arming, submit, clock, clock_s
         self._numbers = itertools.count(1)
-        self._records: deque[CallRecord] = deque(maxlen=HISTORY_KEPT)
+        self._records: deque[CallRecord] = deque(maxlen=MAX_RECORDS)
         self._lock = threading.Lock()
-        self._ended: deque[_Ended] = deque(maxlen=HISTORY_KEPT)
+        self._ended: deque[_CallResult] = deque(maxlen=MAX_RECORDS)
         self._in_flight: _CallInFlight | None = None
         self._done: list[CallRecord] = []
         self._clients: dict[str, Client] = {}
@@ -112,32 +112,32 @@ class ServiceCalls:
         return self._records
 
     @property
-    def waiting(self) -> CallRecord | None:
+    def in_flight(self) -> CallRecord | None:
         """Call in flight, or None."""
         last = self._records[-1] if self._records else None
         return last if last is not None and last.state == "waiting" else None
 
     @property
-    def waited_s(self) -> float:
+    def elapsed_s(self) -> float:
         """Seconds since the start of the call in flight; 0 if there is none."""
-        return self._clock() - self._in_flight.asked_s if self._in_flight is not None else 0.0
+        return self._clock() - self._in_flight.requested_s if self._in_flight is not None else 0.0
 
     def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
         """Call a service; ``words`` is the request as shown to the user.
 
         Raises `NepError` while another call is in flight.
         """
-        if self.waiting is not None:
-            raise NepError(_("Wait for the reply of {service} first.").format(service=self.waiting.service))
+        if self.in_flight is not None:
+            raise NepError(_("Wait for the reply of {service} first.").format(service=self.in_flight.service))
         timeout_s = min(MAX_S, max(MIN_S, timeout_s))
         record = CallRecord(next(self._numbers), service, words, self._clock_s(), timeout_s)
         now = _CallInFlight(record.number, self._arming.turn, self._clock())
         self._in_flight = now
         self._add_record(record)
-        self._submit("", lambda node: self._begin(node, now, record, request))
+        self._submit("", lambda node: self._start(node, now, record, request))
         return record
 
-    def give_up(self) -> None:
+    def cancel(self) -> None:
         """Stop waiting for the reply; the server may still execute the call."""
         self._cancel("canceled", _("cancelled; the server may still execute the call"))
 
@@ -149,9 +149,9 @@ class ServiceCalls:
             if place is None or self._records[place].state != "waiting":
                 continue
             self._apply(place, ended)
-        waiting, now = self.waiting, self._in_flight
+        waiting, now = self.in_flight, self._in_flight
         has_begun = now is None or now.future is not None  # from then on, the client measures the timeout
-        if waiting is not None and not has_begun and self.waited_s > waiting.timeout_s:
+        if waiting is not None and not has_begun and self.elapsed_s > waiting.timeout_s:
             error = _("no master was found within {time} s").format(time=number(waiting.timeout_s))
             self._cancel("failed", error)
         done, self._done = self._done, []
@@ -159,7 +159,7 @@ class ServiceCalls:
 
     def clear(self) -> None:
         """Remove all past calls."""
-        waiting = self.waiting
+        waiting = self.in_flight
         self._records.clear()
         if waiting is not None:
             self._records.append(waiting)
@@ -174,21 +174,21 @@ class ServiceCalls:
 
     def _add_record(self, record: CallRecord) -> None:
         self._records.append(record)
-        for place in range(len(self._records) - ANSWERS_KEPT):
-            if self._records[place].is_kept:
-                self._records[place] = replace(self._records[place], answer=None, text="", is_kept=False)
+        for place in range(len(self._records) - MAX_REPLIES):
+            if self._records[place].is_retained:
+                self._records[place] = replace(self._records[place], reply=None, text="", is_retained=False)
         self.revision += 1
 
-    def _apply(self, place: int, ended: _Ended) -> None:
+    def _apply(self, place: int, ended: _CallResult) -> None:
         updated = replace(
             self._records[place],
             state=ended.state,
-            took_s=ended.took_s,
-            sentence=ended.sentence,
-            answer=ended.answer,
+            duration_s=ended.duration_s,
+            error=ended.error,
+            reply=ended.reply,
             text=ended.text,
-            is_cut=ended.is_cut,
-            was_begun=self._in_flight is not None and self._in_flight.future is not None,
+            is_truncated=ended.is_truncated,
+            was_started=self._in_flight is not None and self._in_flight.future is not None,
         )
         self._records[place] = updated
         self._done.append(updated)
@@ -196,7 +196,7 @@ class ServiceCalls:
         self.revision += 1
 
     def _cancel(self, state: State, sentence: str) -> None:
-        now, waiting = self._in_flight, self.waiting
+        now, waiting = self._in_flight, self.in_flight
         if now is None or waiting is None:
             return
         with self._lock:
@@ -204,9 +204,9 @@ class ServiceCalls:
             future = now.future
         if future is not None:
             future.cancel()
-        self._apply(len(self._records) - 1, _Ended(now.number, state, self.waited_s, sentence))
+        self._apply(len(self._records) - 1, _CallResult(now.number, state, self.elapsed_s, sentence))
 
-    def _begin(self, node: Node, now: _CallInFlight, record: CallRecord, request: object) -> None:
+    def _start(self, node: Node, now: _CallInFlight, record: CallRecord, request: object) -> None:
         # Runs in the network thread.
         began_s = time.monotonic()
         try:
@@ -219,14 +219,14 @@ class ServiceCalls:
                         return
                     now.future = client.call_async(request, record.timeout_s)
 
-            if not self._arming.if_armed(now.turn, target, call_it):
+            if not self._arming.run_if_armed(now.turn, target, call_it):
                 raise NepError(_("not called: no longer armed"))
         except Exception as error:  # noqa: BLE001 - reported as the result of this call
-            text = str(error) if isinstance(error, NepError) else error_words(error)
-            self._ended.append(_Ended(record.number, "failed", 0.0, text))
+            text = str(error) if isinstance(error, NepError) else error_text(error)
+            self._ended.append(_CallResult(record.number, "failed", 0.0, text))
             return
         if now.future is not None:
-            now.future.add_done_callback(lambda future: self._answered(record, began_s, future))
+            now.future.add_done_callback(lambda future: self._on_reply(record, began_s, future))
 
     def _client(self, node: Node, service: str) -> Client:
         known = self._clients.get(service)
@@ -236,25 +236,34 @@ class ServiceCalls:
             known = self._clients[service] = node.new_client(service)
         return known
 
-    def _answered(self, record: CallRecord, began_s: float, future: Future[object]) -> None:
+    def _on_reply(self, record: CallRecord, began_s: float, future: Future[object]) -> None:
         # Runs in the client's thread.
         took_s = time.monotonic() - began_s
         try:
             answer = future.result()
-            text = pretty(answer)
+            text = format_json(answer)
         except CancelledError:
             return
         except Exception as error:  # noqa: BLE001 - the server's callback may raise anything
-            self._ended.append(_Ended(record.number, "failed", took_s, reason_of(error, record.timeout_s)))
+            self._ended.append(
+                _CallResult(record.number, "failed", took_s, failure_reason(error, record.timeout_s))
+            )
             return
-        is_cut = len(text) > ANSWER_LETTERS
+        is_cut = len(text) > MAX_REPLY_LENGTH
         kept = None if is_cut else answer
         self._ended.append(
-            _Ended(record.number, "answered", took_s, answer=kept, text=text[:ANSWER_LETTERS], is_cut=is_cut)
+            _CallResult(
+                record.number,
+                "answered",
+                took_s,
+                reply=kept,
+                text=text[:MAX_REPLY_LENGTH],
+                is_truncated=is_cut,
+            )
         )
 
 
-def reason_of(error: Exception, timeout_s: float) -> str:
+def failure_reason(error: Exception, timeout_s: float) -> str:
     """Return why there is no reply, such as a timeout or the reason given by the server."""
     if isinstance(error, NoServerError):
         return _("no server")
@@ -262,4 +271,4 @@ def reason_of(error: Exception, timeout_s: float) -> str:
         return _("no reply within {time} s").format(time=number(timeout_s))
     if isinstance(error, ServiceError):
         return _("rejected: {reason}").format(reason=error.reason)
-    return str(error) if isinstance(error, NepError) else error_words(error)
+    return str(error) if isinstance(error, NepError) else error_text(error)

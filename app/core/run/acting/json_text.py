@@ -18,7 +18,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault
 
-MAX_LETTERS = 256 * 1024
+MAX_LENGTH = 256 * 1024
 """Maximum length of an editable text; a longer text is not parsed while typing."""
 NEW_ID, NOW = "new id", "now"
 AUTOMATIC: Mapping[str, Callable[[], object]] = {
@@ -26,7 +26,7 @@ AUTOMATIC: Mapping[str, Callable[[], object]] = {
     NOW: lambda: round(time.time(), 6),
 }
 # Strings are matched first, so that braces inside them don't count; an open one ends with its line.
-_PLACE = re.compile(r'"(?:[^"\\\n]|\\.)*"?|\{ ?(?P<name>[^\W\d][\w ]{0,38}\w|[^\W\d]) ?\}')
+_PLACEHOLDER = re.compile(r'"(?:[^"\\\n]|\\.)*"?|\{ ?(?P<name>[^\W\d][\w ]{0,38}\w|[^\W\d]) ?\}')
 
 
 class JsonText:
@@ -42,11 +42,11 @@ class JsonText:
         self.places: tuple[str, ...] = ()
         self.fault: JsonFault | None = None
         self._spans: list[tuple[int, int, str]] = []
-        if len(text) > MAX_LETTERS:
+        if len(text) > MAX_LENGTH:
             reason = _("the text has more than {count} characters; send it with nep topic pub")
-            self.fault = JsonFault(1, 1, reason.format(count=MAX_LETTERS))
+            self.fault = JsonFault(1, 1, reason.format(count=MAX_LENGTH))
             return
-        for found in _PLACE.finditer(text):
+        for found in _PLACEHOLDER.finditer(text):
             if found["name"] is not None:
                 self._spans.append((found.start(), found.end(), found["name"]))
         self.places = tuple(dict.fromkeys(name for _start, _end, name in self._spans))
@@ -58,20 +58,20 @@ class JsonText:
         self.fault = find_json_fault("".join([*parts, text[after:]]))
 
     @property
-    def to_fill(self) -> tuple[str, ...]:
+    def manual_placeholders(self) -> tuple[str, ...]:
         """Placeholders that the user must fill in."""
         return tuple(name for name in self.places if name not in AUTOMATIC)
 
     @property
-    def fills_itself(self) -> bool:
+    def has_automatic(self) -> bool:
         """True if the text contains automatic placeholders, so that each message differs."""
         return any(name in AUTOMATIC for name in self.places)
 
-    def filled(self, values: Mapping[str, object]) -> object:
+    def fill(self, values: Mapping[str, object]) -> object:
         """Return the value with its placeholders filled in. Raises `NepError` if that isn't possible."""
         if self.fault is not None:
-            raise NepError(self.fault.sentence)
-        missing = [name for name in self.to_fill if name not in values]
+            raise NepError(self.fault.message)
+        missing = [name for name in self.manual_placeholders if name not in values]
         if missing:
             raise NepError(_("Fill in “{name}” first.").format(name=missing[0]))
         parts, after = [], 0
@@ -82,18 +82,18 @@ class JsonText:
         whole = "".join([*parts, self.text[after:]])
         fault = find_json_fault(whole)
         if fault is not None:  # a number as a field name
-            raise NepError(fault.sentence)
+            raise NepError(fault.message)
         parsed: object = json.loads(whole)
         return parsed
 
 
 @lru_cache(maxsize=64)
-def read_json(text: str) -> JsonText:
+def parse_json_text(text: str) -> JsonText:
     """Parse JSON text with placeholders. Cached, because lists request the same text on every refresh."""
     return JsonText(text)
 
 
-def value_typed(text: str) -> object:
+def parse_typed_value(text: str) -> object:
     """Parse a typed value: JSON, a number with a decimal comma, or otherwise the text itself."""
     stripped = text.strip()
     if stripped and find_json_fault(stripped) is None:
@@ -104,7 +104,7 @@ def value_typed(text: str) -> object:
         return text
 
 
-def pretty(value: object) -> str:
+def format_json(value: object) -> str:
     """Format a value as editable JSON. Values that JSON lacks become strings."""
     return json.dumps(value, indent=2, ensure_ascii=False, default=_to_json_value)
 

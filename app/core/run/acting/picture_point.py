@@ -12,7 +12,7 @@ TYPES = ("json", Point.MSG_TYPE, "geometry_msgs/PointStamped")
 Button = Literal["left", "middle"]
 
 
-def topic_of(pictures: str) -> str:
+def default_topic(pictures: str) -> str:
     """Return the default topic for points in the images of topic ``pictures``."""
     return f"{pictures.rstrip('/')}/point"
 
@@ -35,7 +35,7 @@ class PicturePoint:
     button: Button = "left"
 
     @property
-    def share(self) -> tuple[float, float]:
+    def relative_position(self) -> tuple[float, float]:
         """Centre of the pixel as fractions of the image's width and height."""
         return (self.x + 0.5) / max(1, self.width), (self.y + 0.5) / max(1, self.height)
 

@@ -11,12 +11,12 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from app.core.faults import error_words
+from app.core.faults import error_text
 from app.core.network.source import Job
 from app.core.robots.motion.gate import MotionGate
 from app.core.run.acting.arming import Arming, Target
-from app.core.run.acting.json_text import pretty
-from app.core.run.acting.sent_log import KEPT_BYTES, Asker
+from app.core.run.acting.json_text import format_json
+from app.core.run.acting.sent_log import MAX_TEXT_BYTES, SendOrigin
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
@@ -29,7 +29,7 @@ MAX_AGE_S = 10.0
 MAX_CONCURRENT = 10
 """Maximum number of messages sent repeatedly at the same time."""
 MAX_PUBLISHERS = 20
-RESULTS_KEPT = 200
+MAX_RESULTS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +47,10 @@ class SendOrder:
     name: str
     topic: str
     msg_type: str
-    make: Callable[[], object]
+    make_payload: Callable[[], object]
     source: str = ""
-    asker: Asker = "publish"
-    told: Callable[[SendResult], object] | None = None
+    origin: SendOrigin = "publish"
+    on_result: Callable[[SendResult], object] | None = None
 
     @property
     def target(self) -> Target:
@@ -72,15 +72,15 @@ class SendResult:
 
     order: SendOrder
     kind: str
-    sentence: str = ""
-    heard: int = 0
+    message: str = ""
+    subscriber_count: int = 0
     count: int = 0
     skipped: int = 0
     text: str = ""
 
 
 @dataclass(slots=True, eq=False)
-class Repeated:
+class RepeatedMessage:
     """Message that is sent repeatedly. Only the sending thread changes it."""
 
     order: SendOrder
@@ -91,12 +91,12 @@ class Repeated:
     due_s: float
     count: int = 0
     skipped: int = 0
-    heard: int = 0
+    subscriber_count: int = 0
     since_s: float = 0.0
     is_over: threading.Event = field(default_factory=threading.Event)
 
     @property
-    def rate_now_hz(self) -> float:
+    def measured_hz(self) -> float:
         """Measured rate in messages per second; 0 before the second message."""
         passed_s = time.monotonic() - self.since_s
         return (self.count - 1) / passed_s if self.count > 1 and passed_s > 0 else 0.0
@@ -121,9 +121,9 @@ class Outbox:
         self._arming, self._submit, self._clock = arming, submit, clock
         self._changed = threading.Condition()
         self._publishers: dict[tuple[str, str], Publisher] = {}
-        self._repeated: dict[str, Repeated] = {}
+        self._repeated: dict[str, RepeatedMessage] = {}
         self._starting: dict[str, object] = {}
-        self._results: deque[SendResult] = deque(maxlen=RESULTS_KEPT)
+        self._results: deque[SendResult] = deque(maxlen=MAX_RESULTS)
         self._thread: threading.Thread | None = None
         self._is_closed = False
 
@@ -134,18 +134,18 @@ class Outbox:
             taken.append(self._results.popleft())
         return taken
 
-    def repeated(self, order_id: str) -> Repeated | None:
+    def repeated(self, order_id: str) -> RepeatedMessage | None:
         """Return the state of a repeated message; None if it isn't being sent."""
         with self._changed:
             return self._repeated.get(order_id)
 
     @property
-    def all_repeated(self) -> tuple[Repeated, ...]:
+    def all_repeated(self) -> tuple[RepeatedMessage, ...]:
         """All repeated messages."""
         with self._changed:
             return tuple(self._repeated.values())
 
-    def is_going(self, order_id: str) -> bool:
+    def is_sending(self, order_id: str) -> bool:
         """Return True if a message is being sent repeatedly or is about to be."""
         with self._changed:
             return order_id in self._repeated or order_id in self._starting
@@ -158,18 +158,18 @@ class Outbox:
 
         def send_it(node: Node) -> None:
             publisher = self._publisher(node, order)
-            value = order.make()
+            value = order.make_payload()
             payload = codec_for(order.msg_type).encode(value)
             self._check(node, order, publisher)
-            if self._arming.if_armed(turn, order.target, lambda: publisher.publish(payload)):
-                text = _text_of(value) if len(payload.data) <= KEPT_BYTES else ""
-                self._add_result(SendResult(order, "sent", heard=publisher.subscribers, text=text))
+            if self._arming.run_if_armed(turn, order.target, lambda: publisher.publish(payload)):
+                text = _text_of(value) if len(payload.data) <= MAX_TEXT_BYTES else ""
+                self._add_result(SendResult(order, "sent", subscriber_count=publisher.subscribers, text=text))
             else:
                 self._add_result(SendResult(order, "failed", _("not sent: no longer armed")))
 
-        self._submit("", self._guarded(order, asked_s, send_it))
+        self._submit("", self._guard(order, asked_s, send_it))
 
-    def begin(self, order: SendOrder, rate_hz: float) -> bool:
+    def start(self, order: SendOrder, rate_hz: float) -> bool:
         """Send a message repeatedly; return False if `MAX_CONCURRENT` is reached."""
         rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
@@ -178,11 +178,13 @@ class Outbox:
                 return False
             self._starting[order.id] = token
 
-        def begin_it(node: Node) -> None:
-            codec_for(order.msg_type).encode(order.make())  # errors are reported before anything is sent
+        def start_job(node: Node) -> None:
+            codec_for(order.msg_type).encode(
+                order.make_payload()
+            )  # errors are reported before anything is sent
             publisher = self._publisher(node, order)
             now = time.monotonic()
-            repeated = Repeated(order, rate_hz, turn, node, publisher, now, since_s=now)
+            repeated = RepeatedMessage(order, rate_hz, turn, node, publisher, now, since_s=now)
             with self._changed:
                 if self._starting.get(order.id) is not token:
                     return  # ended meanwhile
@@ -193,18 +195,18 @@ class Outbox:
                 self._changed.notify_all()
             self._add_result(SendResult(order, "began"))
 
-        def begin_then(node: Node) -> None:
+        def run_start_job(node: Node) -> None:
             try:
-                begin_it(node)
+                start_job(node)
             finally:
                 with self._changed:
                     if self._starting.get(order.id) is token:
                         del self._starting[order.id]
 
-        self._submit("", self._guarded(order, asked_s, begin_then))
+        self._submit("", self._guard(order, asked_s, run_start_job))
         return True
 
-    def end(self, order_id: str) -> None:
+    def stop(self, order_id: str) -> None:
         """Stop sending a repeated message."""
         with self._changed:
             self._starting.pop(order_id, None)
@@ -213,19 +215,19 @@ class Outbox:
         if ended is not None:
             self._report_end(ended)
 
-    def end_all(self) -> None:
+    def stop_all(self) -> None:
         """Stop all sending and close the publishers."""
         with self._changed:
             self._starting.clear()
             ids = list(self._repeated)
         for each in ids:
-            self.end(each)
+            self.stop(each)
         if self._publishers and not self._is_closed:
             self._submit("", lambda _node: self._close_unused())
 
     def close(self) -> None:
         """Stop all sending and wait for the thread."""
-        self.end_all()
+        self.stop_all()
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()
@@ -234,7 +236,7 @@ class Outbox:
 
     # ---- in the network thread
 
-    def _guarded(self, order: SendOrder, asked_s: float, job: Job) -> Job:
+    def _guard(self, order: SendOrder, asked_s: float, job: Job) -> Job:
         def run(node: Node) -> None:
             try:
                 if self._clock() - asked_s > MAX_AGE_S:
@@ -243,7 +245,7 @@ class Outbox:
             except NepError as error:
                 self._add_result(SendResult(order, "failed", str(error)))
             except Exception as error:  # noqa: BLE001 - reported as the result of this message
-                self._add_result(SendResult(order, "failed", error_words(error)))
+                self._add_result(SendResult(order, "failed", error_text(error)))
 
         return run
 
@@ -253,9 +255,9 @@ class Outbox:
             return
         heard = publisher.subscribers
         if heard == self._last_subscriber_counts.get(publisher):
-            refusal = self._gate.refusal(order.topic)
+            refusal = self._gate.rejection_reason(order.topic)
         else:
-            refusal = self._gate.refusal_now(node, order.topic)
+            refusal = self._gate.current_rejection_reason(node, order.topic)
         if refusal:
             raise NepError(_("not sent: {reason}").format(reason=refusal))
         self._last_subscriber_counts[publisher] = heard
@@ -288,11 +290,13 @@ class Outbox:
     def _add_result(self, result: SendResult) -> None:
         self._results.append(result)
 
-    def _report_end(self, ended: Repeated, sentence: str = "") -> None:
+    def _report_end(self, ended: RepeatedMessage, sentence: str = "") -> None:
         if not ended.is_over.is_set():
             ended.is_over.set()
             kind = "failed" if sentence else "ended"
-            self._add_result(SendResult(ended.order, kind, sentence, ended.heard, ended.count, ended.skipped))
+            self._add_result(
+                SendResult(ended.order, kind, sentence, ended.subscriber_count, ended.count, ended.skipped)
+            )
 
     # ---- thread of repeated messages
 
@@ -310,18 +314,18 @@ class Outbox:
             for each in due:
                 self._send_repeated(each)
 
-    def _send_repeated(self, each: Repeated) -> None:
+    def _send_repeated(self, each: RepeatedMessage) -> None:
         problem = ""
         try:
-            payload = codec_for(each.order.msg_type).encode(each.order.make())
+            payload = codec_for(each.order.msg_type).encode(each.order.make_payload())
             self._check(each.node, each.order, each.publisher)
-            is_done = self._arming.if_armed(
+            is_done = self._arming.run_if_armed(
                 each.turn, each.order.target, lambda: self._publish(each, payload)
             )
         except Exception as error:  # noqa: BLE001 - the other messages continue
-            is_done, problem = False, str(error) if isinstance(error, NepError) else error_words(error)
+            is_done, problem = False, str(error) if isinstance(error, NepError) else error_text(error)
         if is_done:
-            each.heard = each.publisher.subscribers
+            each.subscriber_count = each.publisher.subscribers
             each.skipped += self._schedule_next(each)
             return
         with self._changed:
@@ -329,14 +333,14 @@ class Outbox:
                 del self._repeated[each.order.id]
         self._report_end(each, problem)
 
-    def _publish(self, each: Repeated, made: object) -> None:
+    def _publish(self, each: RepeatedMessage, made: object) -> None:
         with self._changed:  # an ended message is not sent once more
             if self._repeated.get(each.order.id) is each:
                 each.publisher.publish(made)
                 each.count += 1
 
     @staticmethod
-    def _schedule_next(each: Repeated) -> int:
+    def _schedule_next(each: RepeatedMessage) -> int:
         # Sets the next due time; returns the number of messages omitted because they are late.
         period_s = 1 / each.rate_hz
         late = max(0, int((time.monotonic() - each.due_s) / period_s))
@@ -345,4 +349,4 @@ class Outbox:
 
 
 def _text_of(value: object) -> str:
-    return value if isinstance(value, str) else pretty(value)
+    return value if isinstance(value, str) else format_json(value)

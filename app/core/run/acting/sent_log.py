@@ -10,10 +10,10 @@ from typing import Literal
 from app.core.run.acting.arming import Target
 
 MAX_ENTRIES = 200
-KEPT_BYTES = 16 * 1024
+MAX_TEXT_BYTES = 16 * 1024
 """Maximum size of stored messages. Larger ones are listed but can't be copied or repeated."""
 
-Asker = Literal["publish", "service", "replay", "image", "switch"]
+SendOrigin = Literal["publish", "service", "replay", "image", "switch"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,25 +33,25 @@ class SentRecord:
     """
 
     at_s: float
-    asker: Asker
+    origin: SendOrigin
     name: str
-    words: str
-    is_bad: bool = False
+    result_text: str
+    is_error: bool = False
     text: str = ""
     source: str = ""
-    again: Callable[[], str] | None = None
+    repeat: Callable[[], str] | None = None
     count: int = 1
     number: int = 0
 
     @property
     def target(self) -> Target:
         """Topic or service."""
-        return Target("service" if self.asker == "service" else "topic", self.name)
+        return Target("service" if self.origin == "service" else "topic", self.name)
 
     def is_like(self, other: SentRecord) -> bool:
         """Return True if both entries describe the same operation and result."""
-        facts = (self.asker, self.name, self.words, self.is_bad, self.source)
-        return facts == (other.asker, other.name, other.words, other.is_bad, other.source)
+        facts = (self.origin, self.name, self.result_text, self.is_error, self.source)
+        return facts == (other.origin, other.name, other.result_text, other.is_error, other.source)
 
 
 class SentLog:
@@ -78,7 +78,7 @@ class SentLog:
         """Return the entry with this number, or None if it was evicted."""
         return next((each for each in self._records if each.number == number), None)
 
-    def put(self, record: SentRecord, sent: int) -> None:
+    def add(self, record: SentRecord, sent: int) -> None:
         """Add and number an entry; ``sent`` is the number of messages or calls that were sent.
 
         If the entry repeats the newest one, only its count increases. Large texts and the means to repeat
@@ -89,9 +89,9 @@ class SentLog:
             self.total += sent
             self.since_s = record.at_s if self.since_s is None else self.since_s
         if is_large(record.text) or is_large(record.source):
-            record = replace(record, text="", source="", again=None)
+            record = replace(record, text="", source="", repeat=None)
         newest = self._records[-1] if self._records else None
-        if newest is not None and record.asker != "switch" and newest.is_like(record):
+        if newest is not None and record.origin != "switch" and newest.is_like(record):
             self._records[-1] = replace(record, number=newest.number, count=newest.count + 1)
         else:
             self._last += 1
@@ -105,4 +105,4 @@ class SentLog:
 
 def is_large(text: str) -> bool:
     """Return True if a text exceeds `KEPT_BYTES`."""
-    return len(text) > KEPT_BYTES or len(text.encode("utf-8", "replace")) > KEPT_BYTES
+    return len(text) > MAX_TEXT_BYTES or len(text.encode("utf-8", "replace")) > MAX_TEXT_BYTES

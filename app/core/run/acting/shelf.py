@@ -8,7 +8,7 @@ import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from app.core.run.acting.json_text import MAX_LETTERS, read_json, value_typed
+from app.core.run.acting.json_text import MAX_LENGTH, parse_json_text, parse_typed_value
 from app.core.run.acting.sending import MAX_HZ, MIN_HZ
 from app.core.run.acting.templates import is_plain
 from nep.errors import NepError
@@ -18,8 +18,8 @@ FORMAT = 1
 MAX_MESSAGES = 200
 MAX_REQUESTS = 100
 MAX_VALUES = 50
-NAME_LETTERS = 80
-VALUE_LETTERS = 2000
+MAX_NAME_LENGTH = 80
+MAX_VALUE_LENGTH = 2000
 MAX_BYTES = 64 * 2**20
 """Maximum file size; larger files are not read."""
 
@@ -34,7 +34,7 @@ def new_message_id() -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class KeptMessage:
+class SavedMessage:
     """Saved message. ``values`` are the names of its placeholders with the values that the user entered."""
 
     id: str
@@ -49,17 +49,17 @@ class KeptMessage:
         """Return a new payload with automatic ids and times. Raises `NepError` if that isn't possible."""
         if is_plain(self.msg_type):
             return self.text
-        typed = {name: value_typed(value) for name, value in self.values if value.strip()}
-        return read_json(self.text).filled(typed)
+        typed = {name: parse_typed_value(value) for name, value in self.values if value.strip()}
+        return parse_json_text(self.text).fill(typed)
 
     @property
     def source(self) -> str:
         """Text that the user wrote, followed by the values of the placeholders."""
         return "\n".join((self.text, *(f"{name}: {value}" for name, value in self.values)))
 
-    def with_value(self, name: str, value: str) -> KeptMessage:
+    def with_value(self, name: str, value: str) -> SavedMessage:
         """Return a copy in which a placeholder has another value."""
-        others = {**dict(self.values), name: value[:VALUE_LETTERS]}
+        others = {**dict(self.values), name: value[:MAX_VALUE_LENGTH]}
         return replace(self, values=tuple(others.items())[-MAX_VALUES:])
 
 
@@ -67,15 +67,15 @@ class Shelf:
     """Saved messages in order, and the last request of each service; both limited in number."""
 
     def __init__(
-        self, messages: Iterable[KeptMessage] = (), requests: Mapping[str, str] | None = None
+        self, messages: Iterable[SavedMessage] = (), requests: Mapping[str, str] | None = None
     ) -> None:
         self._messages = list(messages)[:MAX_MESSAGES]
         self._requests = dict(list((requests or {}).items())[-MAX_REQUESTS:])
-        self._removed: tuple[KeptMessage, int] | None = None
+        self._removed: tuple[SavedMessage, int] | None = None
         self.revision = 0
 
     @property
-    def messages(self) -> tuple[KeptMessage, ...]:
+    def messages(self) -> tuple[SavedMessage, ...]:
         """All messages."""
         return tuple(self._messages)
 
@@ -84,11 +84,11 @@ class Shelf:
         """Last request by service, as JSON."""
         return self._requests
 
-    def get(self, id: str) -> KeptMessage | None:
+    def get(self, id: str) -> SavedMessage | None:
         """Return the message with this id, or None."""
         return next((each for each in self._messages if each.id == id), None)
 
-    def put(self, message: KeptMessage) -> bool:
+    def set_message(self, message: SavedMessage) -> bool:
         """Add a message or replace the one with the same id; return False if the shelf is full."""
         place = self._index(message.id)
         if place is None:
@@ -102,7 +102,7 @@ class Shelf:
         self.revision += 1
         return True
 
-    def copy(self, id: str) -> KeptMessage | None:
+    def copy(self, id: str) -> SavedMessage | None:
         """Insert a copy after a message; return None if that doesn't exist or the shelf is full."""
         place = self._index(id)
         if place is None or len(self._messages) >= MAX_MESSAGES:
@@ -116,13 +116,13 @@ class Shelf:
     def free_name(self, wanted: str) -> str:
         """Return the name, with a number appended if another message has it: "Stand still 2"."""
         taken = {each.name for each in self._messages}
-        number, name = 2, wanted[:NAME_LETTERS]
+        number, name = 2, wanted[:MAX_NAME_LENGTH]
         while name in taken:
-            name = f"{wanted[: NAME_LETTERS - 5]} {number}"
+            name = f"{wanted[: MAX_NAME_LENGTH - 5]} {number}"
             number += 1
         return name
 
-    def remove(self, id: str) -> KeptMessage | None:
+    def remove(self, id: str) -> SavedMessage | None:
         """Remove and return a message; `put_back` undoes it."""
         place = self._index(id)
         if place is None:
@@ -132,7 +132,7 @@ class Shelf:
         self.revision += 1
         return removed
 
-    def put_back(self) -> KeptMessage | None:
+    def restore(self) -> SavedMessage | None:
         """Restore the last removed message at its position."""
         if self._removed is None or len(self._messages) >= MAX_MESSAGES:
             return None
@@ -141,9 +141,9 @@ class Shelf:
         self.revision += 1
         return message
 
-    def remember(self, service: str, request: str) -> None:
+    def set_request(self, service: str, request: str) -> None:
         """Store the last request of a service."""
-        if self._requests.get(service) != request and len(request) <= MAX_LETTERS:
+        if self._requests.get(service) != request and len(request) <= MAX_LENGTH:
             self._requests.pop(service, None)
             self._requests[service] = request
             while len(self._requests) > MAX_REQUESTS:
@@ -157,7 +157,7 @@ class Shelf:
 # ---- file
 
 
-def shelf_text(shelf: Shelf) -> bytes:
+def encode_shelf(shelf: Shelf) -> bytes:
     """Return the file content of a shelf."""
     value = {
         "format": FORMAT,
@@ -178,7 +178,7 @@ def shelf_text(shelf: Shelf) -> bytes:
     return (json.dumps(value, indent=1, ensure_ascii=False) + "\n").encode("utf-8", "backslashreplace")
 
 
-def read_shelf(data: bytes) -> tuple[Shelf, int]:
+def parse_shelf(data: bytes) -> tuple[Shelf, int]:
     """Parse a file; return the shelf and the number of unreadable messages.
 
     Raises `NewerShelfError`, or `NepError` if the file isn't a shelf.
@@ -192,32 +192,32 @@ def read_shelf(data: bytes) -> tuple[Shelf, int]:
         raise NepError(_("it has no list of messages"))
     if isinstance(number := value.get("format"), int) and number > FORMAT:
         raise NewerShelfError(_("it was saved by a newer Studio"))
-    messages = [_message(each) for each in listed[:MAX_MESSAGES]]
+    messages = [_parse_message(each) for each in listed[:MAX_MESSAGES]]
     good = {each.id: each for each in messages if each is not None}
     requests = value.get("requests")
     asked = {
         name: text
         for name, text in (requests.items() if isinstance(requests, dict) else ())
-        if isinstance(text, str) and len(text) <= MAX_LETTERS
+        if isinstance(text, str) and len(text) <= MAX_LENGTH
     }
     return Shelf(good.values(), asked), len(listed) - len(good)
 
 
-def _message(told: object) -> KeptMessage | None:
+def _parse_message(told: object) -> SavedMessage | None:
     if not isinstance(told, dict):
         return None
     id, name, topic, kind, text = (told.get(key) for key in ("id", "name", "topic", "type", "text"))
     if not (isinstance(id, str) and id and isinstance(name, str) and isinstance(topic, str)):
         return None
-    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MAX_LETTERS + 1:
+    if not (isinstance(kind, str) and isinstance(text, str)) or len(text) > MAX_LENGTH + 1:
         return None
     values, rate_hz = told.get("values"), told.get("rate_hz")
     typed = tuple(
-        (name, each[:VALUE_LETTERS])
+        (name, each[:MAX_VALUE_LENGTH])
         for name, each in (values.items() if isinstance(values, dict) else ())
         if isinstance(each, str)
     )
     hertz = 1.0
     if isinstance(rate_hz, (int, float)) and not isinstance(rate_hz, bool) and math.isfinite(rate_hz):
         hertz = float(min(MAX_HZ, max(MIN_HZ, rate_hz)))
-    return KeptMessage(id, name[:NAME_LETTERS], topic, kind, text, typed[:MAX_VALUES], hertz)
+    return SavedMessage(id, name[:MAX_NAME_LENGTH], topic, kind, text, typed[:MAX_VALUES], hertz)

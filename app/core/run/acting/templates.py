@@ -6,22 +6,22 @@ from collections.abc import Mapping
 
 import orjson
 
-from app.core.run.acting.json_text import MAX_LETTERS, pretty
+from app.core.run.acting.json_text import MAX_LENGTH, format_json
 from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.message import Message
 from nep.recordings.formats.schemas import schema_of
 
-WRITTEN = frozenset({"json", "msgpack", "string"})
+TEXT_CODECS = frozenset({"json", "msgpack", "string"})
 """Codecs of messages that can be written as text."""
 _SCALARS: Mapping[str, object] = {"string": "", "boolean": False, "integer": 0, "number": 0.0, "array": []}
 _MAX_DEPTH = 10
 
 
-def is_written(msg_type: str) -> bool:
+def is_editable(msg_type: str) -> bool:
     """Return True if messages of this type can be written as text, which excludes images and bytes."""
-    return codec_for(msg_type).name in WRITTEN
+    return codec_for(msg_type).name in TEXT_CODECS
 
 
 def is_plain(msg_type: str) -> bool:
@@ -31,19 +31,19 @@ def is_plain(msg_type: str) -> bool:
 
 def text_of_message(message: Message) -> str:
     """Return a message as editable text. Raises `NepError` if it can't be written as text."""
-    if message.size_bytes > MAX_LETTERS:
+    if message.size_bytes > MAX_LENGTH:
         raise NepError(_("The last message is too large to edit by hand."))
-    if not is_written(message.msg_type):
+    if not is_editable(message.msg_type):
         raise NepError(_("Messages of type {type} can't be edited by hand.").format(type=message.msg_type))
     payload = message.payload
-    return payload if isinstance(payload, str) and is_plain(message.msg_type) else pretty(payload)
+    return payload if isinstance(payload, str) and is_plain(message.msg_type) else format_json(payload)
 
 
 def text_of_type(msg_type: str) -> str:
     """Return an empty message of a type as text; an empty object if the type has no known fields."""
     if is_plain(msg_type):
         return ""
-    return pretty(_example(orjson.loads(schema_of(msg_type)), 0))
+    return format_json(_example(orjson.loads(schema_of(msg_type)), 0))
 
 
 def _example(schema: object, depth: int) -> object:

@@ -8,49 +8,49 @@ import io
 from collections.abc import Callable, Iterable
 
 from app.core.alarms import SessionAlarms, severity_of
-from app.ui.text.dates import clock_words, when_words
-from app.ui.text.numbers import seconds_words
+from app.ui.text.dates import clock_text, date_time_text
+from app.ui.text.numbers import seconds_text
 from app.ui.widgets.table.model import Cell, Column
 from nep.i18n import _, lazy, ngettext
 from nep.programs.alarms import AlarmRule, AlarmState
 from nep.programs.alarms.history import AlarmRecord
 from nep.programs.alarms.rule import problem_of
-from nep.programs.alarms.sentences import seen_words
+from nep.programs.alarms.sentences import current_value_text
 
-TROUBLES = {
+TROUBLE_TEXTS = {
     "missing": lazy("the newest message has no such field"),
     "no_number": lazy("the value is not a number"),
     "unreadable": lazy("the newest message can't be decoded"),
 }
 
 
-def moment(seconds: float) -> dt.datetime:
+def local_datetime(seconds: float) -> dt.datetime:
     """Convert seconds since 1970 to a datetime in the local time zone."""
     return dt.datetime.fromtimestamp(seconds, tz=dt.timezone.utc).astimezone()
 
 
-def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, str, str | None]:
+def state_chip(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, str, str | None]:
     """Return text, status and icon of an alarm's state chip.
 
     An icon of None stands for the default icon of the status.
     """
-    seen = seen_words(rule.condition, state.seen)
+    seen = current_value_text(rule.condition, state.value)
     match state.phase:
         case "faulty":
             problem = problem_of(rule)
             if not rule.condition.name or problem is None:
                 return _("not finished yet"), "off", None
-            return problem.sentence, "warn", None
+            return problem.message, "warn", None
         case "off":
             return _("off"), "off", None
         case "waits":
             return _("waits for {name}").format(name=rule.condition.name), "off", None
     if rule.is_snoozed(now_s):
-        until = clock_words(moment(rule.snoozed_until_s))
+        until = clock_text(local_datetime(rule.snoozed_until_s))
         words = _("{seen}, snoozed until {clock}") if seen else _("snoozed until {clock}")
         return words.format(seen=seen, clock=until), "warn", "bell-off"
     if state.phase == "on":
-        lasts = _("active for {time}").format(time=seconds_words(state.on_for_s))
+        lasts = _("active for {time}").format(time=seconds_text(state.on_for_s))
         is_told = bool(seen) and rule.condition.kind != "silent"
         words = _("{state}, {seen}").format(state=lasts, seen=seen) if is_told else lasts
         return words, severity_of(rule.condition), None
@@ -59,7 +59,7 @@ def state_words(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, 
     return seen or _("OK"), "ok", None
 
 
-def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
+def note_text(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
     """Return the text next to the state chip.
 
     It is the result of the actions, the trigger count or the time of the last trigger.
@@ -67,26 +67,28 @@ def note_words(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: d
     parts = []
     retry_s = alarms.alarms.retry_in_s(rule.id)
     last = alarms.history.last(rule.id)
-    if retry_s is not None and last is not None and last.deeds:
+    if retry_s is not None and last is not None and last.action_results:
         parts.append(
             _("{what}; next try in {time}").format(
-                what=last.deeds[-1].words, time=seconds_words(round(retry_s))
+                what=last.action_results[-1].text, time=seconds_text(round(retry_s))
             )
         )
-    if state.trouble:
-        parts.append(_(TROUBLES[state.trouble]))
+    if state.problem:
+        parts.append(_(TROUBLE_TEXTS[state.problem]))
     midnight = now.replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
-    today = alarms.history.since(rule.id, midnight)
+    today = alarms.history.count_since(rule.id, midnight)
     if today:
         parts.append(ngettext("once today", "{count} times today", today).format(count=today))
     elif last is not None:
-        parts.append(_("last active {when}").format(when=_uncapital(when_words(moment(last.at_s), now))))
+        parts.append(
+            _("last active {when}").format(when=_lower_first(date_time_text(local_datetime(last.at_s), now)))
+        )
     else:
         parts.append(_("never active"))
     return ", ".join(parts)
 
 
-def _uncapital(words: str) -> str:
+def _lower_first(words: str) -> str:
     return words[:1].lower() + words[1:]
 
 
@@ -100,40 +102,41 @@ def history_columns(
         now: Returns the current time.
     """
 
-    def when(record: AlarmRecord) -> Cell:
-        then = moment(record.at_s)
+    def when_cell(record: AlarmRecord) -> Cell:
+        then = local_datetime(record.at_s)
         today = then.date() == now().date()
-        words = then.strftime("%H:%M:%S").lstrip("0") if today else when_words(then, now())
+        words = then.strftime("%H:%M:%S").lstrip("0") if today else date_time_text(then, now())
         return Cell(words, role="textSecondary", mono=today)
 
     def alarm(record: AlarmRecord) -> Cell:
         icon = "check"
         if record.is_on:
             icon = "circle-x" if condition(record) == "error" else "triangle-alert"
-        return Cell(record.words, icon, condition(record) if record.is_on else "text")
+        return Cell(record.cause, icon, condition(record) if record.is_on else "text")
 
-    def lasted(record: AlarmRecord) -> Cell:
+    def duration_cell(record: AlarmRecord) -> Cell:
         if record.is_on:
             on_s = max(0.0, now().timestamp() - record.at_s)
-            return Cell(_("{time}, active").format(time=seconds_words(on_s)), role=condition(record))
-        return Cell(seconds_words(record.lasted_s) if record.lasted_s is not None else "")
+            return Cell(_("{time}, active").format(time=seconds_text(on_s)), role=condition(record))
+        return Cell(seconds_text(record.duration_s) if record.duration_s is not None else "")
 
     return (
-        Column("when", lazy("When"), 136, when, key=lambda record: record.at_s, figures=False),
-        Column("alarm", lazy("Alarm"), 180, alarm, stretch=True, tip=lambda record: record.words),
+        Column("when", lazy("When"), 136, when_cell, key=lambda record: record.at_s, is_numeric=False),
+        Column("alarm", lazy("Alarm"), 180, alarm, stretch=True, tip=lambda record: record.cause),
         Column("times", lazy("Count"), 56, lambda record: Cell(str(record.count) if record.count > 1 else ""),
-               key=lambda record: record.count, figures=True, yields=2),
-        Column("lasted", lazy("Duration"), 84, lasted, key=lambda record: record.lasted_s, figures=True),
-        Column("did", lazy("Actions"), 210, lambda record: Cell(deeds_words(record), role="textSecondary"),
-               tip=deeds_words, yields=1),
+               key=lambda record: record.count, is_numeric=True, hide_order=2),
+        Column("lasted", lazy("Duration"), 84, duration_cell, key=lambda record: record.duration_s,
+               is_numeric=True),
+        Column("did", lazy("Actions"), 210, lambda record: Cell(actions_text(record), role="textSecondary"),
+               tip=actions_text, hide_order=1),
     )  # fmt: skip
 
 
-def deeds_words(record: AlarmRecord) -> str:
+def actions_text(record: AlarmRecord) -> str:
     """Format the executed actions of a record, such as "restart_lidar did not answer, sound"."""
-    if record.was_snoozed and not record.deeds:
+    if record.was_snoozed and not record.action_results:
         return _("none, snoozed")
-    return ", ".join(deed.words for deed in record.deeds)
+    return ", ".join(deed.text for deed in record.action_results)
 
 
 def csv_text(records: Iterable[AlarmRecord]) -> str:
@@ -142,12 +145,12 @@ def csv_text(records: Iterable[AlarmRecord]) -> str:
     rows = csv.writer(out)
     rows.writerow(("at", "alarm", "lasted_s", "times", "did"))
     for record in records:
-        lasted = "" if record.lasted_s is None else f"{record.lasted_s:.3f}"
-        words = [_harmless(text) for text in (record.words, deeds_words(record))]
-        rows.writerow((moment(record.at_s).isoformat(), words[0], lasted, record.count, words[1]))
+        lasted = "" if record.duration_s is None else f"{record.duration_s:.3f}"
+        words = [_escape_formula(text) for text in (record.cause, actions_text(record))]
+        rows.writerow((local_datetime(record.at_s).isoformat(), words[0], lasted, record.count, words[1]))
     return out.getvalue()
 
 
-def _harmless(text: str) -> str:
+def _escape_formula(text: str) -> str:
     # Prevent CSV injection: spreadsheets evaluate such cells as formulas.
     return f"'{text}" if text[:1] in {"=", "+", "-", "@", "\t", "\r"} else text

@@ -15,22 +15,22 @@ from PySide6.QtGui import QAction, QActionGroup, QGuiApplication
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.alarms import severity_of
-from app.core.recording.recordings import kept_file
+from app.core.recording.recordings import saved_file_name
 from app.core.storage.atomic_file import write_atomically
-from app.ui.panels.alarms.columns import csv_text, history_columns, moment, note_words, state_words
+from app.ui.panels.alarms.columns import csv_text, history_columns, local_datetime, note_text, state_chip
 from app.ui.panels.alarms.phrases import (
     ACTION_ICONS,
     ACTION_MENU,
-    CHOICES,
-    MENU_WORDS,
+    KIND_MENU,
+    MENU_ROLES,
     NEW_ACTIONS,
     PhrasePart,
-    example_of,
-    rejection_of,
-    taken,
-    typed_now,
+    initial_text,
+    placeholder_of,
+    rejection_text,
     with_action,
     with_kind,
+    with_slot_text,
 )
 from app.ui.panels.alarms.row import AlarmRow
 from app.ui.panels.alarms.slots import SlotField
@@ -41,16 +41,16 @@ from app.ui.widgets.buttons import LinkButton
 from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
 from nep.errors import DecodeError
 from nep.i18n import _, lazy, ngettext
-from nep.messages.fields import leaves
+from nep.messages.fields import leaf_paths
 from nep.programs.alarms import AlarmCondition, AlarmRule
 from nep.programs.alarms.history import AlarmRecord
 from nep.programs.alarms.rule import new_id
-from nep.programs.alarms.sentences import condition_words, time_words
+from nep.programs.alarms.sentences import condition_text, duration_text
 
 if TYPE_CHECKING:
     from app.core.network.watches import Watch
@@ -90,7 +90,7 @@ class AlarmsPanel(PanelWidget):
         self.chip = Chip(self.theme)
         self.chips = [self.count, self.chip]
         self.new = Button(self.theme, _("New alarm"), "plus", size="small")
-        self.new.clicked.connect(self.begin)
+        self.new.clicked.connect(self.add_alarm)
         self.header = [self.new]
 
     def _make_rows(self) -> None:
@@ -101,7 +101,7 @@ class AlarmsPanel(PanelWidget):
             "bell",
             _("No alarms yet"),
             _("Right-click a value, topic or node."),
-            [EmptyAction(_("New alarm"), self.begin, "plus", primary=True)],
+            [EmptyAction(_("New alarm"), self.add_alarm, "plus", is_primary=True)],
         )
 
     def _make_history(self) -> None:
@@ -112,17 +112,17 @@ class AlarmsPanel(PanelWidget):
         self.export = Button(self.theme, _("CSV"), "download", size="small")
         self.export.setAccessibleName(_("Save the history as CSV"))
         self.export.clicked.connect(self._save)
-        columns = history_columns(self._severity, lambda: moment(self.now_s()))
+        columns = history_columns(self._severity, lambda: local_datetime(self.now_s()))
         self.model: TableModel[AlarmRecord] = TableModel(
             columns, lambda record: f"{record.rule_id} {record.at_s}"
         )
         self.table = TableView(self.theme, self.model)
         self.table.setAccessibleName(_("History of the alarms"))
         self.table.order_changed.connect(self._show_history)
-        self.table.filter_wanted.connect(self.focus_filter)
+        self.table.filter_requested.connect(self.focus_filter)
         self.table.opened.connect(self._open_record)
-        self.table.menu_wanted.connect(self._show_record_menu)
-        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.table.menu_requested.connect(self._show_record_menu)
+        self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self._clear = QAction(_("Clear the history"), self)
         self._clear.triggered.connect(self.alarms.history.clear)
 
@@ -143,7 +143,7 @@ class AlarmsPanel(PanelWidget):
         self.line = LinkButton(self.theme, _("nep watch"))
         self.line.setToolTip(plain.tip(_("Copies the command that watches these alarms without a window")))
         self.line.setAccessibleName(_("Copy the command for a terminal: nep watch"))
-        self.line.clicked.connect(self._copy_line)
+        self.line.clicked.connect(self._copy_command)
         foot.addWidget(hint, 1)
         foot.addWidget(label(_("also without a window:"), "small", role="textTertiary"))
         foot.addWidget(self.line)
@@ -157,7 +157,7 @@ class AlarmsPanel(PanelWidget):
         column.addWidget(self.table, 3)
         column.addWidget(Separator(self.theme))
         column.addLayout(foot)
-        self.pages: QStackedWidget = self.show_one_of(self.empty, inside)
+        self.pages: QStackedWidget = self.make_page_stack(self.empty, inside)
 
     # -- display ------------------------------------------------------------------------------------------
 
@@ -173,9 +173,11 @@ class AlarmsPanel(PanelWidget):
         if self._history_seen != self.alarms.history.revision:
             self._show_history()
         elif self._ticks % 30 == 0:
-            self.table.tell_visible_changed()
+            self.table.refresh_visible()
         if self.field is not None and self._ticks % STATE_UPDATE_TICKS == 0:
-            self.field.offer(self._existing(self.field.slot.part, self._row_of(self.field.slot)))
+            self.field.set_completions(
+                self._completions_for(self.field.slot.part, self._row_of(self.field.slot))
+            )
 
     def _show_rules(self) -> None:
         known = {row.rule_id: row for row in self.rows}
@@ -194,11 +196,11 @@ class AlarmsPanel(PanelWidget):
 
     def _new_row(self, rule_id: str) -> AlarmRow:
         row = AlarmRow(self.theme, rule_id)
-        row.switched.connect(partial(self._switch, rule_id))
-        row.slot_pressed.connect(partial(self._pressed, row))
+        row.switched.connect(partial(self._set_rule_enabled, rule_id))
+        row.slot_pressed.connect(partial(self._open_slot, row))
         row.action_removed.connect(partial(self._remove_action, rule_id))
         row.snooze_pressed.connect(partial(self._snooze, rule_id))
-        row.more_pressed.connect(partial(self._more, row))
+        row.more_pressed.connect(partial(self._show_more_menu, row))
         return row
 
     def _icon(self, rule: AlarmRule) -> str:
@@ -207,12 +209,12 @@ class AlarmsPanel(PanelWidget):
 
     def _show_states(self) -> None:
         now_s, on = self.now_s(), 0
-        now = moment(now_s)
+        now = local_datetime(now_s)
         for row, rule in zip(self.rows, self.alarms.rules, strict=True):
             state = self.alarms.alarms.evaluator.state(rule)
             on += state.phase == "on" and not rule.is_snoozed(now_s)
-            row.show_state(*state_words(rule, state, now_s), note_words(rule, state, self.alarms, now))
-            row.snooze.setVisible(rule.is_on)
+            row.show_state(*state_chip(rule, state, now_s), note_text(rule, state, self.alarms, now))
+            row.snooze.setVisible(rule.is_enabled)
         count = len(self.rows)
         words = ngettext("{count} alarm", "{count} alarms", count).format(count=count)
         self.count.setText(words if count else "")
@@ -224,10 +226,10 @@ class AlarmsPanel(PanelWidget):
         history = self.alarms.history
         self._history_seen = history.revision
         words = self.filter.text().casefold().split()
-        rows = [each for each in history if all(word in each.words.casefold() for word in words)]
+        rows = [each for each in history if all(word in each.cause.casefold() for word in words)]
         self.model.set_rows(self.table.order.sort(rows))
-        self.table.tell_visible_changed()
-        midnight = moment(self.now_s()).replace(hour=0, minute=0, second=0, microsecond=0)
+        self.table.refresh_visible()
+        midnight = local_datetime(self.now_s()).replace(hour=0, minute=0, second=0, microsecond=0)
         yesterday = (midnight - dt.timedelta(days=1)).timestamp()
         today = sum(each.at_s >= midnight.timestamp() for each in history)
         before = sum(yesterday <= each.at_s < midnight.timestamp() for each in history)
@@ -244,14 +246,14 @@ class AlarmsPanel(PanelWidget):
         return severity_of(rule.condition) if rule is not None else "error"
 
     def badge(self) -> tuple[str, str] | None:
-        on = len(self.alarms.on)
+        on = len(self.alarms.active)
         return (str(on), "error") if on else None
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def begin(self) -> None:
+    def add_alarm(self) -> None:
         """Add an alarm and open the field for its topic."""
-        self.edit(self.alarms.new(AlarmCondition("silent", for_s=2.0)).id, "subject")
+        self.edit(self.alarms.create(AlarmCondition("silent", for_s=2.0)).id, "subject")
 
     def edit(self, rule_id: str, slot: str) -> None:
         """Scroll to an alarm and open one of its slots; with an empty slot only focus the alarm."""
@@ -266,35 +268,35 @@ class AlarmsPanel(PanelWidget):
         found = row.slots.get(slot) or row.slots["kind"]
         found.setFocus(Qt.FocusReason.ShortcutFocusReason)
         if slot:
-            self._pressed(row, found.part)
+            self._open_slot(row, found.part)
 
     def _rule(self, rule_id: str) -> AlarmRule | None:
         return self.alarms.alarms.rule(rule_id)
 
     def _save_rule(self, rule: AlarmRule) -> None:
-        self.alarms.put(rule)
+        self.alarms.set_rule(rule)
         self.refresh()
 
-    def _switch(self, rule_id: str, on: bool) -> None:
+    def _set_rule_enabled(self, rule_id: str, on: bool) -> None:
         rule = self._rule(rule_id)
         if rule is not None:
-            self._save_rule(replace(rule, is_on=on))
+            self._save_rule(replace(rule, is_enabled=on))
 
-    def _pressed(self, row: AlarmRow, part: PhrasePart) -> None:
+    def _open_slot(self, row: AlarmRow, part: PhrasePart) -> None:
         rule = self._rule(row.rule_id)
         if rule is None:
             return
-        if part.role in CHOICES or part.role == "action":
+        if part.role in MENU_ROLES or part.role == "action":
             menu = Menu(self.theme, self)
             menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             (self._fill_kinds if part.role == "kind" else self._fill_actions)(menu, row, part)
-            drop_below(menu, row.slots[part.key])
+            open_below(menu, row.slots[part.key])
         else:
-            self._type(row, rule, part)
+            self._open_field(row, rule, part)
 
-    def _type(self, row: AlarmRow, rule: AlarmRule, part: PhrasePart) -> None:
+    def _open_field(self, row: AlarmRow, rule: AlarmRule, part: PhrasePart) -> None:
         if self.field is not None:
-            self.field.leave(keeps_focus=False)
+            self.field.dismiss(keeps_focus=False)
         condition = rule.condition
         if part.role in {"value", "limit"} and condition.name and self._peek is None:
             # field names and values to offer come from the newest message
@@ -303,29 +305,29 @@ class AlarmsPanel(PanelWidget):
             self.theme,
             row,
             row.slots[part.key],
-            typed_now(rule, part),
-            example_of(part, rule),
+            initial_text(rule, part),
+            placeholder_of(part, rule),
             lambda text: self._apply(row, part, text),
-            rejection=rejection_of(part, rule),
+            rejection=rejection_text(part, rule),
         )
-        self.field.ended.connect(self._field_ended)
-        self.field.offer(self._existing(part, row))
+        self.field.closed.connect(self._field_closed)
+        self.field.set_completions(self._completions_for(part, row))
 
     def _apply(self, row: AlarmRow, part: PhrasePart, text: str) -> bool:
         rule = self._rule(row.rule_id)
         if rule is None:
             return True
-        made = taken(rule, part, text)
+        made = with_slot_text(rule, part, text)
         if made is None:
             return False
         if part.role == "limit" and self._fresh == rule.id:
             # a new alarm stays disabled until its limit is entered
-            made, self._fresh = replace(made, is_on=True), ""
+            made, self._fresh = replace(made, is_enabled=True), ""
         if made != rule:
             self._save_rule(made)
         return True
 
-    def _field_ended(self) -> None:
+    def _field_closed(self) -> None:
         self.field = None
         if self._peek is not None:
             self._peek.close()
@@ -334,7 +336,7 @@ class AlarmsPanel(PanelWidget):
     def _row_of(self, slot: QWidget) -> AlarmRow:
         return next(row for row in self.rows if slot in row.slots.values())
 
-    def _existing(self, part: PhrasePart, row: AlarmRow) -> Sequence[str]:
+    def _completions_for(self, part: PhrasePart, row: AlarmRow) -> Sequence[str]:
         rule = self._rule(row.rule_id)
         if rule is None:
             return ()
@@ -342,31 +344,35 @@ class AlarmsPanel(PanelWidget):
             case "subject" if rule.condition.is_about_node:
                 return sorted({node.name for node in self.session.live.nodes})[:MAX_COMPLETIONS]
             case "subject":
-                return sorted(topic.name for topic in self.session.live.topics.live())[:MAX_COMPLETIONS]
+                return sorted(topic.name for topic in self.session.live.topics.existing_topics())[
+                    :MAX_COMPLETIONS
+                ]
             case "value":
-                return self._paths(rule.condition.name)
+                return self._field_paths(rule.condition.name)
             case "time":
-                return [time_words(seconds) for seconds in (0.5, 1, 2, 5, 10, 30, 60, 600)]
+                return [duration_text(seconds) for seconds in (0.5, 1, 2, 5, 10, 30, 60, 600)]
             case "name":
-                return self._names(rule.actions[part.place].kind)
+                return self._target_names(rule.actions[part.action_index].kind)
             case _:
                 return ()
 
-    def _paths(self, name: str) -> list[str]:
+    def _field_paths(self, name: str) -> list[str]:
         topic = self.session.live.topics.get(name)
         newest = topic.newest if topic is not None else None
         if newest is None or newest.size_bytes > 256 * 1024:
             return []
         try:
-            return list(leaves(newest.payload))
+            return list(leaf_paths(newest.payload))
         except DecodeError:
             return []
 
-    def _names(self, kind: str) -> list[str]:
+    def _target_names(self, kind: str) -> list[str]:
         if kind == "call":
             return sorted(self.session.live.graph.services) if self.session.live.graph is not None else []
         if kind == "send":
-            return sorted(topic.name for topic in self.session.live.topics.live())[:MAX_COMPLETIONS]
+            return sorted(topic.name for topic in self.session.live.topics.existing_topics())[
+                :MAX_COMPLETIONS
+            ]
         titles = [self.session.documents.title(document) for document in self.session.documents]
         return list(dict.fromkeys([*titles, *(file.name for file in self.session.settings.recent)]))
 
@@ -376,16 +382,16 @@ class AlarmsPanel(PanelWidget):
         rule = self._rule(row.rule_id)
         if rule is None:
             return
-        for group in MENU_WORDS:
+        for group in KIND_MENU:
             if menu.actions():
                 menu.addSeparator()
             for kind, words in group:
                 action = menu.addAction(_(words))
                 action.setCheckable(True)
                 action.setChecked(kind == rule.condition.kind)
-                action.triggered.connect(partial(self._choose_kind, row, kind))
+                action.triggered.connect(partial(self._set_kind, row, kind))
 
-    def _choose_kind(self, row: AlarmRow, kind: str, _on: bool = False) -> None:
+    def _set_kind(self, row: AlarmRow, kind: str, _on: bool = False) -> None:
         rule = self._rule(row.rule_id)
         if rule is None:
             return
@@ -407,31 +413,31 @@ class AlarmsPanel(PanelWidget):
         if rule is None:
             return
         is_new = part.role == "add"
-        place = len(rule.actions) if is_new else part.place
+        place = len(rule.actions) if is_new else part.action_index
         there = {action.kind for action in rule.actions}
         for action in NEW_ACTIONS:
             if action.kind in there and action.kind not in {"run", "call", "send"}:
                 continue
             entry = menu.addAction(self.theme.icon(ACTION_ICONS[action.kind]), _(ACTION_MENU[action.kind]))
-            entry.triggered.connect(partial(self._choose_action, row, place, action))
+            entry.triggered.connect(partial(self._set_action, row, place, action))
         if not is_new:
             menu.addSeparator()
             entry = menu.addAction(self.theme.icon("trash-2"), _("Remove this action"))
             entry.triggered.connect(partial(self._remove_action, row.rule_id, part))
 
-    def _choose_action(self, row: AlarmRow, place: int, action: object, _on: bool = False) -> None:
+    def _set_action(self, row: AlarmRow, place: int, action: object, _on: bool = False) -> None:
         rule = self._rule(row.rule_id)
         if rule is None:
             return
         self._save_rule(with_action(rule, place, action))  # type: ignore[arg-type]
         name = row.slots.get(f"name:{place}")
         if name is not None:
-            self._pressed(row, name.part)
+            self._open_slot(row, name.part)
 
     def _remove_action(self, rule_id: str, part: PhrasePart, _on: bool = False) -> None:
         rule = self._rule(rule_id)
-        if rule is not None and part.place < len(rule.actions):
-            self._save_rule(with_action(rule, part.place, None))
+        if rule is not None and part.action_index < len(rule.actions):
+            self._save_rule(with_action(rule, part.action_index, None))
 
     def _snooze(self, rule_id: str, seconds: float = SNOOZE_S, _on: bool = False) -> None:
         rule = self._rule(rule_id)
@@ -441,11 +447,11 @@ class AlarmsPanel(PanelWidget):
             self.refresh()
 
     def _until_tomorrow(self) -> float:
-        now = moment(self.now_s())
+        now = local_datetime(self.now_s())
         tomorrow = (now + dt.timedelta(days=1)).replace(hour=0, minute=0, second=0, microsecond=0)
         return tomorrow.timestamp() - self.now_s()
 
-    def _more(self, row: AlarmRow) -> None:
+    def _show_more_menu(self, row: AlarmRow) -> None:
         rule = self._rule(row.rule_id)
         if rule is None:
             return
@@ -463,7 +469,7 @@ class AlarmsPanel(PanelWidget):
         menu.addSeparator()
         group = QActionGroup(menu)
         for calm_s in CALM_CHOICES_S:
-            said = _("Stay active until the condition is false for {time}").format(time=time_words(calm_s))
+            said = _("Stay active until the condition is false for {time}").format(time=duration_text(calm_s))
             action = menu.addAction(said)
             action.setCheckable(True)
             action.setChecked(rule.calm_s == calm_s)
@@ -472,7 +478,7 @@ class AlarmsPanel(PanelWidget):
         menu.addSeparator()
         menu.addAction(self.theme.icon("copy"), _("Duplicate"), partial(self._duplicate, rule.id))
         menu.addAction(self.theme.icon("trash-2"), _("Delete"), partial(self._delete, rule.id))
-        drop_below(menu, row.more)
+        open_below(menu, row.more)
 
     def _set_calm(self, rule_id: str, calm_s: float, _on: bool = False) -> None:
         rule = self._rule(rule_id)
@@ -489,8 +495,8 @@ class AlarmsPanel(PanelWidget):
     def _delete(self, rule_id: str) -> None:
         rule = self.alarms.remove(rule_id)
         if rule is not None:
-            said = _("Deleted the alarm “{condition}”").format(condition=condition_words(rule.condition))
-            self.context.toast(said, _("Undo"), self.alarms.put_back)
+            said = _("Deleted the alarm “{condition}”").format(condition=condition_text(rule.condition))
+            self.context.toast(said, _("Undo"), self.alarms.restore)
             self.refresh()
             self.new.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -504,7 +510,11 @@ class AlarmsPanel(PanelWidget):
 
     def _show_record_menu(self, key: str, at: QPoint) -> None:
         record = next((each for each in self.alarms.history if self.model.key_of(each) == key), None)
-        kept = [kept_file(deed.words) for deed in record.deeds if deed.kind == "keep"] if record else []
+        kept = (
+            [saved_file_name(deed.text) for deed in record.action_results if deed.kind == "keep"]
+            if record
+            else []
+        )
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction(self.theme.icon("bell"), _("Show the alarm"), partial(self._open_record, key))
@@ -523,14 +533,14 @@ class AlarmsPanel(PanelWidget):
             write_atomically(path, csv_text(self.alarms.history.records).encode("utf-8"))
         except OSError as error:
             said = _("Can't write {file}: {reason}.")
-            self.session.alerts.put(
+            self.session.alerts.raise_alert(
                 "alarms:csv", "warn", said.format(file=path.name, reason=error.strerror or error)
             )
         else:
             self.session.alerts.resolve("alarms:csv")
             self.context.toast(_("Saved {file}").format(file=path.name))
 
-    def _copy_line(self) -> None:
+    def _copy_command(self) -> None:
         path = self.alarms.path
         said = f'nep watch "{path}"' if path is not None else "nep watch"
         QGuiApplication.clipboard().setText(said)
@@ -557,7 +567,7 @@ class AlarmsPanel(PanelWidget):
 
     def dispose(self) -> None:
         if self.field is not None:
-            self.field.leave(keeps_focus=False)
+            self.field.dismiss(keeps_focus=False)
         if self._peek is not None:
             self._peek.close()
 

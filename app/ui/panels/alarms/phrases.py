@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 from string import Formatter
 from typing import Literal
 
-from app.robots.description.typed_number import SEPARATORS, TypedNumberError, parse_number
+from app.robots.description.typed_number import AMBIGUOUS_SEPARATORS, TypedNumberError, parse_number
 from nep.i18n import _, lazy, pgettext, plazy
 from nep.programs.alarms import AlarmAction, AlarmCondition, AlarmRule
-from nep.programs.alarms.rule import KEEP_S, NEEDS_LIMIT, NUMBER_KINDS, VALUE_KINDS, Scalar
-from nep.programs.alarms.sentences import action_words, limit_words, time_words
+from nep.programs.alarms.rule import DEFAULT_RECORDING_S, KINDS_WITH_LIMIT, NUMBER_KINDS, VALUE_KINDS, Scalar
+from nep.programs.alarms.sentences import action_text, duration_text, limit_text
 from nep.text import quotable
 
 PartKind = Literal["word", "slot", "dashed"]
-CHOICES = frozenset({"kind", "add"})
+MENU_ROLES = frozenset({"kind", "add"})
 """Roles of slots whose value is chosen from a menu; other slots have a text field."""
 
 _TEMPLATES: Mapping[str, str] = {
@@ -34,7 +34,7 @@ _TEMPLATES: Mapping[str, str] = {
     "leaves": lazy("When {subject} {kind} {time}"),
     "comes": lazy("When {subject} {kind}"),
 }
-KIND_WORDS: Mapping[str, str] = {
+KIND_TEXTS: Mapping[str, str] = {
     "silent": plazy("alarm", "silent"),
     "rate_below": plazy("alarm rate", "fewer than"),
     "rate_above": plazy("alarm rate", "more than"),
@@ -48,7 +48,7 @@ KIND_WORDS: Mapping[str, str] = {
     "leaves": plazy("alarm", "leaves"),
     "comes": plazy("alarm", "joins"),
 }
-MENU_WORDS: Sequence[Sequence[tuple[str, str]]] = (
+KIND_MENU: Sequence[Sequence[tuple[str, str]]] = (
     (
         ("silent", lazy("A topic is silent")),
         ("rate_below", lazy("A topic has too few messages")),
@@ -80,7 +80,7 @@ SLOT_NAMES: Mapping[str, str] = {
 NEW_ACTIONS: Sequence[AlarmAction] = (
     AlarmAction("banner"),
     AlarmAction("sound"),
-    AlarmAction("keep", seconds=KEEP_S),
+    AlarmAction("keep", seconds=DEFAULT_RECORDING_S),
     AlarmAction("run"),
     AlarmAction("call", payload={}),
     AlarmAction("send"),
@@ -139,7 +139,7 @@ class PhrasePart:
         return self.key.partition(":")[0]
 
     @property
-    def place(self) -> int:
+    def action_index(self) -> int:
         """Index of the action that the slot belongs to."""
         return int(self.key.partition(":")[2] or 0)
 
@@ -172,14 +172,14 @@ def _slot(hole: str, condition: AlarmCondition, icon: str) -> PhrasePart:
         text = condition.path if condition.path != "." else _("the message")
         return PhrasePart(hole, quotable(text) or missing, "slot" if text else "dashed", mono=bool(text))
     if hole == "kind":
-        return PhrasePart(hole, _(KIND_WORDS[condition.kind]))
+        return PhrasePart(hole, _(KIND_TEXTS[condition.kind]))
     if hole == "limit":
-        return PhrasePart(hole, limit_words(condition, condition.limit))
+        return PhrasePart(hole, limit_text(condition, condition.limit))
     if not condition.for_s:
         return PhrasePart(hole, _("for…"), "dashed")
     if condition.kind in {"silent", "loses"}:
-        return PhrasePart(hole, time_words(condition.for_s))
-    return PhrasePart(hole, _("for {time}").format(time=time_words(condition.for_s)))
+        return PhrasePart(hole, duration_text(condition.for_s))
+    return PhrasePart(hole, _("for {time}").format(time=duration_text(condition.for_s)))
 
 
 def _icon(condition: AlarmCondition, icon: str) -> str:
@@ -190,7 +190,7 @@ def _action_parts(place: int, action: AlarmAction) -> list[PhrasePart]:
     verb = _VERBS.get(action.kind)
     if verb is None:
         icon = "square" if action.kind == "stop" else None
-        return [PhrasePart(f"action:{place}", action_words(action), icon=icon)]
+        return [PhrasePart(f"action:{place}", action_text(action), icon=icon)]
     named = quotable(action.name) or _("choose")
     parts = [
         PhrasePart(f"action:{place}", _(verb)),
@@ -216,7 +216,7 @@ def payload_text(payload: object) -> str:
     return json.dumps(payload, ensure_ascii=False)
 
 
-def typed_now(rule: AlarmRule, part: PhrasePart) -> str:
+def initial_text(rule: AlarmRule, part: PhrasePart) -> str:
     """Return the initial text of the field for a slot."""
     condition = rule.condition
     match part.role:
@@ -227,16 +227,16 @@ def typed_now(rule: AlarmRule, part: PhrasePart) -> str:
         case "limit":
             return condition.limit if isinstance(condition.limit, str) else payload_text(condition.limit)
         case "time":
-            return time_words(condition.for_s) if condition.for_s else ""
+            return duration_text(condition.for_s) if condition.for_s else ""
         case "name":
-            return rule.actions[part.place].name
+            return rule.actions[part.action_index].name
         case "payload":
-            return payload_text(rule.actions[part.place].payload)
+            return payload_text(rule.actions[part.action_index].payload)
         case _:
             return ""
 
 
-def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
+def with_slot_text(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
     """Return a copy of the rule with `text` as the value of a slot, or None if the text is invalid."""
     condition, text = rule.condition, text.strip()
     match part.role:
@@ -245,19 +245,21 @@ def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
         case "value":
             return replace(rule, condition=replace(condition, path=text))
         case "limit":
-            limit = read_limit(condition, text)
+            limit = parse_limit(condition, text)
             return None if limit is _INVALID else replace(rule, condition=replace(condition, limit=limit))  # type: ignore[arg-type]
         case "time":
-            for_s = read_time(text)
+            for_s = parse_time(text)
             return None if for_s is None else replace(rule, condition=replace(condition, for_s=for_s))
         case "name":
-            return with_action(rule, part.place, replace(rule.actions[part.place], name=text))
+            return with_action(rule, part.action_index, replace(rule.actions[part.action_index], name=text))
         case "payload":
             try:
                 payload = json.loads(text) if text else None
             except (ValueError, RecursionError):
                 return None
-            return with_action(rule, part.place, replace(rule.actions[part.place], payload=payload))
+            return with_action(
+                rule, part.action_index, replace(rule.actions[part.action_index], payload=payload)
+            )
         case _:
             return None
 
@@ -265,7 +267,7 @@ def taken(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
 _INVALID = object()
 
 
-def read_limit(condition: AlarmCondition, text: str) -> object:
+def parse_limit(condition: AlarmCondition, text: str) -> object:
     """Parse a limit: a number for conditions that need one, else JSON, else the text itself."""
     if condition.kind in NUMBER_KINDS:
         figures, *words = text.replace("%", " ").split() or [""]
@@ -283,7 +285,7 @@ def read_limit(condition: AlarmCondition, text: str) -> object:
     return value if value is None or isinstance(value, str | int | float) else text
 
 
-def read_time(text: str) -> float | None:
+def parse_time(text: str) -> float | None:
     """Parse "2", "2 s", "1.5 min" or "3 h" to seconds; empty text is 0, invalid text None."""
     typed = text.strip()
     if not typed:
@@ -315,9 +317,9 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
         return rule
     limit, for_s = _DEFAULTS.get(kind, (0 if kind in NUMBER_KINDS else None, 0.0))
     both_values = kind in VALUE_KINDS and condition.is_about_value
-    if both_values and kind in NEEDS_LIMIT:
+    if both_values and kind in KINDS_WITH_LIMIT:
         keeps = kind not in NUMBER_KINDS or not math.isnan(condition.number)
-        limit = condition.limit if keeps and condition.kind in NEEDS_LIMIT else limit
+        limit = condition.limit if keeps and condition.kind in KINDS_WITH_LIMIT else limit
         for_s = condition.for_s
     made = AlarmCondition(kind, limit=limit, for_s=for_s)
     if made.is_about_node is condition.is_about_node:
@@ -327,11 +329,11 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
     return replace(rule, condition=made)
 
 
-def rejection_of(part: PhrasePart, rule: AlarmRule) -> str:
+def rejection_text(part: PhrasePart, rule: AlarmRule) -> str:
     """Return a sentence with the values that a slot accepts, to show after an invalid text."""
     match part.role:
         case "limit" if rule.condition.kind in NUMBER_KINDS:
-            return _(SEPARATORS)
+            return _(AMBIGUOUS_SEPARATORS)
         case "time":
             return _("Enter a time such as 2 s, 1.5 min or 250 ms.")
         case "payload":
@@ -340,7 +342,7 @@ def rejection_of(part: PhrasePart, rule: AlarmRule) -> str:
             return ""
 
 
-def example_of(part: PhrasePart, rule: AlarmRule) -> str:
+def placeholder_of(part: PhrasePart, rule: AlarmRule) -> str:
     """Return the placeholder of a slot's field."""
     match part.role:
         case "subject":

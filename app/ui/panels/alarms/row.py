@@ -12,7 +12,7 @@ from app.ui.widgets import Chip, ElidedLabel, IconButton, Separator, Switch, lab
 from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _
 from nep.programs.alarms import AlarmRule
-from nep.programs.alarms.sentences import condition_words
+from nep.programs.alarms.sentences import condition_text
 
 
 class AlarmRow(QWidget):
@@ -71,10 +71,10 @@ class AlarmRow(QWidget):
 
     def show_rule(self, rule: AlarmRule, icon: str, *, snoozed: bool) -> None:
         """Show a rule. Widgets of unchanged slots are kept, so that they don't lose the focus."""
-        said = condition_words(rule.condition)
+        said = condition_text(rule.condition)
         self.setAccessibleName(said)
         self.switch.setAccessibleName(_("Enable: {condition}").format(condition=said))
-        self.switch.setChecked(rule.is_on)
+        self.switch.setChecked(rule.is_enabled)
         self.snooze.set_icon("bell" if snoozed else "bell-off")
         self.snooze.set_name(_("Stop snoozing") if snoozed else _("Snooze for 10 min"))
         parts = parts_of(rule, icon)

@@ -14,7 +14,7 @@ from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.keyboard import following, is_plain
+from app.ui.widgets.keyboard import is_plain, next_in_focus_chain
 from app.ui.widgets.menus import EditMenu
 
 HEIGHT, PADDING, ICON, GAP, MAX_WIDTH = 24, 7, 14, 5, 300
@@ -24,7 +24,7 @@ FIELD_WIDTH = 240
 class AlarmSlot(PaintedButton):
     """Button that represents a word of the sentence; Delete and Backspace remove an action."""
 
-    shortens = True
+    elides_text = True
     removed = Signal()
 
     def __init__(self, theme: Theme, part: PhrasePart, name: str) -> None:
@@ -85,7 +85,7 @@ class AlarmSlot(PaintedButton):
                 square.moveCenter(rect.center())
             paint_icon(painter, square, self.part.icon, ink, filled=self.part.icon == "square")
             left += side + GAP
-        paint.words(
+        paint.text_line(
             painter, rect.adjusted(left - rect.left(), 0, 2 - PADDING, 0), self.text(), self._font(), ink
         )
 
@@ -99,7 +99,7 @@ class SlotField(QLineEdit):
         row: Parent widget, because the field is taller than the `slot`.
     """
 
-    ended = Signal()
+    closed = Signal()
 
     def __init__(
         self,
@@ -124,19 +124,19 @@ class SlotField(QLineEdit):
         completer.setFilterMode(Qt.MatchFlag.MatchContains)
         completer.setCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
         completer.setMaxVisibleItems(10)
-        completer.activated.connect(self._chosen)
+        completer.activated.connect(self._completion_selected)
         popup = completer.popup()
         if popup is not None:
             popup.setProperty("offers", "true")
             popup.setItemDelegate(QStyledItemDelegate(popup))  # lets the style sheet set the padding of items
         self.setCompleter(completer)
         self.textEdited.connect(lambda _text: self._mark(wrong=False))
-        self._place(theme, row)
+        self._position_over_slot(theme, row)
         self.selectAll()
         self.show()
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _place(self, theme: Theme, row: QWidget) -> None:
+    def _position_over_slot(self, theme: Theme, row: QWidget) -> None:
         rect = QRect(self.slot.mapTo(row, QPoint()), self.slot.size())
         rect.setWidth(max(rect.width() + 24, round(theme.scaled(FIELD_WIDTH))))
         if rect.right() > row.width() - 4:
@@ -146,7 +146,7 @@ class SlotField(QLineEdit):
         rect.moveTop(middle - high // 2)
         self.setGeometry(rect)
 
-    def offer(self, words: Sequence[str]) -> None:
+    def set_completions(self, words: Sequence[str]) -> None:
         """Set the completions."""
         if list(words) == self._offered.stringList():
             return
@@ -159,40 +159,40 @@ class SlotField(QLineEdit):
         completer.setCompletionPrefix("")
         completer.complete()
 
-    def _chosen(self, _text: str) -> None:
+    def _completion_selected(self, _text: str) -> None:
         # QCompleter sets the text after this signal.
-        QTimer.singleShot(0, self, self._take_and_leave)
+        QTimer.singleShot(0, self, self._commit_and_dismiss)
 
-    def _take_and_leave(self) -> None:
-        if not self._is_over and self._taken():
-            self.leave()
+    def _commit_and_dismiss(self) -> None:
+        if not self._is_over and self._commit():
+            self.dismiss()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         popup = self.completer().popup()
         is_offering = popup is not None and popup.isVisible()
         if event.key() == Qt.Key.Key_Escape and not is_offering:
-            self.leave()
+            self.dismiss()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
-            self._take_and_leave()
+            self._commit_and_dismiss()
         elif event.key() == Qt.Key.Key_Down and not is_offering:
             self._show_all()
         else:
             super().keyPressEvent(event)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        if self._taken():
+        if self._commit():
             slot = self.slot
-            self.leave()
-            following(slot, forward=forward).setFocus(Qt.FocusReason.TabFocusReason)
+            self.dismiss()
+            next_in_focus_chain(slot, forward=forward).setFocus(Qt.FocusReason.TabFocusReason)
         return True
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
-            self._taken()
-            self.leave(keeps_focus=False)
+            self._commit()
+            self.dismiss(keeps_focus=False)
 
-    def _taken(self) -> bool:
+    def _commit(self) -> bool:
         well = self._take(self.text())
         self._mark(wrong=not well)
         return well
@@ -208,7 +208,7 @@ class SlotField(QLineEdit):
             elif not wrong:
                 QToolTip.hideText()
 
-    def leave(self, *, keeps_focus: bool = True) -> None:
+    def dismiss(self, *, keeps_focus: bool = True) -> None:
         """Close the field and return the focus to its slot."""
         if self._is_over:
             return
@@ -216,5 +216,5 @@ class SlotField(QLineEdit):
         if keeps_focus:
             self.slot.setFocus(Qt.FocusReason.OtherFocusReason)
         self.hide()
-        self.ended.emit()
+        self.closed.emit()
         self.deleteLater()

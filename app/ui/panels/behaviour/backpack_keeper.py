@@ -7,7 +7,7 @@ from typing import Protocol
 
 from PySide6.QtCore import SignalInstance
 
-from app.core.documents.backpack import Backpack, Packed
+from app.core.documents.backpack import Backpack, BackpackStack
 from app.core.storage import deep_json
 from app.errors import BackpackError
 from app.ui.panels.base import PanelContext
@@ -17,26 +17,26 @@ from nep.text import bounded_str
 POLL_TICKS = 30  # refreshes at 30 Hz: changes of another Studio appear within a second
 
 
-class Shows(Protocol):
+class BackpackView(Protocol):
     """Part of the block editor that displays the backpack."""
 
-    backpack_asked: SignalInstance
+    backpack_requested: SignalInstance
 
     def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None: ...
 
 
-class BackpackKeeper:
+class BackpackController:
     """Executes the page's requests about the backpack.
 
     A request is a JSON object with the operation in ``do``: put (with ``blocks``, ``count``, ``notes``),
     remove (with ``id``), empty or look. Every change can be undone from its toast.
     """
 
-    def __init__(self, context: PanelContext, backpack: Backpack, editor: Shows) -> None:
+    def __init__(self, context: PanelContext, backpack: Backpack, editor: BackpackView) -> None:
         self._context, self._backpack, self._editor = context, backpack, editor
         self._shown = -1
         self._ticks = 0
-        editor.backpack_asked.connect(self._asked)
+        editor.backpack_requested.connect(self._handle_request)
         self.reload_if_changed()
 
     def tick(self) -> None:
@@ -51,14 +51,14 @@ class BackpackKeeper:
         self._show()
 
     def _show(self) -> None:
-        trouble = self._backpack.take_trouble()
+        trouble = self._backpack.take_problem()
         if trouble:
-            self._context.toast(_sentence(trouble))
+            self._context.toast(_capitalize_first(trouble))
         if self._shown != self._backpack.revision:
             self._shown = self._backpack.revision
             self._editor.set_backpack([item.to_json() for item in self._backpack.items])
 
-    def _asked(self, what: str) -> None:
+    def _handle_request(self, what: str) -> None:
         try:
             asked = deep_json.loads(what)
         except (ValueError, RecursionError):
@@ -70,16 +70,16 @@ class BackpackKeeper:
         elif asked.get("do") == "put":
             blocks, count = asked.get("blocks"), asked.get("count")
             if isinstance(blocks, list) and isinstance(count, int):
-                self._put(blocks, count, left=bool(asked.get("notes")))
+                self._add(blocks, count, left=bool(asked.get("notes")))
         elif asked.get("do") == "remove":
-            self._take_out(lambda: self._backpack.remove([bounded_str(asked.get("id"))]), emptied=False)
+            self._remove(lambda: self._backpack.remove([bounded_str(asked.get("id"))]), emptied=False)
         elif asked.get("do") == "empty":
-            self._take_out(self._backpack.empty, emptied=True)
+            self._remove(self._backpack.empty, emptied=True)
 
-    def _put(self, blocks: Sequence[Mapping[str, object]], count: int, *, left: bool) -> None:
+    def _add(self, blocks: Sequence[Mapping[str, object]], count: int, *, left: bool) -> None:
         # `left` is True if the selection contained notes, which the backpack doesn't store.
-        made: list[Packed] = []
-        if blocks and self._try(lambda: made.extend(self._backpack.put(blocks))):
+        made: list[BackpackStack] = []
+        if blocks and self._try(lambda: made.extend(self._backpack.add(blocks))):
             words = ngettext(
                 "Added {count} block to the backpack", "Added {count} blocks to the backpack", count
             )
@@ -89,8 +89,8 @@ class BackpackKeeper:
                 said = _("{what}. Notes were not added: the backpack can only hold blocks.").format(what=said)
             self._context.toast(said, _("Undo"), lambda: self._try(lambda: self._backpack.remove(ids)))
 
-    def _take_out(self, take: Callable[[], list[Packed]], *, emptied: bool) -> None:
-        gone: list[Packed] = []
+    def _remove(self, take: Callable[[], list[BackpackStack]], *, emptied: bool) -> None:
+        gone: list[BackpackStack] = []
         if self._try(lambda: gone.extend(take())) and gone:
             words = _("Emptied the backpack") if emptied else _("Removed from the backpack")
             self._context.toast(words, _("Undo"), lambda: self._try(lambda: self._backpack.restore(gone)))
@@ -99,12 +99,12 @@ class BackpackKeeper:
         try:
             change()
         except BackpackError as error:
-            self._context.toast(_sentence(str(error)))
+            self._context.toast(_capitalize_first(str(error)))
             return False
         finally:
             self._show()
         return True
 
 
-def _sentence(words: str) -> str:
+def _capitalize_first(words: str) -> str:
     return words[:1].upper() + words[1:]

@@ -11,28 +11,28 @@ from PySide6.QtWidgets import QWidget
 
 from app.core.session import Session
 from app.ui.panels.base import PanelContext
-from app.ui.panels.behaviour.tabs import NEW, BehaviourTabs
+from app.ui.panels.behaviour.tabs import NEW_TAB, BehaviourTabs
 from nep.i18n import _, ngettext
 
 SCROLL_INTERVAL_MS = 16
 OPEN_DELAY_MS = 500  # like spring-loaded folders in file managers
-BESIDE = QPoint(14, 16)  # offset from the mouse, so that the tab under it stays readable
+POINTER_OFFSET = QPoint(14, 16)  # offset from the mouse, so that the tab under it stays readable
 OPACITY = 0.85
 
 
-class Carrier(Protocol):
+class DragSource(Protocol):
     """Part of the block editor from which blocks are dragged."""
 
-    block_carried: SignalInstance
-    carried_seen: SignalInstance
-    block_dropped: SignalInstance
-    blocks_brought: SignalInstance
+    blocks_dragged_outside: SignalInstance
+    drag_picture_rendered: SignalInstance
+    blocks_dropped_outside: SignalInstance
+    blocks_transferred: SignalInstance
 
-    def bring_blocks(self) -> None: ...
-    def give_blocks_back(self) -> None: ...
+    def move_dragged_blocks(self) -> None: ...
+    def undo_block_move(self) -> None: ...
 
 
-class CarriedPicture(QWidget):
+class DragImage(QWidget):
     """Picture of the dragged blocks at the mouse pointer. The page can't paint outside itself.
 
     An overlay of `window` that is transparent for mouse events; hidden until it has a position and a picture.
@@ -68,7 +68,7 @@ class CarriedPicture(QWidget):
         if place is None or window is None or self._picture.isNull():
             self.hide()
             return
-        self.move(window.mapFromGlobal(place) + BESIDE)
+        self.move(window.mapFromGlobal(place) + POINTER_OFFSET)
         if not self.isVisible():
             self.show()
             self.raise_()
@@ -80,7 +80,7 @@ class CarriedPicture(QWidget):
         painter.end()
 
 
-class CarriedBlocks:
+class BlockDrag:
     """Highlights the tab under blocks that are dragged out of the page, and drops the blocks there.
 
     A tab opens after the mouse has hovered over it for a while, and the drag continues on its page. A drop on
@@ -96,7 +96,7 @@ class CarriedBlocks:
         context: PanelContext,
         session: Session,
         tabs: BehaviourTabs,
-        editor: Carrier,
+        editor: DragSource,
         flush: Callable[[Callable[[], None]], None],
         show: Callable[[], None],
     ) -> None:
@@ -104,30 +104,30 @@ class CarriedBlocks:
         self._flush, self._show = flush, show
         self._home = ""  # key of the tab that the drag started on
         self._held_at: QPoint | None = None
-        self._picture: CarriedPicture | None = None
+        self._picture: DragImage | None = None
         self._aimed = ""
         self._opening = QTimer(tabs)
         self._opening.setSingleShot(True)
         self._opening.setInterval(OPEN_DELAY_MS)
-        self._opening.timeout.connect(self._open)
+        self._opening.timeout.connect(self._open_target)
         self._scrolling = QTimer(tabs)
         self._scrolling.setInterval(SCROLL_INTERVAL_MS)
         self._scrolling.timeout.connect(self._scroll)
-        editor.block_carried.connect(self._carried)
-        editor.carried_seen.connect(self._seen)
-        editor.block_dropped.connect(self._dropped)
-        editor.blocks_brought.connect(self._brought)
+        editor.blocks_dragged_outside.connect(self._drag_moved)
+        editor.drag_picture_rendered.connect(self._set_image)
+        editor.blocks_dropped_outside.connect(self._dropped)
+        editor.blocks_transferred.connect(self._transferred)
 
     def _target(self, place: QPoint) -> str:
         found = self._tabs.target_at(place)
         return found if found != self._home else ""
 
-    def _carried(self, place: QPoint | None, home: str) -> None:
+    def _drag_moved(self, place: QPoint | None, home: str) -> None:
         self._held_at = place
         if place is not None:  # None after the drop: the visible tab may already be another one
             self._home = home
-        self._show_at(place)
-        self._aim(place)
+        self._move_image(place)
+        self._update_target(place)
         if place is None:
             self._scrolling.stop()
         elif not self._scrolling.isActive():
@@ -136,36 +136,36 @@ class CarriedBlocks:
     def _scroll(self) -> None:
         place = self._held_at
         if place is not None and self._tabs.scroll_at(place):
-            self._aim(place)
+            self._update_target(place)
         else:
             self._scrolling.stop()  # the next mouse move starts it again
 
-    def _aim(self, place: QPoint | None) -> None:
-        self._tabs.aim(self._target(place) if place is not None else "")
+    def _update_target(self, place: QPoint | None) -> None:
+        self._tabs.highlight_target(self._target(place) if place is not None else "")
         found = self._tabs.target_at(place) if place is not None else ""
         if found == self._aimed:
             return
         self._aimed = found
-        if found in {"", NEW, self._session.document.key}:
+        if found in {"", NEW_TAB, self._session.document.key}:
             self._opening.stop()
         else:
             self._opening.start()
 
-    def _open(self) -> None:
-        if self._held_at is not None and self._aimed not in {"", NEW}:
+    def _open_target(self) -> None:
+        if self._held_at is not None and self._aimed not in {"", NEW_TAB}:
             self._context.run(f"tab:{self._aimed}")
             self._show()
 
-    def _seen(self, data: bytes, ratio: float) -> None:
+    def _set_image(self, data: bytes, ratio: float) -> None:
         if self._picture is not None:
             self._picture.set_picture(data, ratio)
 
-    def _show_at(self, place: QPoint | None) -> None:
+    def _move_image(self, place: QPoint | None) -> None:
         window = self._tabs.window()
         if place is not None and (self._picture is None or self._picture.parentWidget() is not window):
             if self._picture is not None:
                 self._picture.deleteLater()
-            self._picture = CarriedPicture(window)
+            self._picture = DragImage(window)
         if self._picture is not None:
             self._picture.move_to(place)
 
@@ -173,34 +173,34 @@ class CarriedBlocks:
         target = self._target(place)
         self._held_at = None
         self._scrolling.stop()
-        self._show_at(None)
-        self._aim(None)
+        self._move_image(None)
+        self._update_target(None)
         if not target:
             return
-        if target != NEW:
+        if target != NEW_TAB:
             self._context.run(f"tab:{target}")
-            self._bring()
+            self._transfer()
             return
         self._context.run("file.new")
-        self._flush(self._bring)  # after the flush of file.new, which shows the new behaviour
+        self._flush(self._transfer)  # after the flush of file.new, which shows the new behaviour
 
-    def _bring(self) -> None:
+    def _transfer(self) -> None:
         if self._session.document.key != self._home:
             self._show()
-            self._editor.bring_blocks()
+            self._editor.move_dragged_blocks()
 
-    def _brought(self, count: int, how: str, home: str) -> None:
+    def _transferred(self, count: int, how: str, home: str) -> None:
         document = self._session.document
-        words = brought_words(count, how, self._session.documents.title(document))
+        words = transfer_text(count, how, self._session.documents.title(document))
 
-        def give_back() -> None:
+        def undo() -> None:
             self._context.run(f"tab:{home}")
-            self._editor.give_blocks_back()
+            self._editor.undo_block_move()
 
-        self._context.toast(words, _("Undo"), give_back)
+        self._context.toast(words, _("Undo"), undo)
 
 
-def brought_words(count: int, how: str, name: str) -> str:
+def transfer_text(count: int, how: str, name: str) -> str:
     """Return the toast text after blocks were "moved", "copied" or "added"; `count` 0 stands for a note."""
     if not count:
         words = _("Moved the note to {name}") if how == "moved" else _("Copied the note to {name}")

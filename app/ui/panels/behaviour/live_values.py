@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 from app.robots.description.description import DataField, Robot, Sensor
-from app.ui.text.sensor_values import number_words, reading_of, yes_words
+from app.ui.text.sensor_values import quantity_text, reading_text, yes_no_text
 
 SILENT = "silent"
 
 
-class KnownValues(Protocol):
+class SensorValues(Protocol):
     """Sensor values of a robot, as provided by `app.core.robots.robot_link.RobotLink`."""
 
     @property
@@ -21,16 +21,16 @@ class KnownValues(Protocol):
     @property
     def state(self) -> str: ...
     @property
-    def connected(self) -> bool: ...
+    def is_connected(self) -> bool: ...
 
 
 class RobotLookup(Protocol):
     """Lookup of robots by name."""
 
-    def link(self, name: str) -> KnownValues | None: ...
+    def link(self, name: str) -> SensorValues | None: ...
 
 
-def live_words(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
+def sensor_texts(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
     """Return the texts for sensor blocks, and the keys of stale ones.
 
     Keys are ``<robot>/<sensor>`` or ``<robot>/<sensor>/<field>``. Values are stale while the robot is silent;
@@ -41,27 +41,27 @@ def live_words(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[
     for robot, name in sensors:
         link = fleet.link(robot)
         sensor = link.robot.sensor(name) if link is not None else None
-        if link is None or sensor is None or not link.connected:
+        if link is None or sensor is None or not link.is_connected:
             continue
-        told = _words(f"{robot}/{name}", sensor, link.values.get(name))
+        told = _value_texts(f"{robot}/{name}", sensor, link.values.get(name))
         words |= told
         if link.state == SILENT:
             old |= told.keys()
     return words, old
 
 
-def _words(key: str, sensor: Sensor, value: object) -> dict[str, str]:
+def _value_texts(key: str, sensor: Sensor, value: object) -> dict[str, str]:
     if sensor.kind != "object":
-        return {key: reading_of(sensor, value).value}
+        return {key: reading_text(sensor, value).value}
     parts = value if isinstance(value, Mapping) else {}
     return {
-        f"{key}/{field.name}": _part(field, parts[field.name])
+        f"{key}/{field.name}": _field_text(field, parts[field.name])
         for field in sensor.fields
         if parts.get(field.name) is not None
     }
 
 
-def _part(field: DataField, value: object) -> str:
+def _field_text(field: DataField, value: object) -> str:
     if isinstance(value, bool):
-        return yes_words(value)
-    return number_words(value, field.unit) if isinstance(value, (int, float)) else str(value)
+        return yes_no_text(value)
+    return quantity_text(value, field.unit) if isinstance(value, (int, float)) else str(value)

@@ -14,15 +14,15 @@ from PySide6.QtGui import QGuiApplication, QPageLayout
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.documents.backpack import Backpack
-from app.core.documents.rename import why_not
-from app.core.documents.titles import told_apart
-from app.core.reports.not_installed import MissingLibraries, missing_libraries, tell_missing
+from app.core.documents.rename import name_problem
+from app.core.documents.titles import unique_titles
+from app.core.reports.not_installed import MissingLibraries, alert_missing, missing_libraries
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.behaviour.backpack_keeper import BackpackKeeper
-from app.ui.panels.behaviour.carried_blocks import CarriedBlocks
-from app.ui.panels.behaviour.live_values import live_words
+from app.ui.panels.behaviour.backpack_keeper import BackpackController
+from app.ui.panels.behaviour.carried_blocks import BlockDrag
+from app.ui.panels.behaviour.live_values import sensor_texts
 from app.ui.panels.behaviour.program_view import ProgramView
 from app.ui.panels.behaviour.tab import TabFacts
 from app.ui.panels.behaviour.tabs import BehaviourTitle
@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 LIVE_UPDATE_TICKS = 6  # refreshes at 30 Hz: values on sensor blocks are updated five times a second
 PINNED_SETTING = "toolbox_pinned"
 ALARM_STATES = frozenset({NOT_STOPPED, STOPPING, "silent"})
-WAIT_WORDS = lazy("Loading blocks.")
-WAIT_UNTIL_S = 0.5
+LOADING_TEXT = lazy("Loading blocks.")
+LOADING_TEXT_DELAY_S = 0.5
 START_COMMANDS = {"robot": "robots.virtual", "examples": "help.examples"}
 """Window commands of the buttons on an empty canvas."""
 _PLACEHOLDER = re.compile(r"\([^()]*\)")  # placeholders in the help, such as "(robot) say (text)"
@@ -56,18 +56,18 @@ class Editor(Protocol):
     history_changed: SignalInstance
     key_pressed: SignalInstance
     recovered: SignalInstance
-    sensors_offered: SignalInstance
-    command_wanted: SignalInstance
-    values_watched: SignalInstance
-    wanted: SignalInstance
-    try_asked: SignalInstance
+    visible_sensors_changed: SignalInstance
+    command_requested: SignalInstance
+    watched_variables_changed: SignalInstance
+    canvas_button_pressed: SignalInstance
+    try_requested: SignalInstance
     toolbox_pinned: SignalInstance
     blocks_deleted: SignalInstance
-    block_carried: SignalInstance
-    carried_seen: SignalInstance
-    block_dropped: SignalInstance
-    blocks_brought: SignalInstance
-    backpack_asked: SignalInstance
+    blocks_dragged_outside: SignalInstance
+    drag_picture_rendered: SignalInstance
+    blocks_dropped_outside: SignalInstance
+    blocks_transferred: SignalInstance
+    backpack_requested: SignalInstance
 
     @property
     def is_ready(self) -> bool: ...
@@ -76,7 +76,7 @@ class Editor(Protocol):
     def show_tab(self, key: str, workspace: Json) -> None: ...
     def close_tab(self, key: str) -> None: ...
     def load(self, workspace: Json) -> None: ...
-    def change(self, workspace: Json) -> None: ...
+    def apply_edit(self, workspace: Json) -> None: ...
     def flush(self, done: Callable[[WorkspaceJson], None]) -> None: ...
     def set_theme(self, tokens: Json, dark: bool) -> None: ...
     def highlight(self, ids: Sequence[str]) -> None: ...
@@ -96,17 +96,19 @@ class Editor(Protocol):
     def edit(self, what: str) -> None: ...
     def edit_from_menu(self, what: str) -> None: ...
     def undo_deletion(self) -> None: ...
-    def bring_blocks(self) -> None: ...
-    def give_blocks_back(self) -> None: ...
+    def move_dragged_blocks(self) -> None: ...
+    def undo_block_move(self) -> None: ...
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None: ...
-    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None: ...
+    def render_pdf(
+        self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]
+    ) -> None: ...
     def open_find(self) -> None: ...
     def open_search(self) -> None: ...
     def redo(self) -> None: ...
     def show_block(self, id: str) -> None: ...
 
 
-def blockly(parent: QWidget) -> Editor:
+def make_blockly_editor(parent: QWidget) -> Editor:
     """Create the real block editor; called when the panel is first shown."""
     # Importing Qt WebEngine takes about 200 ms.
     from app.ui.blockly.view import BlocklyView  # noqa: PLC0415
@@ -118,7 +120,9 @@ def blockly(parent: QWidget) -> Editor:
 class BehaviourPanel(PanelWidget):
     """Panel with the active behaviour as editable blocks or read-only Python."""
 
-    def __init__(self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = blockly) -> None:
+    def __init__(
+        self, context: PanelContext, make_editor: Callable[[QWidget], Editor] = make_blockly_editor
+    ) -> None:
         super().__init__(context, _("Behaviour"))
         self._can_open = True
         self._bar = BehaviourTitle(self.theme)
@@ -127,12 +131,12 @@ class BehaviourPanel(PanelWidget):
         self._bar.undo.clicked.connect(self.undo)
         self._bar.redo.clicked.connect(self.redo)
         tabs = self._bar.tabs
-        tabs.chosen.connect(lambda key: context.run(f"tab:{key}"))
-        tabs.closed.connect(lambda key: context.run(f"tab.close:{key}"))
+        tabs.selected.connect(lambda key: context.run(f"tab:{key}"))
+        tabs.close_requested.connect(lambda key: context.run(f"tab.close:{key}"))
         tabs.moved.connect(lambda key, place: context.run(f"tab.move:{key}:{place}"))
-        tabs.asked.connect(lambda command, key: context.run(f"{command}:{key}"))
+        tabs.command_requested.connect(lambda command, key: context.run(f"{command}:{key}"))
         tabs.renamed.connect(lambda key, name: context.run(f"tab.rename:{key}:{name}"))
-        tabs.why_not = self._why_not_named
+        tabs.why_not = self._name_problem
         tabs.add.clicked.connect(lambda: context.run("file.new"))
         self.mode = "blocks"
         self.program = ProgramView(self.theme)
@@ -141,8 +145,8 @@ class BehaviourPanel(PanelWidget):
         self._place = QWidget()
         self._place_column = QVBoxLayout(self._place)
         self._place_column.setContentsMargins(0, 0, 0, 0)
-        self.pages = self.show_one_of(self._place, self.program)
-        self.waiting = BlocksWait(self._place)
+        self.pages = self.make_page_stack(self._place, self.program)
+        self.waiting = LoadingMessage(self._place)
         self._shown: dict[str, object] = {}
         self._given: dict[str, tuple[int, int]] = {}
         self._watches: dict[str, Watch] = {}
@@ -150,10 +154,10 @@ class BehaviourPanel(PanelWidget):
         self._offered: tuple[tuple[str, str], ...] = ()  # sensors in the flyout while it is open
         self._watched: tuple[str, ...] = ()  # ids of variables whose values the page shows
         self._ticks = 0
-        self._carried: CarriedBlocks | None = None
-        self._backpack: BackpackKeeper | None = None
+        self._carried: BlockDrag | None = None
+        self._backpack: BackpackController | None = None
 
-    def replaces_title(self) -> QWidget:
+    def title_widget(self) -> QWidget:
         return self._bar
 
     # -- display ------------------------------------------------------------------------------------------
@@ -165,10 +169,10 @@ class BehaviourPanel(PanelWidget):
         if self.editor is None and self._can_open:
             self.editor = self._open_editor()
         if self.editor is not None:
-            if self._new("definitions", documents.definitions_revision):
+            if self._has_changed("definitions", documents.definitions_revision):
                 self.editor.set_definitions(documents.definitions())
             self._show_blocks(self.editor)
-        program = document.newest()
+        program = document.newest_program()
         if program is not None and program is not self._shown.get("facts"):
             self._shown["facts"] = program
             self._program_changed(program)
@@ -178,26 +182,26 @@ class BehaviourPanel(PanelWidget):
     def _show_run(self, editor: Editor) -> None:
         runs, document = self.session.runs, self.session.document
         mine = runs.document is document
-        if self._new("blocks", (runs.blocks_revision, mine)):
+        if self._has_changed("blocks", (runs.blocks_revision, mine)):
             editor.highlight(runs.running_blocks if mine else ())
             editor.mark_stopped(runs.stopped_blocks if mine else ())
             editor.set_errors(runs.block_errors if mine else {})
             editor.set_warnings(runs.block_warnings if mine else {})
         tried = runs.tried_value
-        if self._new("tried", tried) and tried is not None and tried.document is document:
-            editor.show_value(tried.block, tried.words)
+        if self._has_changed("tried", tried) and tried is not None and tried.document is document:
+            editor.show_value(tried.block, tried.text)
         alarms = alarms_of(self.session.fleet.links)
-        if self._new("alarms", alarms):
+        if self._has_changed("alarms", alarms):
             editor.set_alarms(alarms)
-        if self._new("values", (runs.values_revision, mine, self._watched)):
+        if self._has_changed("values", (runs.values_revision, mine, self._watched)):
             values = runs.values if mine else {}
             editor.set_variable_values({id: values[id].to_json() for id in self._watched if id in values})
         if self._ticks % LIVE_UPDATE_TICKS == 0:
             self._show_live()
         if self._backpack is not None:
             self._backpack.tick()
-        self.waiting.report(ready=editor.is_ready)
-        robot = bool(self.session.fleet.connected or self.session.coming)
+        self.waiting.set_ready(ready=editor.is_ready)
+        robot = bool(self.session.fleet.connected or self.session.starting_robots)
         editor.set_first_step(pgettext("block", "when started"), robot)
 
     def show_current(self) -> None:
@@ -212,20 +216,20 @@ class BehaviourPanel(PanelWidget):
         document = self.session.document
         now = (document.revision, document.fixes)
         known = self._given.get(document.key)
-        if self._new("tab", document.key):
+        if self._has_changed("tab", document.key):
             editor.show_tab(document.key, document.workspace)
             for what in ("facts", "blocks"):
                 self._shown.pop(what, None)
         if known is not None and known[0] != now[0]:
             editor.load(document.workspace)
         elif known is not None and known[1] != now[1]:
-            editor.change(document.workspace)
+            editor.apply_edit(document.workspace)
         self._given[document.key] = now
         for key in self._given.keys() - {each.key for each in self.session.documents}:
             del self._given[key]
             editor.close_tab(key)
 
-    def _new(self, what: str, now: object) -> bool:
+    def _has_changed(self, what: str, now: object) -> bool:
         if self._shown.get(what) == now and what in self._shown:
             return False
         self._shown[what] = now
@@ -239,26 +243,26 @@ class BehaviourPanel(PanelWidget):
             if missing is None:
                 raise
             self._can_open = False
-            self._refuse(missing)
+            self._show_missing_libraries(missing)
             return None
         editor.changed.connect(self._edited)
         editor.recovered.connect(
             lambda: self.context.toast(_("The block editor was restarted. Undo history was cleared."))
         )
-        editor.history_changed.connect(self._history)
-        editor.key_pressed.connect(self._key)
-        editor.sensors_offered.connect(self._offer)
-        editor.command_wanted.connect(self.context.run)
-        editor.values_watched.connect(self._watch_variables)
-        editor.wanted.connect(lambda what: self.context.run(START_COMMANDS[what]))
-        editor.try_asked.connect(lambda stack: self.context.run(f"try:{stack}"))
-        editor.toolbox_pinned.connect(self._keep_pinned)
-        editor.blocks_deleted.connect(lambda count: self._deleted(editor, count))
-        self._carried = CarriedBlocks(
+        editor.history_changed.connect(self._history_changed)
+        editor.key_pressed.connect(self._key_pressed)
+        editor.visible_sensors_changed.connect(self._set_flyout_sensors)
+        editor.command_requested.connect(self.context.run)
+        editor.watched_variables_changed.connect(self._watch_variables)
+        editor.canvas_button_pressed.connect(lambda what: self.context.run(START_COMMANDS[what]))
+        editor.try_requested.connect(lambda stack: self.context.run(f"try:{stack}"))
+        editor.toolbox_pinned.connect(self._save_pinned)
+        editor.blocks_deleted.connect(lambda count: self._blocks_deleted(editor, count))
+        self._carried = BlockDrag(
             self.context, self.session, self._bar.tabs, editor, self.flush, self.show_current
         )
         backpack = Backpack(self.session.settings.path.parent)
-        self._backpack = BackpackKeeper(self.context, backpack, editor)
+        self._backpack = BackpackController(self.context, backpack, editor)
         pinned: object = self.session.settings.get(PINNED_SETTING, None)
         editor.set_toolbox_pinned(pinned if isinstance(pinned, bool) else None)
         editor.set_theme(self.theme.blockly_tokens(), self.theme.dark)
@@ -270,8 +274,8 @@ class BehaviourPanel(PanelWidget):
                 editor.setFocus(Qt.FocusReason.OtherFocusReason)
         return editor
 
-    def _refuse(self, missing: MissingLibraries) -> None:
-        tell_missing(self.session.alerts, missing)
+    def _show_missing_libraries(self, missing: MissingLibraries) -> None:
+        alert_missing(self.session.alerts, missing)
         state = EmptyState(self.theme, "circle-x", missing.title, missing.remedy)
         if missing.command:
             copy = partial(self._copy_command, missing.command)
@@ -291,14 +295,14 @@ class BehaviourPanel(PanelWidget):
         if self.mode == "python":
             self.program.show_program(program.source)
 
-    def _look_at(self, robots: set[str]) -> None:
+    def _watch_robots(self, robots: set[str]) -> None:
         for name in self._watches.keys() - robots:
             self._watches.pop(name).close()
         for name in robots - self._watches.keys():
             if self.session.fleet.link(name) is not None:
-                self._watches[name] = self.session.fleet.look_at(name)
+                self._watches[name] = self.session.fleet.watch_sensors(name)
 
-    def _offer(self, sensors: tuple[tuple[str, str], ...]) -> None:
+    def _set_flyout_sensors(self, sensors: tuple[tuple[str, str], ...]) -> None:
         self._offered = sensors
         self._show_live()
 
@@ -316,20 +320,20 @@ class BehaviourPanel(PanelWidget):
             else:
                 self.editor.edit_variable(edit)
 
-    def _keep_pinned(self, keeps: bool) -> None:
+    def _save_pinned(self, keeps: bool) -> None:
         # Failed writes are shown by the status bar.
         with suppress(SettingsError):
             self.session.settings.set(PINNED_SETTING, keeps)
 
-    def _deleted(self, editor: Editor, count: int) -> None:
+    def _blocks_deleted(self, editor: Editor, count: int) -> None:
         words = ngettext("Deleted {count} block", "Deleted {count} blocks", count).format(count=count)
         self.context.toast(words, _("Undo"), editor.undo_deletion)
 
     def _show_live(self) -> None:
         sensors = dict.fromkeys((*self._sensors, *self._offered))
-        self._look_at({robot for robot, _name in sensors})
+        self._watch_robots({robot for robot, _name in sensors})
         if self.editor is not None:
-            words, old = live_words(self.session.fleet, sensors)
+            words, old = sensor_texts(self.session.fleet, sensors)
             self.editor.set_live_values(words, old)
 
     def theme_changed(self) -> None:
@@ -388,12 +392,12 @@ class BehaviourPanel(PanelWidget):
         else:
             self.editor.picture(kind, white, done)
 
-    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         """Render all blocks as a PDF with this page layout and pass it to `done`; b"" without blocks."""
         if self.editor is None:
             done(b"")
         else:
-            self.editor.pdf(title, date, layout, done)
+            self.editor.render_pdf(title, date, layout, done)
 
     def find_blocks(self, *, to_add: bool) -> None:
         """Open the search in the toolbox (if `to_add`) or in the behaviour."""
@@ -425,25 +429,25 @@ class BehaviourPanel(PanelWidget):
             self.editor.show_block(block)
 
     def _edited(self, key: str, workspace: WorkspaceJson) -> None:
-        document = self.session.documents.with_key(key)
+        document = self.session.documents.find_by_key(key)
         if document is not None:
-            was_blank = document.blank
-            document.edited(workspace)
-            self.session.tabs.edited(document, was_blank=was_blank)
+            was_blank = document.is_blank
+            document.apply_edit(workspace)
+            self.session.tabs.on_edited(document, was_blank=was_blank)
 
     def rename_tab(self, key: str) -> None:
         """Start in-place editing of a tab's name."""
         self._bar.tabs.edit(key)
 
-    def _why_not_named(self, key: str, name: str) -> str:
-        document = self.session.documents.with_key(key)
-        return why_not(name, document.path) if document is not None else ""
+    def _name_problem(self, key: str, name: str) -> str:
+        document = self.session.documents.find_by_key(key)
+        return name_problem(name, document.path) if document is not None else ""
 
-    def _history(self, can_undo: bool, can_redo: bool) -> None:
+    def _history_changed(self, can_undo: bool, can_redo: bool) -> None:
         self._bar.undo.setEnabled(can_undo)
         self._bar.redo.setEnabled(can_redo)
 
-    def _key(self, key: str) -> None:
+    def _key_pressed(self, key: str) -> None:
         self.context.run(f"key:{key}")  # the shortcut table knows the command of this key
 
     def save_state(self) -> dict[str, object]:
@@ -457,10 +461,10 @@ class BehaviourPanel(PanelWidget):
 
     def dispose(self) -> None:
         self._sensors = self._offered = ()
-        self._look_at(set())
+        self._watch_robots(set())
 
 
-class BlocksWait:
+class LoadingMessage:
     """Loading message in the middle of `place`.
 
     Shown only after half a second, so that fast loading doesn't flicker. `clock` returns seconds.
@@ -469,20 +473,20 @@ class BlocksWait:
     def __init__(self, place: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
         self._place, self._clock = place, clock
         self._since: float | None = None
-        self.words = label(_(WAIT_WORDS), "bodyLarge", role="textSecondary", wrap=True)
+        self.words = label(_(LOADING_TEXT), "bodyLarge", role="textSecondary", wrap=True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.words.setParent(place)
         self.words.hide()
 
-    def report(self, *, ready: bool) -> None:
+    def set_ready(self, *, ready: bool) -> None:
         """Show or hide the message, depending on whether the page is ready; call on every refresh."""
         now = self._clock()
         if ready:
             self._since = None
         elif self._since is None:
             self._since = now
-        late = self._since is not None and now - self._since >= WAIT_UNTIL_S
+        late = self._since is not None and now - self._since >= LOADING_TEXT_DELAY_S
         if late:
             self.words.setGeometry(self._place.rect())
             self.words.raise_()
@@ -493,7 +497,7 @@ class BlocksWait:
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
     """Return toolbox icon and text, by name, for robots that may be moving or don't reply."""
     return {
-        link.name: (ROBOT_STATUS[link.state], link.state_words)
+        link.name: (ROBOT_STATUS[link.state], link.state_label)
         for link in links
         if link.state in ALARM_STATES
     }
@@ -503,7 +507,7 @@ def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
     """Return the data of each tab."""
     shown = list(documents)
     found = []
-    for document, title in zip(shown, told_apart([(each.name, each.path) for each in shown]), strict=True):
+    for document, title in zip(shown, unique_titles([(each.name, each.path) for each in shown]), strict=True):
         running = runs.active and runs.document is document
         where = str(document.path) if document.path is not None else _("Not saved to a file yet")
         found.append(

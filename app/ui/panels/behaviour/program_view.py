@@ -14,7 +14,7 @@ from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
 # The first rule that matches wins: strings and comments come before keywords.
-_RULES: tuple[tuple[str, str], ...] = (
+_HIGHLIGHT_RULES: tuple[tuple[str, str], ...] = (
     ("ok", r"""[fFrRbB]{0,2}(?:\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])*')"""),
     ("textTertiary", r"#[^\n]*"),
     ("changed", r"@[\w.]+"),
@@ -24,16 +24,16 @@ _RULES: tuple[tuple[str, str], ...] = (
 )
 
 
-class _Colours(QSyntaxHighlighter):
+class _Highlighter(QSyntaxHighlighter):
     def __init__(self, document: QTextDocument, theme: Theme) -> None:
         super().__init__(document)
         self._theme = theme
-        together = "|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_RULES))
+        together = "|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_HIGHLIGHT_RULES))
         self._rules = re.compile(together)
 
     def highlightBlock(self, text: str) -> None:
         for found in self._rules.finditer(text):
-            role = _RULES[int((found.lastgroup or "r0")[1:])][0]
+            role = _HIGHLIGHT_RULES[int((found.lastgroup or "r0")[1:])][0]
             shown = QTextCharFormat()
             shown.setForeground(self._theme.colour(role))
             self.setFormat(found.start(), found.end() - found.start(), shown)
@@ -51,7 +51,7 @@ class ProgramView(QPlainTextEdit):
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.setAccessibleName(_("Python program"))
         self.document().setDocumentMargin(16)
-        self._colours = _Colours(self.document(), theme)
+        self._colours = _Highlighter(self.document(), theme)
         EditMenu(theme, self)
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -70,7 +70,7 @@ class ProgramView(QPlainTextEdit):
             self.setPlainText(source)
             bar.setValue(place)
 
-    def line_with(self, words: str) -> int:
+    def line_containing(self, words: str) -> int:
         """Return the 1-based number of the first line that contains `words`, or 0."""
         found = self.document().find(QRegularExpression(QRegularExpression.escape(words)))
         return found.blockNumber() + 1 if not found.isNull() else 0

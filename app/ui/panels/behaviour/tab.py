@@ -27,7 +27,7 @@ MAX_NAME_WIDTH = 220
 MAX_NAME_LENGTH = 200
 PROBLEM_TIP_MS = 20_000
 PADDING = 12
-ICON = 16
+ICON_SIZE = 16
 SLOT_WIDTH = 18  # place of the unsaved dot or, on hover, the close button
 
 
@@ -37,8 +37,8 @@ class TabFacts:
 
     key: str
     name: str
-    dirty: bool = False
-    runs: bool = False
+    is_dirty: bool = False
+    is_running: bool = False
     tip: str = ""
     plain_name: str = ""
     """Name in the rename field, without the folder that distinguishes equal names."""
@@ -51,11 +51,11 @@ class BehaviourTab(PaintedButton):
     An amber dot in place of the icon means running, a small dot means unsaved changes.
     """
 
-    chosen = Signal()
+    selected = Signal()
     close_pressed = Signal()
     dragged = Signal(int)
-    stepped = Signal(int)
-    rename_wanted = Signal()
+    step_requested = Signal(int)
+    rename_requested = Signal()
 
     def __init__(self, theme: Theme, parent: QWidget) -> None:
         super().__init__(theme, checkable=True, parent=parent)
@@ -68,11 +68,17 @@ class BehaviourTab(PaintedButton):
         """Update the tab. Return True if its width changed."""
         if facts == self.facts and current == self.isChecked():
             return False
-        wider = facts.name != self.facts.name or current != self.isChecked() or facts.runs != self.facts.runs
+        wider = (
+            facts.name != self.facts.name
+            or current != self.isChecked()
+            or facts.is_running != self.facts.is_running
+        )
         self.facts = facts
         self.setChecked(current)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus if current else Qt.FocusPolicy.ClickFocus)
-        states = [word for word, so in ((_("not saved"), facts.dirty), (_("running"), facts.runs)) if so]
+        states = [
+            word for word, so in ((_("not saved"), facts.is_dirty), (_("running"), facts.is_running)) if so
+        ]
         self.set_text(facts.name, ", ".join([facts.name, *states]))
         said = _("The active behaviour") if current else _("Another open behaviour")
         self.setAccessibleDescription(said)
@@ -80,16 +86,16 @@ class BehaviourTab(PaintedButton):
         self.update()
         return wider
 
-    def _icon(self) -> int:
-        return round(self._theme.scaled(ICON))
+    def _icon_size(self) -> int:
+        return round(self._theme.scaled(ICON_SIZE))
 
     def _has_icon(self) -> bool:
-        return self.isChecked() or self.facts.runs
+        return self.isChecked() or self.facts.is_running
 
     def sizeHint(self) -> QSize:
         font = self._font(current=True)
         name = min(self._theme.scaled(MAX_NAME_WIDTH), paint.width_of(font, self.facts.name) + 1)
-        icon = self._icon() + 8 if self._has_icon() else 0
+        icon = self._icon_size() + 8 if self._has_icon() else 0
         height = max(28, round(paint.height_of(font)) + 6)
         return QSize(round(PADDING + icon + name + SLOT_WIDTH + 4), height)
 
@@ -112,16 +118,16 @@ class BehaviourTab(PaintedButton):
         ink = theme.colour("selectedText" if current else "textSecondary")
         left = float(PADDING)
         if self._has_icon():
-            side = self._icon()
+            side = self._icon_size()
             self._paint_mark(painter, QRectF(left, rect.center().y() - side / 2, side, side))
             left += side + 8
         words = rect.adjusted(left, 0, -SLOT_WIDTH - 2, 0)
-        paint.words(painter, words, self.facts.name, self._font(current=current), ink)
+        paint.text_line(painter, words, self.facts.name, self._font(current=current), ink)
         self._paint_slot(painter, over or self.hasFocus())
 
     def _paint_mark(self, painter: QPainter, square: QRectF) -> None:
         theme = self._theme
-        if not self.facts.runs:
+        if not self.facts.is_running:
             paint_icon(painter, square, "blocks", theme.colour("selectedText"))
             return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -139,7 +145,7 @@ class BehaviourTab(PaintedButton):
             if self._over_close:
                 paint.box(painter, slot, theme.radius("key"), theme.colour("pressed"))
             paint_icon(painter, slot.adjusted(2, 2, -2, -2), "x", ink)
-        elif self.facts.dirty:
+        elif self.facts.is_dirty:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(ink)
@@ -152,13 +158,13 @@ class BehaviourTab(PaintedButton):
             self._close_down = self.close_rect().contains(event.position())
             self._from = None if self._close_down else event.position()
             if not self._close_down:
-                self.chosen.emit()
+                self.selected.emit()
         event.accept()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and not self.close_rect().contains(event.position()):
             self._from = None
-            self.rename_wanted.emit()
+            self.rename_requested.emit()
             event.accept()
         else:
             self.mousePressEvent(event)
@@ -189,13 +195,13 @@ class BehaviourTab(PaintedButton):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         steps = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
         if event.key() in steps:
-            self.stepped.emit(steps[Qt.Key(event.key())])
+            self.step_requested.emit(steps[Qt.Key(event.key())])
         elif event.key() == Qt.Key.Key_F2:
-            self.rename_wanted.emit()
+            self.rename_requested.emit()
         elif event.key() == Qt.Key.Key_Delete:
             self.close_pressed.emit()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}:
-            self.chosen.emit()
+            self.selected.emit()
         else:
             super().keyPressEvent(event)
 
@@ -211,8 +217,8 @@ class NameField(QLineEdit):
     invalid, or "".
     """
 
-    taken = Signal(str)
-    left = Signal()
+    committed = Signal(str)
+    exited = Signal()
 
     def __init__(self, theme: Theme, name: str, why_not: Callable[[str], str], parent: QWidget) -> None:
         super().__init__(name, parent)
@@ -222,14 +228,14 @@ class NameField(QLineEdit):
         self.setMaxLength(MAX_NAME_LENGTH)
         self.setFont(theme.font("label"))
         EditMenu(theme, self)
-        self.textEdited.connect(lambda _text: self._mark(""))
+        self.textEdited.connect(lambda _text: self._show_problem(""))
         self.selectAll()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self._commit()
         elif event.key() == Qt.Key.Key_Escape:
-            self._end()
+            self._finish()
         elif event.key() in {Qt.Key.Key_Tab, Qt.Key.Key_F2}:
             event.accept()
         else:
@@ -241,25 +247,25 @@ class NameField(QLineEdit):
         if event.reason() in stays:
             return
         if self._why_not(self.text()):
-            self._end()
+            self._finish()
         else:
             self._commit()
 
     def _commit(self) -> None:
         problem = self._why_not(self.text())
         if problem:
-            self._mark(problem)
+            self._show_problem(problem)
         elif not self._ended:
             self._ended = True
-            self.taken.emit(self.text().strip())
-            self.left.emit()
+            self.committed.emit(self.text().strip())
+            self.exited.emit()
 
-    def _end(self) -> None:
+    def _finish(self) -> None:
         if not self._ended:
             self._ended = True
-            self.left.emit()
+            self.exited.emit()
 
-    def _mark(self, problem: str) -> None:
+    def _show_problem(self, problem: str) -> None:
         wrong = "true" if problem else ""
         if self.property("wrong") != wrong:
             self.setProperty("wrong", wrong)

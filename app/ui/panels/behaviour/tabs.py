@@ -12,14 +12,14 @@ from app.ui.panels.behaviour.tab import BehaviourTab, NameField, TabFacts
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Segments
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
 MIN_TAB_WIDTH = 76
 GAP = 4
 NAME_WIDTH = 180  # width of the name field
 SCROLL_MARGIN, SCROLL_STEP = 32, 8  # px
-NEW = "+"
+NEW_TAB = "+"
 """Value that represents the "+" button where a tab's key is expected."""
 
 
@@ -29,10 +29,10 @@ class BehaviourTabs(QWidget):
     While some tabs are scrolled out of view, a button opens a list of all tabs.
     """
 
-    chosen = Signal(str)
-    closed = Signal(str)
+    selected = Signal(str)
+    close_requested = Signal(str)
     moved = Signal(str, int)
-    asked = Signal(str, str)  # command of a tab's context menu, key of the tab
+    command_requested = Signal(str, str)  # command of a tab's context menu, key of the tab
     renamed = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
@@ -50,7 +50,7 @@ class BehaviourTabs(QWidget):
         self.add = IconButton(theme, "plus", _("New behaviour"), "Ctrl+N", parent=self)
         self.add.setProperty("command", "file.new")
         self.list = IconButton(theme, "chevron-down", _("All open behaviours"), parent=self)
-        self.list.clicked.connect(self._list_all)
+        self.list.clicked.connect(self._show_tab_list)
         self.list.hide()
         self.setAccessibleName(_("Open behaviours"))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -73,7 +73,7 @@ class BehaviourTabs(QWidget):
         changed = [self._tab(each).show_facts(each, each.key == current) for each in wanted]
         if had_focus and moved and current in self.tabs:
             self.tabs[current].setFocus(Qt.FocusReason.OtherFocusReason)
-        self._place(bring=moved)
+        self._update_layout(bring=moved)
         if any(changed):
             self.updateGeometry()
 
@@ -81,23 +81,23 @@ class BehaviourTabs(QWidget):
         key = facts.key
         if key not in self.tabs:
             tab = self.tabs[key] = BehaviourTab(self._theme, self._room)
-            tab.chosen.connect(lambda: self.chosen.emit(key))
-            tab.close_pressed.connect(lambda: self.closed.emit(key))
+            tab.selected.connect(lambda: self.selected.emit(key))
+            tab.close_pressed.connect(lambda: self.close_requested.emit(key))
             tab.dragged.connect(lambda x: self._drag(key, x))
-            tab.stepped.connect(self._step)
-            tab.rename_wanted.connect(lambda: self.edit(key))
+            tab.step_requested.connect(self._step)
+            tab.rename_requested.connect(lambda: self.edit(key))
             tab.show()
         return self.tabs[key]
 
-    def _list_all(self) -> None:
+    def _show_tab_list(self) -> None:
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for each in self._facts:
-            entry = menu.addAction(plain.entry(each.name))
+            entry = menu.addAction(plain.escape_menu_text(each.name))
             entry.setCheckable(True)
             entry.setChecked(each.key == self._current)
-            entry.triggered.connect(lambda _on=False, key=each.key: self.chosen.emit(key))
-        drop_below(menu, self.list)
+            entry.triggered.connect(lambda _on=False, key=each.key: self.selected.emit(key))
+        open_below(menu, self.list)
 
     # -- drops of blocks ----------------------------------------------------------------------------------
 
@@ -107,7 +107,7 @@ class BehaviourTabs(QWidget):
             return ""
         here = self.mapFromGlobal(place)
         if self.add.isVisible() and self.add.geometry().contains(here):
-            return NEW
+            return NEW_TAB
         if not self._room.geometry().contains(here):
             return ""
         return next((key for key, tab in self.tabs.items() if tab.geometry().contains(here)), "")
@@ -123,14 +123,14 @@ class BehaviourTabs(QWidget):
             self._left -= SCROLL_STEP
         elif here.x() > room.right() - near:
             self._left += SCROLL_STEP
-        self._place()
+        self._update_layout()
         return self._left != before
 
-    def aim(self, key: str) -> None:
+    def highlight_target(self, key: str) -> None:
         """Highlight a drop target: the key of a tab, `NEW` for "+", or "" for none."""
         for each, tab in self.tabs.items():
-            tab.set_aimed(each == key)
-        self.add.set_aimed(key == NEW)
+            tab.set_drop_target(each == key)
+        self.add.set_drop_target(key == NEW_TAB)
 
     # -- renaming -----------------------------------------------------------------------------------------
 
@@ -143,9 +143,9 @@ class BehaviourTabs(QWidget):
         name = facts.plain_name or facts.name
         self._edited = key
         self.field = NameField(self._theme, name, lambda name: self.why_not(key, name), self._room)
-        self.field.taken.connect(lambda name: self.renamed.emit(key, name))
-        self.field.left.connect(self._end_edit)
-        self._place(bring=key == self._current)
+        self.field.committed.connect(lambda name: self.renamed.emit(key, name))
+        self.field.exited.connect(self._end_edit)
+        self._update_layout(bring=key == self._current)
         self.field.show()
         self.field.raise_()
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -161,7 +161,7 @@ class BehaviourTabs(QWidget):
         if had_focus and self._edited in self.tabs:
             self.tabs[self._edited].setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _place_field(self) -> None:
+    def _position_field(self) -> None:
         self.add.setVisible(self.field is None)  # the field may cover it
         if self.field is None or self._edited not in self.tabs:
             return
@@ -173,7 +173,7 @@ class BehaviourTabs(QWidget):
 
     def _step(self, step: int) -> None:
         keys = [each.key for each in self._facts]
-        self.chosen.emit(keys[(keys.index(self._current) + step) % len(keys)])
+        self.selected.emit(keys[(keys.index(self._current) + step) % len(keys)])
 
     def _drag(self, key: str, x: int) -> None:
         keys = [each.key for each in self._facts]
@@ -190,15 +190,15 @@ class BehaviourTabs(QWidget):
 
     def _restyle(self) -> None:
         self.updateGeometry()
-        self._place(bring=True)
+        self._update_layout(bring=True)
 
     def _widths(self) -> list[int]:
         # The active tab keeps its full width up to the available room; the others shrink down to MIN_LENGTH.
         wanted = [self.tabs[each.key].sizeHint().width() for each in self._facts]
-        room = self._room_width(scrolls=False) - GAP * len(wanted)
+        room = self._available_width(scrolls=False) - GAP * len(wanted)
         least = round(self._theme.scaled(MIN_TAB_WIDTH))
         keys = [each.key for each in self._facts]
-        alone = max(least, self._room_width(scrolls=len(keys) > 1))
+        alone = max(least, self._available_width(scrolls=len(keys) > 1))
 
         def cut(most: int) -> list[int]:
             pairs = zip(keys, wanted, strict=True)
@@ -209,17 +209,17 @@ class BehaviourTabs(QWidget):
             most -= 4
         return cut(max(most, least))
 
-    def _room_width(self, *, scrolls: bool) -> int:
+    def _available_width(self, *, scrolls: bool) -> int:
         taken = self.add.sizeHint().width() + GAP
         return self.width() - taken - (self.list.sizeHint().width() + GAP if scrolls else 0)
 
-    def _place(self, *, bring: bool = False) -> None:
+    def _update_layout(self, *, bring: bool = False) -> None:
         widths = self._widths()
         total = sum(widths) + GAP * max(0, len(widths) - 1)
-        scrolls = total > self._room_width(scrolls=False)
-        room = self._room_width(scrolls=scrolls)
+        scrolls = total > self._available_width(scrolls=False)
+        room = self._available_width(scrolls=scrolls)
         if bring:
-            self._left = self._left_for_current(widths, room)
+            self._left = self._offset_for_current(widths, room)
         self._left = max(0.0, min(self._left, float(total - room)))
         self._room.setGeometry(0, 0, max(0, room), self.height())
         x = -self._left
@@ -234,9 +234,9 @@ class BehaviourTabs(QWidget):
         self.list.setVisible(scrolls)
         self.list.setGeometry(self.width() - side, (self.height() - side) // 2, side, side)
         self.list.raise_()
-        self._place_field()
+        self._position_field()
 
-    def _left_for_current(self, widths: list[int], room: int) -> float:
+    def _offset_for_current(self, widths: list[int], room: int) -> float:
         x = 0.0
         for each, width in zip(self._facts, widths, strict=True):
             if each.key == self._current:
@@ -257,12 +257,12 @@ class BehaviourTabs(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._place(bring=True)
+        self._update_layout(bring=True)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         turned = event.angleDelta().y() or event.angleDelta().x()
         self._left -= turned / 2
-        self._place()
+        self._update_layout()
         event.accept()
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
@@ -293,7 +293,9 @@ class BehaviourTabs(QWidget):
             action = menu.addAction(words)
             if icon:
                 action.setIcon(self._theme.icon(icon))
-            action.triggered.connect(lambda _on=False, command=command: self.asked.emit(command, key))
+            action.triggered.connect(
+                lambda _on=False, command=command: self.command_requested.emit(command, key)
+            )
             if command == "tab.folder":
                 action.setEnabled(self.tabs[key].facts.has_file)
             if command == "tab.close_others":

@@ -39,7 +39,7 @@ LEVELS = {
     "error": ("circle-x", "error"),
     "critical": ("octagon-x", "error"),
 }
-WORDS = {
+LEVEL_NAMES = {
     "debug": lazy("debug"),
     "info": lazy("info"),
     "warn": lazy("warn"),
@@ -47,9 +47,9 @@ WORDS = {
     "critical": lazy("fatal"),
 }
 """Names of the levels, short enough for their column."""
-ROW = {"compact": 22, "comfortable": 30}
-ICON = 14
-MESSAGE = 24  # characters of the text that should stay visible
+ROW_HEIGHTS = {"compact": 22, "comfortable": 30}
+ICON_SIZE = 14
+MIN_TEXT_CHARS = 24  # characters of the text that should stay visible
 _ROOT = QModelIndex()
 
 
@@ -63,9 +63,9 @@ def line_of(record: ConsoleRecord, level: str = "") -> str:
 
 def tip_of(record: ConsoleRecord) -> str:
     """Return the tooltip of a record: full text, time, level, and source location of the log call."""
-    where = "  ".join(part for part in (record.logger, record.place) if part)
+    where = "  ".join(part for part in (record.logger, record.location) if part)
     clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
-    said = f"{record.text}\n{clock} {_level_words(record)}"
+    said = f"{record.text}\n{clock} {_level_name(record)}"
     return f"{said}  {record.origin}\n{where}" if where else f"{said}  {record.origin}"
 
 
@@ -79,8 +79,8 @@ def first_line(text: str) -> str:
     return said.format(text=first, count=more)
 
 
-def _level_words(record: ConsoleRecord) -> str:
-    return _("critical") if record.level == "critical" else _(WORDS.get(record.level, record.level))
+def _level_name(record: ConsoleRecord) -> str:
+    return _("critical") if record.level == "critical" else _(LEVEL_NAMES.get(record.level, record.level))
 
 
 class RecordFilter:
@@ -116,20 +116,24 @@ class ConsoleModel(QAbstractListModel):
         if role == RECORD_ROLE:
             return record
         if role in {Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.AccessibleTextRole}:
-            return line_of(record, _level_words(record))
+            return line_of(record, _level_name(record))
         return plain.tip(tip_of(record)) if role == Qt.ItemDataRole.ToolTipRole else None
 
-    def show_all(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> None:
+    def reset_records(
+        self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]
+    ) -> None:
         """Reset the model; `records` are sorted oldest first, and `wanted` is the filter."""
         self.beginResetModel()
         self._records = deque(record for record in records if wanted(record))
         self._newest = records[-1].number if records else 0
         self.endResetModel()
 
-    def follow(self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]) -> int:
+    def update_records(
+        self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]
+    ) -> int:
         """Add new matching records and remove evicted ones. Return the number of rows added."""
         if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
-            self.show_all(records, wanted)
+            self.reset_records(records, wanted)
             return len(self._records)
         self._evict_older_than(records[0].number)
         came: list[ConsoleRecord] = []
@@ -174,7 +178,7 @@ class LineDelegate(QStyledItemDelegate):
 
     def row_height(self) -> int:
         """Return the height of a row in pixels, scaled with the text size."""
-        return round(self._theme.scaled(ROW[self._density()]))
+        return round(self._theme.scaled(ROW_HEIGHTS[self._density()]))
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         record: ConsoleRecord | None = index.data(RECORD_ROLE)
@@ -189,20 +193,20 @@ class LineDelegate(QStyledItemDelegate):
         shown = self.columns(record, rect.width())
         if "time" in shown:
             clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
-            paint.words(painter, rect, clock, small, theme.colour("textTertiary"))
+            paint.text_line(painter, rect, clock, small, theme.colour("textTertiary"))
             rect.setLeft(rect.left() + shown["time"])
         icon, role = LEVELS.get(record.level, LEVELS["info"])
-        square = QRectF(rect.left(), rect.center().y() - ICON / 2, ICON, ICON)
+        square = QRectF(rect.left(), rect.center().y() - ICON_SIZE / 2, ICON_SIZE, ICON_SIZE)
         paint_icon(painter, square, icon, theme.colour(role))
         rect.setLeft(rect.left() + shown["icon"])
         if "level" in shown:
-            level = _(WORDS.get(record.level, record.level))
-            paint.words(painter, rect, level, font, theme.colour(role))
+            level = _(LEVEL_NAMES.get(record.level, record.level))
+            paint.text_line(painter, rect, level, font, theme.colour(role))
             rect.setLeft(rect.left() + shown["level"])
         for words, colour, most in self._parts(record, logger="logger" in shown):
             part = QRectF(rect)
             part.setWidth(min(paint.width_of(font, words) + 1, rect.width() * most))
-            paint.words(painter, part, words, font, theme.colour(colour))
+            paint.text_line(painter, part, words, font, theme.colour(colour))
             rect.setLeft(part.right() + 7)
 
     def columns(self, record: ConsoleRecord, width: float) -> dict[str, float]:
@@ -212,11 +216,11 @@ class LineDelegate(QStyledItemDelegate):
         time. The tooltip contains everything.
         """
         font = self._font()
-        text = MESSAGE * paint.width_of(font, "n")
+        text = MIN_TEXT_CHARS * paint.width_of(font, "n")
         shown = {
             "time": paint.width_of(self._theme.font("code"), "00:00:00") + 14,
-            "icon": float(ICON + 4),
-            "level": max(paint.width_of(font, _(word)) for word in WORDS.values()) + 10,
+            "icon": float(ICON_SIZE + 4),
+            "level": max(paint.width_of(font, _(word)) for word in LEVEL_NAMES.values()) + 10,
             "origin": min(paint.width_of(font, record.origin), 0.3 * width) + 7,
             "logger": paint.width_of(font, record.logger.rpartition(".")[2]),
         }
@@ -241,7 +245,7 @@ class LineList(QListView):
     The key ``/`` emits `find_wanted`; `resized` is emitted on a change of geometry.
     """
 
-    find_wanted = Signal()
+    find_requested = Signal()
     resized = Signal()
 
     def __init__(self) -> None:
@@ -256,7 +260,7 @@ class LineList(QListView):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.text() == "/":
-            self.find_wanted.emit()
+            self.find_requested.emit()
         else:
             super().keyPressEvent(event)
 
@@ -265,10 +269,10 @@ class LineList(QListView):
         self.resized.emit()
 
 
-class FindWords(SearchField):
+class FindField(SearchField):
     """Search field of the console. Down moves the focus to the list; Esc clears and hides the field."""
 
-    left = Signal()
+    exited = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, _("Find text"))
@@ -279,6 +283,6 @@ class FindWords(SearchField):
             self.clear()
             self.hide()
         if event.key() in {Qt.Key.Key_Escape, Qt.Key.Key_Down} and is_plain(event):
-            self.left.emit()
+            self.exited.emit()
         else:
             super().keyPressEvent(event)

@@ -10,33 +10,33 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout
 
-from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget, filter_hindrance
+from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, filter_blocker
 from app.ui.panels.console.list import (
     LEVELS,
     RECORD_ROLE,
     ConsoleModel,
-    FindWords,
+    FindField,
     LineDelegate,
     LineList,
     RecordFilter,
     line_of,
 )
 from app.ui.text import plain
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.widgets import Button, EmptyAction, EmptyState, IconButton
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _, lazy, ngettext
 
 if TYPE_CHECKING:
     from app.core.console import ConsoleRecord
 
-LEVEL_WORDS = {
+LEVEL_LABELS = {
     "debug": lazy("All, including details"),
     "all": lazy("Everything"),
     "warn": lazy("Warnings and errors"),
     "error": lazy("Errors only"),
 }
-SHOWN_LEVELS = {
+VISIBLE_LEVELS = {
     "debug": frozenset(LEVELS),
     "all": frozenset(LEVELS) - {"debug"},
     "warn": frozenset({"warn", "error", "critical"}),
@@ -58,9 +58,9 @@ class ConsolePanel(PanelWidget):
         self.filter = IconButton(self.theme, "filter", _("Choose which lines are shown"), size=26)
         self.filter.clicked.connect(self._show_menu)
         self.header = [self.filter]
-        self.words = FindWords(self.theme)
+        self.words = FindField(self.theme)
         self.words.textChanged.connect(self.refresh)
-        self.words.left.connect(self._to_lines)
+        self.words.exited.connect(self._focus_lines)
         self.words.hide()
         self.model = ConsoleModel()
         self.list = self._make_list()
@@ -87,8 +87,8 @@ class ConsolePanel(PanelWidget):
         made.setModel(self.model)
         self._delegate = LineDelegate(self.theme, lambda: self.density, self.text_font)
         made.setItemDelegate(self._delegate)
-        made.find_wanted.connect(self.focus_filter)
-        made.resized.connect(self._place_newer)
+        made.find_requested.connect(self.focus_filter)
+        made.resized.connect(self._position_newer_button)
         self._copy = QAction(_("Copy"), made)
         self._copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
         self._copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
@@ -107,95 +107,95 @@ class ConsolePanel(PanelWidget):
 
     def source_changed(self) -> None:
         self._seen = -1
-        self.model.show_all((), self._wanted())
+        self.model.reset_records((), self._current_filter())
 
     def refresh(self) -> None:
-        console = self.session.shown_console
+        console = self.session.displayed_console
         choice = (self.level, self.node, self.words.text())
         if (console.revision, choice) == (self._seen, self._choice):
             return
-        records, wanted = console.records, self._wanted()
+        records, wanted = console.records, self._current_filter()
         if choice != self._choice:
-            self.model.show_all(records, wanted)
+            self.model.reset_records(records, wanted)
             self.list.scrollToTop()
         else:
-            self._follow(records)
+            self._update_records(records)
         self._seen, self._choice = console.revision, choice
         self.pages.setCurrentIndex(1 if self.model.rowCount() else 0)
-        self._say_nothing()
+        self._update_empty_state()
 
-    def _follow(self, records: Sequence[ConsoleRecord]) -> None:
+    def _update_records(self, records: Sequence[ConsoleRecord]) -> None:
         # Keeps the visible lines in place when the user has scrolled down.
         bar = self.list.verticalScrollBar()
         before = bar.value()
-        came = self.model.follow(records, self._wanted())
+        came = self.model.update_records(records, self._current_filter())
         if before > 0 and came:
             self.list.doItemsLayout()
             bar.setValue(before + came * self._delegate.row_height())
             self._unseen += came
-            self._say_newer()
+            self._update_newer_button()
         elif came:
             self.list.scrollToTop()
 
-    def _wanted(self) -> RecordFilter:
-        return RecordFilter(SHOWN_LEVELS[self.level], self.node, self.words.text())
+    def _current_filter(self) -> RecordFilter:
+        return RecordFilter(VISIBLE_LEVELS[self.level], self.node, self.words.text())
 
     def _scrolled(self, value: int) -> None:
         if value == 0:
             self._unseen = 0
-        self._say_newer()
+        self._update_newer_button()
 
-    def _say_newer(self) -> None:
+    def _update_newer_button(self) -> None:
         away = self.list.verticalScrollBar().value() > 0
         if self._unseen:
             said = ngettext("{count} new", "{count} new", self._unseen)
-            self.newer.set_word(said.format(count=grouped(self._unseen)), "arrow-up")
+            self.newer.set_label(said.format(count=group_digits(self._unseen)), "arrow-up")
         else:
-            self.newer.set_word(_("Jump to newest"), "arrow-up")
+            self.newer.set_label(_("Jump to newest"), "arrow-up")
         self.newer.setVisible(away)
         self.newer.adjustSize()
-        self._place_newer()
+        self._position_newer_button()
 
-    def _place_newer(self) -> None:
+    def _position_newer_button(self) -> None:
         port = self.list.viewport()
         self.newer.move(port.width() - self.newer.width() - 12, 8)
 
-    def _say_nothing(self) -> None:
+    def _update_empty_state(self) -> None:
         chosen = self.level in {"warn", "error"} or self.node or self.words.text()
         if not chosen:
             self.empty.set_texts(_("No events yet"), _("Log messages of programs and robots appear here."))
-            self.empty.set_actions([self.why()])
+            self.empty.set_actions([self.doctor_action()])
         elif self.node or self.words.text():
             self.empty.set_texts(_("No matching lines"), _("Show all lines, or wait for a matching one."))
-            self.empty.set_actions([EmptyAction(_("Show all lines"), self.show_all, "x")])
+            self.empty.set_actions([EmptyAction(_("Show all lines"), self.clear_filters, "x")])
         else:
-            said = _("Choose “{everything}” to see all lines.").format(everything=_(LEVEL_WORDS["all"]))
+            said = _("Choose “{everything}” to see all lines.").format(everything=_(LEVEL_LABELS["all"]))
             self.empty.set_texts(_("No problems reported"), said)
             self.empty.set_actions([])
 
-    def hindrances(self) -> list[Hindrance]:
+    def blockers(self) -> list[Blocker]:
         chosen = [
             self.words.text(),
             self.node,
-            _(LEVEL_WORDS[self.level]) if self.level in {"warn", "error"} else "",
+            _(LEVEL_LABELS[self.level]) if self.level in {"warn", "error"} else "",
         ]
         words = ", ".join(filter(None, chosen))
-        return [filter_hindrance(self.title(), words, self.show_all)] if words else []
+        return [filter_blocker(self.title(), words, self.clear_filters)] if words else []
 
     # filters
 
     def set_level(self, level: str) -> None:
         """Set the minimum level: "debug", "all" (everything but debug), "warn" or "error"."""
-        if level in SHOWN_LEVELS:
+        if level in VISIBLE_LEVELS:
             self.level = level
-            self._name_filter()
+            self._update_filter_button()
 
     def set_node(self, node: str) -> None:
         """Show only the records of one node; "" for all nodes."""
         self.node = node
-        self._name_filter()
+        self._update_filter_button()
 
-    def show_all(self) -> None:
+    def clear_filters(self) -> None:
         """Remove all filters."""
         self.words.clear()
         self.words.hide()
@@ -204,34 +204,36 @@ class ConsolePanel(PanelWidget):
 
     def clear(self) -> None:
         """Delete all stored records."""
-        self.session.shown_console.clear()
+        self.session.displayed_console.clear()
         self.refresh()
 
-    def _name_filter(self) -> None:
+    def _update_filter_button(self) -> None:
         said = _("Showing: {level} of {node}") if self.node else _("Showing: {level}")
-        self.filter.set_name(said.format(level=_(LEVEL_WORDS[self.level]), node=self.node))
+        self.filter.set_name(said.format(level=_(LEVEL_LABELS[self.level]), node=self.node))
         self.filter.setProperty("chosen", self.level != "all" or bool(self.node))
         self.refresh()
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
-        for level, words in LEVEL_WORDS.items():
-            self._offer(menu, _(words), level == self.level, partial(self.set_level, level))
-        nodes = sorted({record.origin for record in self.session.shown_console.records} | {self.node} - {""})
+        for level, words in LEVEL_LABELS.items():
+            self._add_choice(menu, _(words), level == self.level, partial(self.set_level, level))
+        nodes = sorted(
+            {record.origin for record in self.session.displayed_console.records} | {self.node} - {""}
+        )
         if nodes:
             menu.addSeparator()
-            self._offer(menu, _("From all sources"), not self.node, partial(self.set_node, ""))
+            self._add_choice(menu, _("From all sources"), not self.node, partial(self.set_node, ""))
         for node in nodes[:MAX_NODES]:
             if node:
-                self._offer(menu, node, node == self.node, partial(self.set_node, node))
+                self._add_choice(menu, node, node == self.node, partial(self.set_node, node))
         menu.addSeparator()
         menu.addAction(self._find)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        drop_below(menu, self.filter)
+        open_below(menu, self.filter)
 
     @staticmethod
-    def _offer(menu: Menu, words: str, is_chosen: bool, choose: partial[None]) -> None:
-        action = menu.addAction(plain.entry(words))
+    def _add_choice(menu: Menu, words: str, is_chosen: bool, choose: partial[None]) -> None:
+        action = menu.addAction(plain.escape_menu_text(words))
         action.setCheckable(True)
         action.setChecked(is_chosen)
         action.triggered.connect(lambda _on=False: choose())
@@ -251,7 +253,7 @@ class ConsolePanel(PanelWidget):
         self.words.selectAll()
         return True
 
-    def _to_lines(self) -> None:
+    def _focus_lines(self) -> None:
         self.list.setFocus(Qt.FocusReason.OtherFocusReason)
 
     # copying
@@ -268,14 +270,14 @@ class ConsolePanel(PanelWidget):
             records = [self.model.index(row, 0).data(RECORD_ROLE) for row in rows]
             QGuiApplication.clipboard().setText("\n".join(line_of(record) for record in records))
             said = ngettext("Copied {count} line", "Copied {count} lines", len(rows))
-            self.context.toast(said.format(count=grouped(len(rows))))
+            self.context.toast(said.format(count=group_digits(len(rows))))
 
     # appearance and saved state
 
     def theme_changed(self) -> None:
         super().theme_changed()
         self.list.doItemsLayout()  # row heights depend on the font
-        self._say_newer()
+        self._update_newer_button()
 
     def save_state(self) -> dict[str, object]:
         return {"level": self.level}

@@ -12,7 +12,15 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLay
 from app.core.documents.examples import example_block_ids
 from app.errors import SettingsError
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.first_steps.steps import START, STEPS, Built, Lesson, Now, built_in, shown_by
+from app.ui.panels.first_steps.steps import (
+    START_BLOCK,
+    STEPS,
+    TutorialBlocks,
+    TutorialState,
+    TutorialStep,
+    completed_steps,
+    find_tutorial_blocks,
+)
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, EmptyAction, EmptyState, label, paint
@@ -20,7 +28,7 @@ from app.ui.widgets.labels import set_role
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from nep.i18n import _, lazy, pgettext
 
-KEPT = "first_steps"
+PROGRESS_SETTING = "first_steps"
 HINT_AFTER_S = 20.0
 MARK_SIZE = 22
 ALL_DONE = lazy("First steps done")
@@ -52,21 +60,23 @@ class _Mark(QWidget):
             edge = theme.colour("accent" if following else "controlBorder")
             paint.box(painter, rect, rect.height() / 2, fill, edge, 1.25)
             ink = theme.colour("onAccent" if following else "textSecondary")
-            paint.words(painter, rect, str(self._number), theme.font("caption"), ink, paint.CENTRE)
+            paint.text_line(painter, rect, str(self._number), theme.font("caption"), ink, paint.CENTRE)
         painter.end()
 
 
 class StepRow(QWidget):
     """Row of one step; the next step is tinted and has hint and button."""
 
-    def __init__(self, theme: Theme, number: int, step: Lesson, show_me: Callable[[Lesson], None]) -> None:
+    def __init__(
+        self, theme: Theme, number: int, step: TutorialStep, show_me: Callable[[TutorialStep], None]
+    ) -> None:
         super().__init__()
         self._theme, self.step = theme, step
         self.mark = _Mark(theme, number)
-        self.words = label(spoken(step.text), "bodyLarge", wrap=True)
-        self.hint = label(spoken(step.hint), "body", role="textSecondary", wrap=True)
+        self.words = label(with_block_names(step.text), "bodyLarge", wrap=True)
+        self.hint = label(with_block_names(step.hint), "body", role="textSecondary", wrap=True)
         first = step.id == "robot"
-        self.button = Button(theme, spoken(step.text) if first else _("Show me"), size="small")
+        self.button = Button(theme, with_block_names(step.text) if first else _("Show me"), size="small")
         self.button.clicked.connect(lambda: show_me(step))
         for words in (self.words, self.hint):
             words.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
@@ -97,7 +107,7 @@ class StepRow(QWidget):
 
     def show_hint(self, *, loose: bool) -> None:
         """Show where to find the block. If `loose`, say that it must be attached to the script."""
-        self.hint.setText(spoken(LOOSE_HINT if loose else self.step.hint))
+        self.hint.setText(with_block_names(LOOSE_HINT if loose else self.step.hint))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.mark.state == "next":
@@ -108,7 +118,7 @@ class StepRow(QWidget):
             painter.end()
 
 
-def spoken(text: str) -> str:
+def with_block_names(text: str) -> str:
     """Return the text of a step with the names of its blocks filled in."""
     return _(text).format(
         start=pgettext("block", "when started"), say=pgettext("robot", "say"), turn=pgettext("robot", "turn")
@@ -124,13 +134,13 @@ class FirstStepsPanel(PanelWidget):
     def __init__(self, context: PanelContext, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(context, _("First steps"))
         self._clock = clock
-        kept: object = self.session.settings.get(KEPT, [])
+        kept: object = self.session.settings.get(PROGRESS_SETTING, [])
         known = {step.id for step in STEPS}
         self.done: frozenset[str] = frozenset(kept if isinstance(kept, list) else ()) & known
         self._waits_since: tuple[str, float] | None = None
         self._pointed_for = ""
         self._edits: object = None
-        self._built: tuple[object, Built] = (None, Built())
+        self._built: tuple[object, TutorialBlocks] = (None, TutorialBlocks())
         self.rows = [
             StepRow(self.theme, number, step, self.show_me) for number, step in enumerate(STEPS, start=1)
         ]
@@ -143,11 +153,11 @@ class FirstStepsPanel(PanelWidget):
             _(ALL_DONE),
             _(WHAT_NEXT),
             [
-                EmptyAction(_("Open an example"), lambda: context.run("help.examples"), primary=True),
+                EmptyAction(_("Open an example"), lambda: context.run("help.examples"), is_primary=True),
                 EmptyAction(_("Start over"), self.start_again),
             ],
         )
-        self.pages: QStackedWidget = self.show_one_of(steps, self.end)
+        self.pages: QStackedWidget = self.make_page_stack(steps, self.end)
         self.chip = Chip(self.theme, "", "off")
         self.chips = [self.chip]
         self._again = QAction(_("Start over"), self)
@@ -157,50 +167,53 @@ class FirstStepsPanel(PanelWidget):
     def more_actions(self) -> tuple[QAction, ...]:
         return (self._again,)
 
-    def following(self) -> Lesson | None:
+    def next_step(self) -> TutorialStep | None:
         """Return the next step, or None after the last one."""
         return next((step for step in STEPS if step.id not in self.done), None)
 
     # -- checking -----------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        if self.following() is None:
+        if self.next_step() is None:
             return
-        done = shown_by(self._now(), self.done)
+        done = completed_steps(self._current_state(), self.done)
         if done != self.done:
             self.done = done
-            self._keep()
+            self._save_progress()
             self._show()
-            if self.following() is None:
+            if self.next_step() is None:
                 paint.announce(self, _(ALL_DONE))
-        self._hint_after_a_while()
+        self._show_delayed_hint()
 
-    def _now(self) -> Now:
+    def _current_state(self) -> TutorialState:
         runs, document = self.session.runs, self.session.document
         mine = runs.document is document
         edition = (document.key, document.revision, document.edits, document.fixes)
         if self._built[0] != edition:
-            self._built = (edition, built_in(document.workspace, example_block_ids()))
+            self._built = (edition, find_tutorial_blocks(document.workspace, example_block_ids()))
             for row in self.rows:
-                row.show_hint(loose=bool(row.step.takes) and row.step.takes in self._built[1].loose)
-        return Now(
+                row.show_hint(
+                    loose=bool(row.step.block_suffix)
+                    and row.step.block_suffix in self._built[1].detached_suffixes
+                )
+        return TutorialState(
             can_speak=any(
                 action.name == "say" for link in self.session.fleet.connected for action in link.robot.actions
             ),
-            built=self._built[1],
-            ran=runs.ran_blocks,
-            stopped=mine and bool(runs.stopped_blocks) and not runs.active,
+            blocks=self._built[1],
+            executed_ids=runs.ran_blocks,
+            was_stopped=mine and bool(runs.stopped_blocks) and not runs.active,
         )
 
-    def _hint_after_a_while(self) -> None:
+    def _show_delayed_hint(self) -> None:
         # Shown once per step.
-        step, now = self.following(), self._clock()
+        step, now = self.next_step(), self._clock()
         seen = (self.session.document.edits, self.session.runs.active)
         if step is None:
             return
         if self._waits_since is None or self._waits_since[0] != step.id or seen != self._edits:
             if self._waits_since is not None and self._waits_since[0] != step.id and self._pointed_for:
-                self._point_at_nothing()
+                self._clear_highlight()
             self._waits_since, self._edits = (step.id, now), seen
         elif now - self._waits_since[1] >= HINT_AFTER_S and self._pointed_for != step.id:
             if step.id != "robot" and not self.session.runs.active:
@@ -208,7 +221,7 @@ class FirstStepsPanel(PanelWidget):
             self._pointed_for = step.id
 
     def _show(self) -> None:
-        step = self.following()
+        step = self.next_step()
         held = any(row.button.hasFocus() for row in self.rows)
         for row in self.rows:
             state = "done" if row.step.id in self.done else "next" if row.step is step else "later"
@@ -222,33 +235,33 @@ class FirstStepsPanel(PanelWidget):
         if held and button is not None:  # keeps the focus for keyboard users
             button.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _keep(self) -> None:
+    def _save_progress(self) -> None:
         kept = [step.id for step in STEPS if step.id in self.done]
         try:
-            self.session.settings.set(KEPT, kept)
+            self.session.settings.set(PROGRESS_SETTING, kept)
         except SettingsError as error:
             self.session.console.add("warn", "studio", str(error))
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def show_me(self, step: Lesson) -> None:
+    def show_me(self, step: TutorialStep) -> None:
         """Highlight the block or button of a step."""
         self._pointed_for = step.id
         if step.id == "robot":
             self.context.run("robots.virtual")
-        elif step.takes:
-            self.context.run(f"point.block:{self._type(step.takes)}")
+        elif step.block_suffix:
+            self.context.run(f"point.block:{self._block_type(step.block_suffix)}")
         else:
             self.context.run(f"point.button:{step.button}")
 
-    def _type(self, end: str) -> str:
-        if end == START:
-            return START
+    def _block_type(self, end: str) -> str:
+        if end == START_BLOCK:
+            return START_BLOCK
         blocks = self.session.documents.definitions().get("blocks")
         types = [str(each.get("type", "")) for each in blocks] if isinstance(blocks, list) else []
         return next((kind for kind in types if kind.endswith(end)), end)
 
-    def _point_at_nothing(self) -> None:
+    def _clear_highlight(self) -> None:
         self._pointed_for = ""
         self.context.run("point.block:-")
 
@@ -256,7 +269,7 @@ class FirstStepsPanel(PanelWidget):
         """Restart the tutorial in a new behaviour; existing blocks are not changed."""
         self.done = frozenset()
         self._waits_since = None
-        self._keep()
+        self._save_progress()
         if self.session.document.has_blocks:
             self.context.run("file.new")
         self._show()
@@ -264,7 +277,7 @@ class FirstStepsPanel(PanelWidget):
     def suspend(self) -> None:
         super().suspend()
         if self._pointed_for:
-            self._point_at_nothing()
+            self._clear_highlight()
 
 
 PANEL = Panel("first_steps", lazy("First steps"), "lightbulb", (), FirstStepsPanel)

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 from nep.i18n import lazy
 
-START = "events_started"
+START_BLOCK = "events_started"
 SAY, TURN = "_do_say", "_do_turn"
 Script = tuple[tuple[str, str], ...]
 """Type and id of each block of a script."""
 
 
 @dataclass(frozen=True)
-class Lesson:
+class TutorialStep:
     """Step of the tutorial.
 
     Attributes:
@@ -27,31 +27,36 @@ class Lesson:
     id: str
     text: str
     hint: str
-    takes: str = ""
+    block_suffix: str = ""
     button: str = ""
 
 
-STEPS: tuple[Lesson, ...] = (
-    Lesson("robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button="robots.virtual"),
-    Lesson(
+STEPS: tuple[TutorialStep, ...] = (
+    TutorialStep(
+        "robot", lazy("Use the virtual robot"), lazy("It comes with Studio."), button="robots.virtual"
+    ),
+    TutorialStep(
         "start",
         lazy("Drag “{start}” onto the page"),
         lazy("You'll find it under Events, on the left."),
-        takes=START,
+        block_suffix=START_BLOCK,
     ),
-    Lesson(
-        "say", lazy("Place “{say}” below it"), lazy("You'll find it under Speech, on the left."), takes=SAY
+    TutorialStep(
+        "say",
+        lazy("Place “{say}” below it"),
+        lazy("You'll find it under Speech, on the left."),
+        block_suffix=SAY,
     ),
-    Lesson(
+    TutorialStep(
         "run", lazy("Press Run and listen"), lazy("The button is green, at the top left."), button="run.run"
     ),
-    Lesson(
+    TutorialStep(
         "turn",
         lazy("Place “{turn}” below “{say}”"),
         lazy("You'll find it under Movement, on the left."),
-        takes=TURN,
+        block_suffix=TURN,
     ),
-    Lesson(
+    TutorialStep(
         "stop",
         lazy("Press Run, then Stop while the robot turns"),
         lazy("The Stop button is red, at the top right. F12 does the same."),
@@ -61,32 +66,32 @@ STEPS: tuple[Lesson, ...] = (
 
 
 @dataclass(frozen=True)
-class Built:
+class TutorialBlocks:
     """Result of `built_in`: ids of "say" blocks below "when started", and True if there is a "turn" block.
 
     `loose` has the type suffixes of blocks that occur only in scripts without an event.
     """
 
     started: bool = False
-    says: frozenset[str] = frozenset()
-    turns: bool = False
-    loose: frozenset[str] = frozenset()
+    say_ids: frozenset[str] = frozenset()
+    has_turn: bool = False
+    detached_suffixes: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
-class Now:
+class TutorialState:
     """Current state of blocks and run.
 
     `ran` has the ids of blocks that have run; `stopped` is True after Stop.
     """
 
     can_speak: bool = False
-    built: Built = field(default_factory=Built)
-    ran: Collection[str] = ()
-    stopped: bool = False
+    blocks: TutorialBlocks = field(default_factory=TutorialBlocks)
+    executed_ids: Collection[str] = ()
+    was_stopped: bool = False
 
 
-def built_in(workspace: Mapping[str, object], others: Collection[str] = ()) -> Built:
+def find_tutorial_blocks(workspace: Mapping[str, object], others: Collection[str] = ()) -> TutorialBlocks:
     """Return the tutorial's blocks that a workspace contains.
 
     Args:
@@ -96,24 +101,24 @@ def built_in(workspace: Mapping[str, object], others: Collection[str] = ()) -> B
     started: list[Script] = []
     loose: list[Script] = []
     is_started = False
-    for top in _tops(workspace):
-        own = tuple((kind, id) for kind, id in _inside(top) if id not in others)
-        (started if top.get("type") == START else loose).append(own)
-        is_started |= top.get("type") == START and top.get("id") not in others
-    below = {end for end in (SAY, TURN) if _has(started, end)}
-    return Built(
+    for top in _top_blocks(workspace):
+        own = tuple((kind, id) for kind, id in _iter_blocks(top) if id not in others)
+        (started if top.get("type") == START_BLOCK else loose).append(own)
+        is_started |= top.get("type") == START_BLOCK and top.get("id") not in others
+    below = {end for end in (SAY, TURN) if _contains_type(started, end)}
+    return TutorialBlocks(
         is_started,
         frozenset(id for script in started for kind, id in script if kind.endswith(SAY)),
         TURN in below,
-        frozenset(end for end in (SAY, TURN) if end not in below and _has(loose, end)),
+        frozenset(end for end in (SAY, TURN) if end not in below and _contains_type(loose, end)),
     )
 
 
-def _has(scripts: Sequence[Script], end: str) -> bool:
+def _contains_type(scripts: Sequence[Script], end: str) -> bool:
     return any(kind.endswith(end) for script in scripts for kind, _id in script)
 
 
-def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
+def completed_steps(now: TutorialState, done: Collection[str]) -> frozenset[str]:
     """Return the ids of completed steps; steps in `done` stay completed.
 
     Stop counts only after a run with a turn, so that the step can't be completed by chance.
@@ -121,26 +126,26 @@ def shown_by(now: Now, done: Collection[str]) -> frozenset[str]:
     found = set(done)
     if now.can_speak:
         found.add("robot")
-    if now.built.started:
+    if now.blocks.started:
         found.add("start")
-    if now.built.says:
+    if now.blocks.say_ids:
         found.add("say")
-    if now.built.says & set(now.ran):
+    if now.blocks.say_ids & set(now.executed_ids):
         found.add("run")
-    if now.built.turns:
+    if now.blocks.has_turn:
         found.add("turn")
-    if now.stopped and now.built.turns and {"run", "turn"} <= found:
+    if now.was_stopped and now.blocks.has_turn and {"run", "turn"} <= found:
         found.add("stop")
     return frozenset(found)
 
 
-def _tops(workspace: Mapping[str, object]) -> list[Mapping[str, object]]:
+def _top_blocks(workspace: Mapping[str, object]) -> list[Mapping[str, object]]:
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     return [top for top in tops if isinstance(top, Mapping)] if isinstance(tops, list) else []
 
 
-def _inside(block: Mapping[str, object]) -> Iterator[tuple[str, str]]:
+def _iter_blocks(block: Mapping[str, object]) -> Iterator[tuple[str, str]]:
     # Iterative, because deeply nested blocks would exceed the recursion limit.
     waiting: list[object] = [block]
     while waiting:

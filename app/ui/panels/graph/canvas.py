@@ -19,13 +19,13 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 
-from app.core.graph.walk import Arrow, GraphChoice, step
+from app.core.graph.walk import Arrow, GraphSelection, move_selection
 from app.ui.panels.graph.painting import paint_scene
-from app.ui.panels.graph.scene import FiguresOf, GraphScene, LineItem, NodeItem
+from app.ui.panels.graph.scene import GraphScene, LineItem, NodeItem, StatsOf
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.keyboard import is_plain, keyboard_leads
+from app.ui.widgets.keyboard import is_keyboard_navigation, is_plain
 from nep.i18n import _
 
 MIN_SCALE, MAX_SCALE = 0.05, 3.0
@@ -36,7 +36,7 @@ CLICK_TOLERANCE = 4.0
 """Mouse movement in px up to which a press counts as a click."""
 MAX_UPDATES_PER_TICK = 250
 """Maximum number of nodes and lines updated per tick."""
-MAX_AREAS = 60
+MAX_DIRTY_RECTS = 60
 """Number of changed areas above which their bounding rectangle is repainted instead."""
 _ARROWS: dict[int, Arrow] = {
     Qt.Key.Key_Left: "left",
@@ -66,22 +66,22 @@ class GraphCanvas(QWidget):
         tip: Returns the tooltip of a topic.
     """
 
-    chosen = Signal(object)
+    selected = Signal(object)
     opened = Signal(str)
     entered = Signal()
     toggled = Signal(str)
-    quiet_wanted = Signal(str)
-    letter = Signal(str)
-    moved = Signal()
-    menu_wanted = Signal(object, QPoint)
+    quiet_nodes_requested = Signal(str)
+    key_pressed = Signal(str)
+    viewport_changed = Signal()
+    menu_requested = Signal(object, QPoint)
 
     def __init__(
-        self, theme: Theme, describe: Callable[[GraphChoice | None], str], tip: Callable[[str], str]
+        self, theme: Theme, describe: Callable[[GraphSelection | None], str], tip: Callable[[str], str]
     ) -> None:
         super().__init__()
         self._theme, self._describe, self._tip = theme, describe, tip
         self.scene: GraphScene | None = None
-        self.choice: GraphChoice | None = None
+        self.choice: GraphSelection | None = None
         self.scale = 1.0
         self._offset = QPointF()
         self._shows_all = True
@@ -96,7 +96,7 @@ class GraphCanvas(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setAccessibleName(_("Graph of nodes"))
         theme.changed.connect(self.update)
-        self.moved.connect(self.renew_soon)
+        self.viewport_changed.connect(self.schedule_update)
 
     def sizeHint(self) -> QSize:
         return QSize(640, 420)
@@ -109,27 +109,27 @@ class GraphCanvas(QWidget):
     def show_scene(self, scene: GraphScene | None) -> None:
         """Show another graph, or the same graph in another layout."""
         self.scene = scene
-        if self.choice is not None and not self._is_there(self.choice):
-            self.choose(None)
+        if self.choice is not None and not self._exists(self.choice):
+            self.select(None)
         elif self.choice is not None:
             self.setAccessibleDescription(self._describe(self.choice))
         if self._shows_all:
             self.show_all()
         self.update()
-        self.moved.emit()
+        self.viewport_changed.emit()
 
-    def _is_there(self, choice: GraphChoice) -> bool:
+    def _exists(self, choice: GraphSelection) -> bool:
         if self.scene is None:
             return False
         graph = self.scene.graph
         return (graph.node(choice.key) if choice.kind == "node" else graph.line_of(choice.key)) is not None
 
-    def renew_soon(self) -> None:
+    def schedule_update(self) -> None:
         """Schedule a refresh of the rates and counts on visible items; `renew` performs it."""
         if self.scene is not None:
-            self._waiting = self.scene.items_in(self.visible())
+            self._waiting = self.scene.items_in(self.visible_rect())
 
-    def renew(self, figures: FiguresOf) -> int:
+    def update_stats(self, figures: StatsOf) -> int:
         """Update the rates and counts of the next `MAX_UPDATES_PER_TICK` visible items.
 
         Only changed areas are repainted. Called on every tick, therefore each call is short.
@@ -140,22 +140,22 @@ class GraphCanvas(QWidget):
         scene = self.scene
         if scene is None or not self._waiting:
             return 0
-        if not scene.has_figures(self.scale):
+        if not scene.has_stats(self.scale):
             self._waiting = []  # updated when the user zooms in
             return 0
         now, self._waiting = self._waiting[:MAX_UPDATES_PER_TICK], self._waiting[MAX_UPDATES_PER_TICK:]
-        has_words = scene.has_words(self.scale)
-        changed = [scene.renew(item, figures, with_words=has_words) for item in now]
-        seen = self.visible()
+        has_words = scene.has_small_text(self.scale)
+        changed = [scene.update_stats(item, figures, with_words=has_words) for item in now]
+        seen = self.visible_rect()
         areas = [area for area in changed if area is not None and area.intersects(seen)]
-        if len(areas) > MAX_AREAS:
+        if len(areas) > MAX_DIRTY_RECTS:
             self.update()
         else:
             for area in areas:
                 self.update(self._to_screen(area).adjusted(-2, -2, 2, 2).toAlignedRect())
         return len(areas)
 
-    def choose(self, choice: GraphChoice | None, *, by_key: bool = False) -> None:
+    def select(self, choice: GraphSelection | None, *, by_key: bool = False) -> None:
         """Select an item, or None for nothing. A selection by key is scrolled into view and announced."""
         if choice == self.choice:
             return
@@ -163,14 +163,14 @@ class GraphCanvas(QWidget):
         said = self._describe(choice)
         self.setAccessibleDescription(said)
         if by_key:
-            self._bring_into_sight()
+            self._scroll_to_selection()
             paint.announce(self, said)
         self.update()
-        self.chosen.emit(choice)
+        self.selected.emit(choice)
 
     # -- viewport -----------------------------------------------------------------------------------------
 
-    def visible(self) -> QRectF:
+    def visible_rect(self) -> QRectF:
         """Return the visible part of the scene, in scene coordinates."""
         left_top = -self._offset / self.scale
         return QRectF(left_top.x(), left_top.y(), self.width() / self.scale, self.height() / self.scale)
@@ -185,7 +185,7 @@ class GraphCanvas(QWidget):
         self.scale = max(MIN_SCALE, fits)
         self._offset = QPointF(self.width() / 2, self.height() / 2) - whole.center() * self.scale
         self.update()
-        self.moved.emit()
+        self.viewport_changed.emit()
 
     def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
         """Zoom by a factor around a point of the widget, by default its centre."""
@@ -199,26 +199,26 @@ class GraphCanvas(QWidget):
         self.scale = scale
         self._shows_all = False
         self.update()
-        self.moved.emit()
+        self.viewport_changed.emit()
 
     def move_by(self, dx: float, dy: float) -> None:
         """Pan by a distance in px."""
         self._offset += QPointF(dx, dy)
         self._shows_all = False
         self.update()
-        self.moved.emit()
+        self.viewport_changed.emit()
 
-    def show_place(self, at: QPointF) -> None:
+    def center_on(self, at: QPointF) -> None:
         """Centre the view on a point of the scene."""
-        middle = self.visible().center()
+        middle = self.visible_rect().center()
         self.move_by((middle.x() - at.x()) * self.scale, (middle.y() - at.y()) * self.scale)
 
-    def _bring_into_sight(self) -> None:
-        rect = self._place_of(self.choice)
-        if not rect.isNull() and not self.visible().contains(rect):
-            self.show_place(rect.center())
+    def _scroll_to_selection(self) -> None:
+        rect = self._rect_of(self.choice)
+        if not rect.isNull() and not self.visible_rect().contains(rect):
+            self.center_on(rect.center())
 
-    def _place_of(self, choice: GraphChoice | None) -> QRectF:
+    def _rect_of(self, choice: GraphSelection | None) -> QRectF:
         scene = self.scene
         if scene is None or choice is None:
             return QRectF()
@@ -254,10 +254,10 @@ class GraphCanvas(QWidget):
             clip = QRectF(event.rect())
             corner = self._to_scene(clip.topLeft())
             seen = QRectF(corner, clip.size() / self.scale)
-            rings = self.hasFocus() and keyboard_leads()
+            rings = self.hasFocus() and is_keyboard_navigation()
             paint_scene(self.scene, painter, seen, self.scale, self.choice, rings=rings)
             painter.resetTransform()
-        if self.hasFocus() and keyboard_leads() and self.choice is None:
+        if self.hasFocus() and is_keyboard_navigation() and self.choice is None:
             whole = QRectF(self.rect()).adjusted(2, 2, -2, -2)
             paint.box(painter, whole, theme.radius("small"), None, theme.colour("focus"), 2.0)
         painter.end()
@@ -267,7 +267,7 @@ class GraphCanvas(QWidget):
         if self._shows_all:
             self.show_all()
         else:
-            self.moved.emit()
+            self.viewport_changed.emit()
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
@@ -294,7 +294,7 @@ class GraphCanvas(QWidget):
             node = self.scene.node_at(at)
             item = self.scene.line_at(at, self.scale) if node is None else None
             if node is not None:
-                said = self._describe(GraphChoice("node", node.key))
+                said = self._describe(GraphSelection("node", node.key))
             elif item is not None:
                 said = "\n".join(self._tip(topic) for topic in item.line.topics[:12])
         QToolTip.showText(event.globalPos(), plain.tip(said), self)
@@ -325,7 +325,7 @@ class GraphCanvas(QWidget):
             return
         self.setCursor(
             Qt.CursorShape.PointingHandCursor
-            if self._means(event.position()) is not None
+            if self._item_at(event.position()) is not None
             else Qt.CursorShape.ArrowCursor
         )
 
@@ -336,33 +336,33 @@ class GraphCanvas(QWidget):
             self._press(event.position())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        meant = self._means(event.position())
-        if isinstance(meant, GraphChoice) and meant.kind == "topic":
+        meant = self._item_at(event.position())
+        if isinstance(meant, GraphSelection) and meant.kind == "topic":
             self.opened.emit(meant.key)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         # Selects the item under the mouse first, so that its card fits the menu.
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
-            choice, place = self.choice, self._to_screen(self._place_of(self.choice)).center()
+            choice, place = self.choice, self._to_screen(self._rect_of(self.choice)).center()
         else:
-            meant, place = self._means(QPointF(event.pos())), QPointF(event.pos())
-            choice = meant if isinstance(meant, GraphChoice) else None
+            meant, place = self._item_at(QPointF(event.pos())), QPointF(event.pos())
+            choice = meant if isinstance(meant, GraphSelection) else None
             if choice is not None:
-                self.choose(choice)
+                self.select(choice)
         if choice is not None:
-            self.menu_wanted.emit(choice, self.mapToGlobal(place.toPoint()))
+            self.menu_requested.emit(choice, self.mapToGlobal(place.toPoint()))
 
     def _press(self, at: QPointF) -> None:
-        meant = self._means(at)
+        meant = self._item_at(at)
         if isinstance(meant, tuple):
             group, is_head = meant
-            (self.toggled if is_head else self.quiet_wanted).emit(group)
+            (self.toggled if is_head else self.quiet_nodes_requested).emit(group)
             return
-        if meant is not None and meant.kind == "node" and self.open_group(meant.key):
+        if meant is not None and meant.kind == "node" and self.expand_group(meant.key):
             return
-        self.choose(meant)
+        self.select(meant)
 
-    def _means(self, at: QPointF) -> GraphChoice | tuple[str, bool] | None:
+    def _item_at(self, at: QPointF) -> GraphSelection | tuple[str, bool] | None:
         # The bool of a group is True for its title, False for its number of quiet nodes.
         scene = self.scene
         if scene is None:
@@ -370,19 +370,21 @@ class GraphCanvas(QWidget):
         here = self._to_scene(at)
         node = scene.node_at(here)
         if node is not None:
-            return GraphChoice("node", node.key)
+            return GraphSelection("node", node.key)
         item = scene.line_at(here, self.scale)
         if item is not None:
-            return GraphChoice("topic", item.line.topics[0], item.line.sources[0])
+            return GraphSelection("topic", item.line.topics[0], item.line.sources[0])
         group = scene.group_at(here)
         return (group[0].key, group[1]) if group is not None else None
 
-    def open_group(self, key: str) -> bool:
+    def expand_group(self, key: str) -> bool:
         """Expand a group that is collapsed to one box; return False for other nodes."""
         node = self.scene.graph.node(key) if self.scene is not None else None
         if node is None or node.kind != "group":
             return False
-        (self.quiet_wanted if node.quiet == node.members else self.toggled).emit(node.group)
+        (self.quiet_nodes_requested if node.quiet_count == node.member_count else self.toggled).emit(
+            node.group
+        )
         return True
 
     # -- keys ---------------------------------------------------------------------------------------------
@@ -394,11 +396,11 @@ class GraphCanvas(QWidget):
             across, down = _PAN_DIRECTIONS[arrow]
             self.move_by(across * PAN_STEP, down * PAN_STEP)
         elif arrow is not None and is_plain(event):
-            self._walk(arrow)
+            self._select_neighbour(arrow)
         elif key in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
-            self._enter()
+            self._activate()
         elif key == Qt.Key.Key_Escape and self.choice is not None:
-            self.choose(None)
+            self.select(None)
         elif not self._zoom_key(event):
             super().keyPressEvent(event)
 
@@ -408,7 +410,7 @@ class GraphCanvas(QWidget):
         if held:
             return False
         if key in PANEL_KEYS:
-            self.letter.emit(PANEL_KEYS[Qt.Key(key)])
+            self.key_pressed.emit(PANEL_KEYS[Qt.Key(key)])
         elif event.text() in {"+", "="}:
             self.zoom_by(ZOOM_STEP)
         elif event.text() == "-":
@@ -419,19 +421,19 @@ class GraphCanvas(QWidget):
             return False
         return True
 
-    def _walk(self, arrow: Arrow) -> None:
+    def _select_neighbour(self, arrow: Arrow) -> None:
         if self.scene is not None:
-            found = step(self.scene.graph, self.scene.layout, self.choice, arrow)
+            found = move_selection(self.scene.graph, self.scene.layout, self.choice, arrow)
             if found is not None:
-                self.choose(found, by_key=True)
+                self.select(found, by_key=True)
 
-    def _enter(self) -> None:
+    def _activate(self) -> None:
         choice = self.choice
         if choice is None:
             return
         if choice.kind == "topic":
             self.opened.emit(choice.key)
-        elif not self.open_group(choice.key):
+        elif not self.expand_group(choice.key):
             self.entered.emit()
 
 
@@ -444,15 +446,15 @@ class GraphOverview(QWidget):
         self.resize(168, 104)
         self.setAccessibleName(_("Overview"))
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        canvas.moved.connect(self._follow)
+        canvas.viewport_changed.connect(self._update_position)
         self.hide()
 
-    def _follow(self) -> None:
+    def _update_position(self) -> None:
         # Visible while part of the graph is out of view and there is room for it.
         canvas, scene = self._canvas, self._canvas.scene
         wanted = (
             scene is not None
-            and not canvas.visible().contains(scene.bounds)
+            and not canvas.visible_rect().contains(scene.bounds)
             and canvas.width() > 3 * self.width()
             and canvas.height() > 3 * self.height()
         )
@@ -482,7 +484,7 @@ class GraphOverview(QWidget):
                 is_chosen = choice is not None and choice.key == key
                 painter.fillRect(item.rect, theme.colour("accent" if is_chosen else "controlBorder"))
             painter.restore()
-            seen = self._canvas.visible()
+            seen = self._canvas.visible_rect()
             frame = QRectF(seen.topLeft() * scale + offset, seen.size() * scale)
             paint.box(
                 painter, frame.intersected(rect.adjusted(2, 2, -2, -2)), 3, None, theme.colour("accent"), 1.5
@@ -493,4 +495,4 @@ class GraphOverview(QWidget):
         scene = self._canvas.scene
         if scene is not None and event.button() == Qt.MouseButton.LeftButton:
             scale, offset = self._fit(scene)
-            self._canvas.show_place((event.position() - offset) / scale)
+            self._canvas.center_on((event.position() - offset) / scale)

@@ -12,11 +12,20 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout
 
 from app.core.graph.node_graph import DrawnNode
 from app.core.network.topics import Topic, key_of, split_key
-from app.ui.panels.graph.words import known_figure, percent_words, short_rate
-from app.ui.text.nodes import cpu_words, generation_words
-from app.ui.text.numbers import age_words, bandwidth_words, grouped, latency_words, rate_words, size_words
+from app.ui.panels.graph.words import finite_or_none, percent_text, short_rate
+from app.ui.text.nodes import cpu_text, generation_text
+from app.ui.text.numbers import age_text, bandwidth_text, group_digits, latency_text, rate_text, size_text
 from app.ui.theme.theme import Theme
-from app.ui.widgets import Button, Card, ElidedLabel, IconButton, Scrolled, Separator, Sparkline, label
+from app.ui.widgets import (
+    Button,
+    Card,
+    ContentScrollArea,
+    ElidedLabel,
+    IconButton,
+    Separator,
+    Sparkline,
+    label,
+)
 from app.ui.widgets.buttons import LinkButton
 from app.ui.widgets.flow_layout import Flow
 from nep.i18n import _, ngettext, number
@@ -39,11 +48,11 @@ class CardTable:
     title: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
-    chooses: str = "node"
+    item_kind: str = "node"
 
 
 @dataclass(frozen=True, slots=True)
-class CardFigure:
+class CardStat:
     """Number in large type with a note and an optional curve."""
 
     title: str
@@ -59,7 +68,7 @@ class CardContent:
 
     title: str
     kind: str
-    figures: tuple[CardFigure, ...] = ()
+    stats: tuple[CardStat, ...] = ()
     facts: tuple[str, ...] = ()
     tables: tuple[CardTable, ...] = ()
     foot: str = ""
@@ -84,11 +93,11 @@ class GraphCard(QWidget):
     """
 
     closed = Signal()
-    inspected = Signal(str)
-    plotted = Signal(str)
-    warned = Signal(str)
-    record_wanted = Signal(str)
-    chose = Signal(str, str)
+    inspect_requested = Signal(str)
+    plot_requested = Signal(str)
+    alarm_requested = Signal(str)
+    record_requested = Signal(str)
+    select_requested = Signal(str, str)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -102,9 +111,9 @@ class GraphCard(QWidget):
         self._column = QVBoxLayout(self._inside)
         self._column.setContentsMargins(14, 4, 14, 10)
         self._column.setSpacing(8)
-        scroll = Scrolled(self._inside)
+        scroll = ContentScrollArea(self._inside)
         scroll.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self._make_steps()
+        self._make_buttons()
         self.foot = label("", "small", role="textTertiary", wrap=True)
         self.foot.setContentsMargins(14, 5, 14, 7)
         column = QVBoxLayout(self)
@@ -116,19 +125,19 @@ class GraphCard(QWidget):
         self._line = Separator(theme)
         column.addWidget(self._line)
         column.addWidget(self.foot)
-        self._figures: list[_FigureBox] = []
+        self._figures: list[_StatBox] = []
         self._tables: list[_Table] = []
         self.setAccessibleName(_("Selection"))
         self.hide()
 
-    def _make_steps(self) -> None:
+    def _make_buttons(self) -> None:
         theme = self._theme
         self.inspect = Button(theme, _("Inspect"), "list-tree", size="form")
         self.inspect.clicked.connect(self._inspect)
         self.plot = Button(theme, _("Plot a field"), "chart-line", size="form")
         self.plot.clicked.connect(self._plot)
         self.alarm = Button(theme, _("New alarm"), "bell", size="form")
-        self.alarm.clicked.connect(self._warn)
+        self.alarm.clicked.connect(self._request_alarm)
         self.record = Button(theme, _("Record topic"), "circle-dot", size="form")
         self.record.clicked.connect(self._record)
         self.steps = QWidget()
@@ -149,7 +158,7 @@ class GraphCard(QWidget):
         head.addWidget(self.close_button)
         return head
 
-    def first_stop(self) -> QWidget:
+    def first_focus_widget(self) -> QWidget:
         """Return the widget that gets the focus first: a row, else *Inspect*, else the close button."""
         rows = [row.button for table in self._tables for row in table.rows]
         first = next((button for button in rows if button.isVisibleTo(self)), None)
@@ -157,19 +166,19 @@ class GraphCard(QWidget):
 
     def _inspect(self) -> None:
         if self.content is not None and self.content.topic:
-            self.inspected.emit(self.content.topic)
+            self.inspect_requested.emit(self.content.topic)
 
     def _plot(self) -> None:
         if self.content is not None and self.content.topic:
-            self.plotted.emit(self.content.topic)
+            self.plot_requested.emit(self.content.topic)
 
-    def _warn(self) -> None:
+    def _request_alarm(self) -> None:
         if self.content is not None and self.content.alarm:
-            self.warned.emit(self.content.alarm)
+            self.alarm_requested.emit(self.content.alarm)
 
     def _record(self) -> None:
         if self.content is not None and self.content.topic:
-            self.record_wanted.emit(self.content.topic)
+            self.record_requested.emit(self.content.topic)
 
     def show_content(self, content: CardContent | None) -> None:
         """Show a card, or hide it if `content` is None."""
@@ -189,10 +198,10 @@ class GraphCard(QWidget):
         self.foot.setText(content.foot)
         self.foot.setVisible(bool(content.foot))
         self._line.setVisible(bool(content.foot))
-        if before is None or _shape(before) != _shape(content):
+        if before is None or _structure_key(before) != _structure_key(content):
             self._rebuild(content)
-        for box, figure in zip(self._figures, content.figures, strict=True):
-            box.set_figure(figure)
+        for box, figure in zip(self._figures, content.stats, strict=True):
+            box.set_stat(figure)
         for made, table in zip(self._tables, content.tables, strict=True):
             made.set_table(table)
         self.show()
@@ -202,7 +211,7 @@ class GraphCard(QWidget):
             if (old := item.widget()) is not None:
                 old.hide()
                 old.deleteLater()
-        self._figures = [_FigureBox(self._theme) for _figure in content.figures]
+        self._figures = [_StatBox(self._theme) for _figure in content.stats]
         if self._figures:
             card = Card(self._theme)
             grid = QGridLayout(card)
@@ -216,19 +225,19 @@ class GraphCard(QWidget):
             self._column.addWidget(card)
         for fact in content.facts:
             self._column.addWidget(label(fact, "body", role="textSecondary", wrap=True))
-        self._tables = [_Table(self._theme, table, self.chose.emit) for table in content.tables]
+        self._tables = [_Table(self._theme, table, self.select_requested.emit) for table in content.tables]
         for made in self._tables:
             self._column.addWidget(made)
         self._column.addStretch(1)
 
 
-def _shape(content: CardContent) -> object:
+def _structure_key(content: CardContent) -> object:
     # Widgets are rebuilt only when this value changes.
     tables = [(table.title, table.columns, [row[:2] for row in table.rows]) for table in content.tables]
-    return content.title, len(content.figures), content.facts, tables
+    return content.title, len(content.stats), content.facts, tables
 
 
-class _FigureBox(QWidget):
+class _StatBox(QWidget):
     """Number in large type with title, note and curve."""
 
     def __init__(self, theme: Theme) -> None:
@@ -248,7 +257,7 @@ class _FigureBox(QWidget):
         column.addLayout(row)
         column.addWidget(self._note)
 
-    def set_figure(self, figure: CardFigure) -> None:
+    def set_stat(self, figure: CardStat) -> None:
         self._title.setText(figure.title)
         if self._value.text() != figure.value:
             self._value.setText(figure.value)
@@ -266,7 +275,7 @@ class _FigureBox(QWidget):
 @dataclass(slots=True)
 class _TableRow:
     button: LinkButton
-    figures: list[QWidget]
+    value_labels: list[QWidget]
 
 
 class _Table(QWidget):
@@ -288,7 +297,7 @@ class _Table(QWidget):
             button = LinkButton(theme, name)
             button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
             button.setEnabled(bool(key))
-            button.clicked.connect(lambda _on=False, key=key, kind=table.chooses: chose(kind, key))
+            button.clicked.connect(lambda _on=False, key=key, kind=table.item_kind: chose(kind, key))
             grid.addWidget(button, number_, 0)
             shown: list[QWidget] = []
             for place, _words in enumerate(figures, 1):
@@ -298,7 +307,7 @@ class _Table(QWidget):
 
     def set_table(self, table: CardTable) -> None:
         for row, (_key, _name, figures) in zip(self.rows, table.rows, strict=True):
-            for shown, words in zip(row.figures, figures, strict=True):
+            for shown, words in zip(row.value_labels, figures, strict=True):
                 if shown.text() != words:  # type: ignore[attr-defined]
                     shown.setText(words)  # type: ignore[attr-defined]
 
@@ -307,7 +316,7 @@ class _Table(QWidget):
 
 
 @dataclass(frozen=True, slots=True)
-class CardFacts:
+class CardSources:
     """Sources of the information on a card.
 
     Attributes:
@@ -324,46 +333,46 @@ class CardFacts:
     view: GraphView | None
     name_of: Callable[[str], str]
     box_of: Callable[[str], str]
-    calls: Mapping[str, float]
-    shows: Callable[[str], bool] = lambda _name: True
+    call_rates_hz: Mapping[str, float]
+    is_visible: Callable[[str], bool] = lambda _name: True
     now_ns: Callable[[], int] = time.time_ns
 
 
-def topic_card(key: str, facts: CardFacts) -> CardContent | None:
+def topic_card(key: str, facts: CardSources) -> CardContent | None:
     """Return the card of a topic or service, or None if it is unknown."""
     topic = facts.topic_of(key)
     if topic is not None:
-        return _of_topic(topic, facts)
+        return _topic_content(topic, facts)
     service = facts.view.services.get(key) if facts.view is not None else None
-    return _of_service(service, facts) if service is not None else None
+    return _service_content(service, facts) if service is not None else None
 
 
-def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
-    rate, sent = known_figure(topic.rate_hz), known_figure(topic.bandwidth_Bps)
+def _topic_content(topic: Topic, facts: CardSources) -> CardContent:
+    rate, sent = finite_or_none(topic.rate_hz), finite_or_none(topic.bandwidth_Bps)
     size = sent / rate if sent and rate else None
     rates = tuple(topic.rates)
-    least = _("recent minimum {rate}").format(rate=rate_words(min(rates))) if len(rates) > 1 else ""
+    least = _("recent minimum {rate}").format(rate=rate_text(min(rates))) if len(rates) > 1 else ""
     figures = (
-        CardFigure(_("Rate"), f"{rate_words(rate)} /s" if rate is not None else "", least, rates),
-        CardFigure(
+        CardStat(_("Rate"), f"{rate_text(rate)} /s" if rate is not None else "", least, rates),
+        CardStat(
             _("Bandwidth"),
-            bandwidth_words(sent),
-            _("{size} per message").format(size=size_words(size)) if size else "",
+            bandwidth_text(sent),
+            _("{size} per message").format(size=size_text(size)) if size else "",
         ),
-        _lost(topic),
-        _latency(topic),
+        _loss_stat(topic),
+        _latency_stat(topic),
     )
     info = topic.info
     publishers = tuple(
         _row(
             facts,
             key_of(topic.network, each.node_id),
-            (rate_words(known_figure(each.rate_hz)), grouped(each.last_seq)),
+            (rate_text(finite_or_none(each.rate_hz)), group_digits(each.last_seq)),
         )
         for each in (info.publishers if info is not None else ())[:MAX_ROWS]
     )
     subscribers = tuple(
-        _row(facts, key_of(topic.network, each.node_id), _received(each.received, each.lost))
+        _row(facts, key_of(topic.network, each.node_id), _received_texts(each.received, each.lost))
         for each in (info.subscribers if info is not None else ())[:MAX_ROWS]
     )
     more = max(0, topic.publishers - MAX_ROWS) + max(0, topic.subscribers - MAX_ROWS)
@@ -375,53 +384,55 @@ def _of_topic(topic: Topic, facts: CardFacts) -> CardContent:
         topic.name,
         topic.msg_type,
         figures,
-        (_more(more),) if more else (),
+        (_more_text(more),) if more else (),
         tuple(table for table in tables if table.rows),
-        clock_words(facts.view) if not topic.network else "",
+        clock_offset_text(facts.view) if not topic.network else "",
         topic.key,
         topic.codec != "image",
         "" if topic.network else f"alarm.topic:{topic.name}",  # alarms work on Studio's own network only
     )
 
 
-def _received(received: int | None, lost: int | None) -> tuple[str, str]:
-    return "" if received is None else grouped(received), "" if lost is None else grouped(lost)
+def _received_texts(received: int | None, lost: int | None) -> tuple[str, str]:
+    return "" if received is None else group_digits(received), "" if lost is None else group_digits(lost)
 
 
-def _more(count: int) -> str:
-    return ngettext("{count} more not listed", "{count} more not listed", count).format(count=grouped(count))
+def _more_text(count: int) -> str:
+    return ngettext("{count} more not listed", "{count} more not listed", count).format(
+        count=group_digits(count)
+    )
 
 
-def _lost(topic: Topic) -> CardFigure:
+def _loss_stat(topic: Topic) -> CardStat:
     if topic.lost is None:
-        return CardFigure(_("Lost"), "")
+        return CardStat(_("Lost"), "")
     share = topic.loss_ratio
-    value = "0" if not topic.lost else percent_words(share) if share is not None else grouped(topic.lost)
-    note = ngettext("{count} message", "{count} messages", topic.lost).format(count=grouped(topic.lost))
-    return CardFigure(_("Lost"), value, note if topic.lost else "", is_bad=bool(topic.lost))
+    value = "0" if not topic.lost else percent_text(share) if share is not None else group_digits(topic.lost)
+    note = ngettext("{count} message", "{count} messages", topic.lost).format(count=group_digits(topic.lost))
+    return CardStat(_("Lost"), value, note if topic.lost else "", is_bad=bool(topic.lost))
 
 
-def _latency(topic: Topic) -> CardFigure:
+def _latency_stat(topic: Topic) -> CardStat:
     # Measured only while the topic is subscribed to.
     newest = topic.newest
     latency = newest.latency_s if newest is not None else None
     if latency is None:
-        return CardFigure(_("Latency"), "", _("measured while open"))
-    return CardFigure(_("Latency"), latency_words(latency), _("of the newest message"))
+        return CardStat(_("Latency"), "", _("measured while open"))
+    return CardStat(_("Latency"), latency_text(latency), _("of the newest message"))
 
 
-def _of_service(service: ServiceInfo, facts: CardFacts) -> CardContent:
-    rate = facts.calls.get(service.name)
+def _service_content(service: ServiceInfo, facts: CardSources) -> CardContent:
+    rate = facts.call_rates_hz.get(service.name)
     figures = (
-        CardFigure(_("Calls"), grouped(service.calls), short_rate(rate) if rate is not None else ""),
-        CardFigure(_("Errors"), grouped(service.errors), is_bad=service.errors > 0),
+        CardStat(_("Calls"), group_digits(service.calls), short_rate(rate) if rate is not None else ""),
+        CardStat(_("Errors"), group_digits(service.errors), is_bad=service.errors > 0),
     )
     servers = tuple(
-        _row(facts, each.node_id, (grouped(each.calls), grouped(each.errors)))
+        _row(facts, each.node_id, (group_digits(each.calls), group_digits(each.errors)))
         for each in service.servers[:MAX_ROWS]
     )
     clients = tuple(
-        _row(facts, each.node_id, _received(each.answered, each.failed))
+        _row(facts, each.node_id, _received_texts(each.answered, each.failed))
         for each in service.clients[:MAX_ROWS]
     )
     tables = (
@@ -433,11 +444,13 @@ def _of_service(service: ServiceInfo, facts: CardFacts) -> CardContent:
     )
 
 
-def _row(facts: CardFacts, entry: str, figures: tuple[str, ...]) -> Row:
+def _row(facts: CardSources, entry: str, figures: tuple[str, ...]) -> Row:
     return facts.box_of(entry), facts.name_of(entry), figures
 
 
-def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardFacts) -> CardContent | None:
+def node_card(
+    node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardSources
+) -> CardContent | None:
     """Return a node's card.
 
     `services` maps services to True if the node offers them, False if it calls them.
@@ -450,19 +463,19 @@ def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: Card
         lines.append(_("pid {number}").format(number=entry.pid))
     if entry.since_ns and entry.gone_s is None:
         since = max(0.0, (facts.now_ns() - entry.since_ns) / 1e9)
-        lines.append(_("connected for {age}").format(age=age_words(since - since % 10)))
+        lines.append(_("connected for {age}").format(age=age_text(since - since % 10)))
     if entry.gone_s is not None:
         lines.append(_("gone"))
-    figures = (CardFigure(_("Processor"), cpu_words(entry.cpu_ratio), _("of one core")),)
+    figures = (CardStat(_("Processor"), cpu_text(entry.cpu_ratio), _("of one core")),)
     tables = (
-        _topics_of(_("Publishes"), entry.network, entry.publishes, facts),
-        _topics_of(_("Subscribes"), entry.network, entry.subscribes, facts),
+        _topics_table(_("Publishes"), entry.network, entry.publishes, facts),
+        _topics_table(_("Subscribes"), entry.network, entry.subscribes, facts),
         CardTable(_("Serves"), (), tuple((name, name, ()) for name, serves in services if serves), "topic"),
         CardTable(
             _("Calls"), (), tuple((name, name, ()) for name, serves in services if not serves), "topic"
         ),
     )
-    kind = ", ".join(filter(None, (entry.language, generation_words(entry))))
+    kind = ", ".join(filter(None, (entry.language, generation_text(entry))))
     return CardContent(
         node.name,
         kind,
@@ -473,20 +486,20 @@ def node_card(node: DrawnNode, services: Sequence[tuple[str, bool]], facts: Card
     )
 
 
-def _topics_of(title: str, network: str, names: Sequence[str], facts: CardFacts) -> CardTable:
+def _topics_table(title: str, network: str, names: Sequence[str], facts: CardSources) -> CardTable:
     rows: list[Row] = []
-    names = [name for name in names if facts.shows(name)]
+    names = [name for name in names if facts.is_visible(name)]
     for name in names[:MAX_ROWS]:
         key = key_of(network, name)
         topic = facts.topic_of(key)
-        rate = "" if topic is None else rate_words(known_figure(topic.rate_hz))
+        rate = "" if topic is None else rate_text(finite_or_none(topic.rate_hz))
         rows.append((key if topic is not None else "", split_key(key)[1], (rate,)))
     if len(names) > MAX_ROWS:
-        rows.append(("", _more(len(names) - MAX_ROWS), ("",)))
+        rows.append(("", _more_text(len(names) - MAX_ROWS), ("",)))
     return CardTable(title, (_("Rate /s"),), tuple(rows), "topic")
 
 
-def clock_words(view: GraphView | None) -> str:
+def clock_offset_text(view: GraphView | None) -> str:
     """Format the largest uncertainty of the computers' clock offsets; "" if none was measured."""
     if view is None:
         return ""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QPainter, QPen
 
-from app.core.graph.walk import GraphChoice
-from app.ui.panels.graph.scene import JOIN, GraphScene, GroupItem, LineItem, NodeItem
-from app.ui.panels.graph.words import group_note, node_icon, percent_words, quiet_words
+from app.core.graph.walk import GraphSelection
+from app.ui.panels.graph.scene import BRIDGE_END_WIDTH, GraphScene, GroupItem, LineItem, NodeItem
+from app.ui.panels.graph.words import group_note, node_icon, percent_text, quiet_text
 from app.ui.theme.icons import paint_icon
 from app.ui.widgets import paint
 
-CHOSEN_WIDTH = 2.25
+SELECTION_WIDTH = 2.25
 DIM_OPACITY = 0.3
 MIN_TEXT_PX = 6.0
 """Font height in px below which text is not painted, because it would be illegible."""
@@ -22,7 +22,7 @@ def paint_scene(
     painter: QPainter,
     clip: QRectF,
     scale: float,
-    chosen: GraphChoice | None = None,
+    chosen: GraphSelection | None = None,
     *,
     rings: bool = False,
 ) -> None:
@@ -45,15 +45,15 @@ class _Painting:
         painter: QPainter,
         clip: QRectF,
         scale: float,
-        chosen: GraphChoice | None,
+        chosen: GraphSelection | None,
         *,
         rings: bool,
     ) -> None:
         self.scene, self.theme, self.painter = scene, scene.theme, painter
         self.clip, self.scale, self.rings = clip, scale, rings
         self.has_text = scale * scene.name_font.pixelSize() >= MIN_TEXT_PX
-        self.has_small = scene.has_words(scale)
-        self.is_tiny = not scene.has_figures(scale)
+        self.has_small = scene.has_small_text(scale)
+        self.is_tiny = not scene.has_stats(scale)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, not self.is_tiny)
         line = scene.graph.line_of(chosen.key) if chosen is not None and chosen.kind == "topic" else None
         self.line = line
@@ -65,31 +65,31 @@ class _Painting:
         painter, clip = self.painter, self.clip
         for group in self.scene.groups:
             if group.rect.intersects(clip):
-                self._group(group)
+                self._paint_group(group)
         shown = [item for item in self.scene.lines if item.bounds.intersects(clip)]
         above = [item for item in shown if item.line is self.line]
         for item in [*(each for each in shown if each.line is not self.line), *above]:
             painter.setOpacity(DIM_OPACITY if item.is_dim else 1.0)
-            self._line(item)
+            self._paint_line(item)
         if self.has_small:
             for item in self.scene.lines:
                 if item.label is not None and item.label.intersects(clip):
                     painter.setOpacity(DIM_OPACITY if item.is_dim else 1.0)
-                    self._label(item, item.label)
+                    self._paint_label(item, item.label)
         for box in self.scene.nodes.values():
             if box.rect.adjusted(-6, -6, 6, 6).intersects(clip):
                 painter.setOpacity(DIM_OPACITY if box.is_dim else 1.0)
-                self._node(box)
+                self._paint_node(box)
         painter.setOpacity(1.0)
         for item in above:
-            self._losses(item)
+            self._paint_losses(item)
 
-    def _group(self, item: GroupItem) -> None:
+    def _paint_group(self, item: GroupItem) -> None:
         theme, painter, group = self.theme, self.painter, item.group
         paint.box(painter, item.rect, theme.radius("card"), theme.colour("window"), theme.colour("border"))
         if not self.has_text:
             return
-        head = self.scene.sizes.head
+        head = self.scene.sizes.header
         side = theme.scaled(16)
         left = item.rect.left() + 14
         middle = item.rect.top() + head / 2
@@ -98,30 +98,32 @@ class _Painting:
         )
         left += side + 8
         area = QRectF(left, item.rect.top(), item.rect.right() - 10 - left, head)
-        _text(painter, area, item.name, self.scene.title_font, theme.colour("text"))
+        _paint_text(painter, area, item.name, self.scene.title_font, theme.colour("text"))
         used = paint.width_of(self.scene.title_font, item.name) + 8
         if area.width() - used > 40:
             area.setLeft(left + used)
-            paint.words(painter, area, group_note(group), self.scene.small_font, theme.colour("textTertiary"))
-        if item.quiet is not None:
+            paint.text_line(
+                painter, area, group_note(group), self.scene.small_font, theme.colour("textTertiary")
+            )
+        if item.quiet_rect is not None:
             pen = QPen(theme.colour("controlBorder"), 1, Qt.PenStyle.DashLine)
             painter.setPen(pen)
             painter.setBrush(theme.colour("panel"))
-            round_end = item.quiet.height() / 2
-            painter.drawRoundedRect(item.quiet, round_end, round_end)
-            paint.words(
+            round_end = item.quiet_rect.height() / 2
+            painter.drawRoundedRect(item.quiet_rect, round_end, round_end)
+            paint.text_line(
                 painter,
-                item.quiet,
-                quiet_words(group),
+                item.quiet_rect,
+                quiet_text(group),
                 self.scene.small_font,
                 theme.colour("textSecondary"),
                 paint.CENTRE,
             )
 
-    def _line(self, item: LineItem) -> None:
+    def _paint_line(self, item: LineItem) -> None:
         is_chosen = item.line is self.line
         colour = self.theme.colour("accent" if is_chosen else "controlBorder")
-        width = 1.0 if self.is_tiny else CHOSEN_WIDTH if is_chosen else item.figures.width
+        width = 1.0 if self.is_tiny else SELECTION_WIDTH if is_chosen else item.stats.width
         pen = QPen(colour, width)
         pen.setCosmetic(self.is_tiny)
         if item.line.kind == "service":
@@ -129,7 +131,7 @@ class _Painting:
         self.painter.setPen(pen)
         self.painter.setBrush(Qt.BrushStyle.NoBrush)
         if self.is_tiny:
-            for way in item.plain():
+            for way in item.sharp_routes():
                 self.painter.drawPolyline(way)
             return
         self.painter.drawPath(item.path())
@@ -138,11 +140,11 @@ class _Painting:
         for arrow in item.arrows():
             self.painter.drawPolygon(arrow)
 
-    def _label(self, item: LineItem, rect: QRectF) -> None:
+    def _paint_label(self, item: LineItem, rect: QRectF) -> None:
         theme, painter = self.theme, self.painter
-        names, _space, figure = item.figures.words.rpartition(" ")
+        names, _space, figure = item.stats.label.rpartition(" ")
         if not names or not figure.endswith(("/s", "/min")):
-            names, figure = item.figures.words, ""
+            names, figure = item.stats.label, ""
         is_chosen = item.line is self.line
         if is_chosen:
             paint.box(
@@ -153,31 +155,31 @@ class _Painting:
                 theme.colour("accent"),
             )
         ink = theme.colour("accentText" if is_chosen else "text")
-        _text(painter, rect, names, self.scene.label_font, ink)
+        _paint_text(painter, rect, names, self.scene.label_font, ink)
         if figure:
             used = (len(names) + 1) * self.scene.letter
             area = rect.adjusted(used, 0, 20, 0)
             quiet = theme.colour("accentText" if is_chosen else "textSecondary")
-            _text(painter, area, figure, self.scene.label_font, quiet)
+            _paint_text(painter, area, figure, self.scene.label_font, quiet)
 
-    def _losses(self, item: LineItem) -> None:
+    def _paint_losses(self, item: LineItem) -> None:
         if not self.has_small:
             return
         theme, painter, font = self.theme, self.painter, self.scene.small_font
-        for box, share in item.figures.lost:
-            tip = next((points[-1] for ends, points in item.ways.items() if ends[1] == box), None)
+        for box, share in item.stats.losses:
+            tip = next((points[-1] for ends, points in item.routes.items() if ends[1] == box), None)
             if tip is None:
                 continue
-            words = percent_words(share)
+            words = percent_text(share)
             side = theme.scaled(12)
             wide, high = paint.width_of(font, words) + side + 18, theme.scaled(20)
             chip = QRectF(tip[0] - wide - 12, tip[1] + 6, wide, high)
             paint.box(painter, chip, high / 2, theme.colour("warnTint"), theme.colour("warnBorder"))
             square = QRectF(chip.left() + 7, chip.center().y() - side / 2, side, side)
             paint_icon(painter, square, "triangle-alert", theme.colour("warn"))
-            _text(painter, chip.adjusted(side + 11, 0, 0, 0), words, font, theme.colour("warn"))
+            _paint_text(painter, chip.adjusted(side + 11, 0, 0, 0), words, font, theme.colour("warn"))
 
-    def _node(self, item: NodeItem) -> None:
+    def _paint_node(self, item: NodeItem) -> None:
         theme, painter, node = self.theme, self.painter, item.node
         is_chosen = node.key == self.chosen
         at_line = node.key in self.ends
@@ -192,27 +194,29 @@ class _Painting:
             painter.drawRoundedRect(item.rect.adjusted(0.5, 0.5, -0.5, -0.5), radius, radius)
         else:
             paint.box(painter, item.rect, radius, fill, edge, 1.5 if is_chosen or at_line else 1.0)
-        if node.joins:
-            self._other_side(item.rect, node.joins, edge)
+        if node.bridged_network:
+            self._paint_bridge_end(item.rect, node.bridged_network, edge)
         if is_chosen and self.rings:
             ring = item.rect.adjusted(-3, -3, 3, 3)
             paint.box(painter, ring, radius + 3, None, theme.colour("focus"), 2.0)
         if self.has_text:
-            self._words(item, "textDisabled" if node.is_gone else "textSecondary" if faint else "text")
+            self._paint_texts(item, "textDisabled" if node.is_gone else "textSecondary" if faint else "text")
 
-    def _other_side(self, rect: QRectF, joins: str, edge: QColor) -> None:
+    def _paint_bridge_end(self, rect: QRectF, joins: str, edge: QColor) -> None:
         # Right part of a bridge, with the name of the other network.
         theme, painter = self.theme, self.painter
-        part = QRectF(rect.right() - JOIN, rect.top() + 1, JOIN - 1, rect.height() - 2)
+        part = QRectF(
+            rect.right() - BRIDGE_END_WIDTH, rect.top() + 1, BRIDGE_END_WIDTH - 1, rect.height() - 2
+        )
         paint.box(painter, part, theme.radius("small"), theme.colour("sunken"))
         painter.setPen(QPen(edge, 1))
         painter.drawLine(part.topLeft(), part.bottomLeft())
         if self.has_small:
             font = QFont(self.scene.small_font)
             font.setWeight(QFont.Weight.DemiBold)
-            paint.words(painter, part, joins, font, theme.colour("textSecondary"), paint.CENTRE)
+            paint.text_line(painter, part, joins, font, theme.colour("textSecondary"), paint.CENTRE)
 
-    def _words(self, item: NodeItem, role: str) -> None:
+    def _paint_texts(self, item: NodeItem, role: str) -> None:
         theme, painter, rect = self.theme, self.painter, item.rect
         side = theme.scaled(16)
         square = QRectF(rect.left() + 12, rect.center().y() - side / 2, side, side)
@@ -227,13 +231,13 @@ class _Painting:
         if item.node.is_gone:
             font = QFont(font)
             font.setStrikeOut(True)
-        _text(painter, area, item.name, font, theme.colour(role))
+        _paint_text(painter, area, item.name, font, theme.colour(role))
         if has_line:
             area.translate(0, rect.height() / 2 - 4)
-            _text(painter, area, item.line, self.scene.small_font, theme.colour("textTertiary"))
+            _paint_text(painter, area, item.line, self.scene.small_font, theme.colour("textTertiary"))
 
 
-def _text(painter: QPainter, rect: QRectF, text: str, font: QFont, colour: QColor) -> None:
+def _paint_text(painter: QPainter, rect: QRectF, text: str, font: QFont, colour: QColor) -> None:
     # Faster than `paint.words`, which measures the text again.
     painter.setFont(font)
     painter.setPen(colour)

@@ -20,46 +20,46 @@ from app.core.graph.layout_thread import LayoutThread
 from app.core.graph.node_graph import (
     MAX_EXPANDED_NODES,
     DrawnNode,
-    GraphChoices,
     GraphFacts,
     GraphLine,
+    GraphOptions,
     GroupBy,
     NodeGraph,
-    is_shown,
+    is_drawn,
     node_graph,
 )
-from app.core.graph.walk import GraphChoice
+from app.core.graph.walk import GraphSelection
 from app.core.network.topics import split_key
 from app.core.network.web_words import page_nodes
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.graph.canvas import GraphCanvas, GraphOverview
-from app.ui.panels.graph.card import WIDTH, CardFacts, GraphCard, node_card, topic_card
+from app.ui.panels.graph.card import WIDTH, CardSources, GraphCard, node_card, topic_card
 from app.ui.panels.graph.painting import paint_scene
 from app.ui.panels.graph.scene import GraphScene
 from app.ui.panels.graph.tools import GraphLegend, GraphTools
 from app.ui.panels.graph.words import (
-    LineFigures,
-    counts_words,
+    LineStats,
+    counts_text,
+    finite_or_none,
     group_name,
-    known_figure,
-    line_figures,
     line_name,
+    line_stats,
     node_line,
     node_name,
     short_rate,
 )
 from app.ui.panels.row_actions import (
     RowAction,
-    copies,
-    filled,
+    copy_action,
+    fill_menu,
     node_actions,
     service_actions,
     show_messages,
     topic_actions,
 )
 from app.ui.text import plain
-from app.ui.text.numbers import bandwidth_words, grouped
+from app.ui.text.numbers import bandwidth_text, group_digits
 from app.ui.widgets import Button, EmptyAction, EmptyState, Separator, label
 from app.ui.widgets.file_dialogs import FileKind
 from app.ui.widgets.menus import Menu
@@ -67,9 +67,9 @@ from nep.i18n import _, lazy, ngettext
 
 SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
-MAX_AT_ONCE = 500
+MAX_LINES_PER_TICK = 500
 """Number of lines above which building and first painting of a scene are spread over two ticks."""
-CARD_BESIDE_WIDTH = 700
+MIN_SIDE_CARD_WIDTH = 700
 """Minimum width in px (at 100 % text size) for a card at the side; below it, the card is at the bottom."""
 QUIET_UPDATE_TICKS = 30
 """Refreshes (at 30 Hz) between checks for quiet nodes."""
@@ -85,7 +85,7 @@ class GraphPanel(PanelWidget):
         super().__init__(context, _("Graph"))
         theme = self.theme
         self._host = platform.node()
-        self._choices = GraphChoices()
+        self._choices = GraphOptions()
         self._thread = LayoutThread()
         self._quiet, self._calls = QuietNodes(), CallRates()
         self._layout: GraphLayout | None = None
@@ -101,14 +101,16 @@ class GraphPanel(PanelWidget):
         self.export = Button(theme, _("Export"), "download", size="small")
         self._menu = Menu(theme, self.export)
         for words, kind in ((_("Image (SVG)"), SVG), (_("Graph (DOT)"), DOT)):
-            self._menu.addAction(words).triggered.connect(lambda _on=False, kind=kind: self._ask_file(kind))
+            self._menu.addAction(words).triggered.connect(
+                lambda _on=False, kind=kind: self._prompt_file(kind)
+            )
         self.export.clicked.connect(
             lambda: self._menu.popup(self.export.mapToGlobal(self.export.rect().bottomLeft()))
         )
         self.count.setProperty("place", "start")
         self.header = [self.count, self.export]
         self.tools = GraphTools(theme)
-        self.canvas = GraphCanvas(theme, self._described, self._topic_words)
+        self.canvas = GraphCanvas(theme, self._description_of, self._topic_description)
         self.overview = GraphOverview(theme, self.canvas)
         self.legend = GraphLegend(theme)
         self.card = GraphCard(theme)
@@ -118,7 +120,7 @@ class GraphPanel(PanelWidget):
         self.note.hide()
         self._make_actions()
         self._connect()
-        self.pages = self.show_one_of(self._make_page(), self.empty)
+        self.pages = self.make_page_stack(self._make_page(), self.empty)
         self.setFocusProxy(self.canvas)
         self.theme_changed()
 
@@ -126,36 +128,38 @@ class GraphPanel(PanelWidget):
         theme = self.theme
         self._own = QAction(_("Show NEP's own topics"), self)
         self._own.setCheckable(True)
-        self._own.toggled.connect(lambda on: self._choose(shows_own=on))
+        self._own.toggled.connect(lambda on: self._update_choices(shows_own=on))
         self._anew = QAction(theme.icon("refresh-cw"), _("Rearrange"), self)
-        self._anew.triggered.connect(lambda _on=False: self._arrange_anew())
+        self._anew.triggered.connect(lambda _on=False: self._reset_layout())
 
     def _connect(self) -> None:
         tools, canvas = self.tools, self.canvas
         tools.filter.textChanged.connect(self._filter)
-        tools.filter.leave.connect(lambda: canvas.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        tools.filter.exited.connect(lambda: canvas.setFocus(Qt.FocusReason.ShortcutFocusReason))
         tools.group.changed.connect(self._group_by)
         tools.quiet.clicked.connect(
-            lambda: self._choose(hides_quiet=tools.quiet.isChecked(), quiet_shown=frozenset())
+            lambda: self._update_choices(hides_quiet=tools.quiet.isChecked(), quiet_shown=frozenset())
         )
-        tools.services.clicked.connect(lambda: self._choose(shows_services=tools.services.isChecked()))
+        tools.services.clicked.connect(
+            lambda: self._update_choices(shows_services=tools.services.isChecked())
+        )
         tools.whole.clicked.connect(canvas.show_all)
         tools.larger.clicked.connect(lambda: canvas.zoom_by(1.2))
         tools.smaller.clicked.connect(lambda: canvas.zoom_by(1 / 1.2))
-        canvas.moved.connect(lambda: tools.say_scale(canvas.scale))
-        canvas.chosen.connect(self._chosen)
+        canvas.viewport_changed.connect(lambda: tools.show_scale(canvas.scale))
+        canvas.selected.connect(self._selection_changed)
         canvas.opened.connect(self._open)
-        canvas.entered.connect(lambda: self.card.first_stop().setFocus(Qt.FocusReason.TabFocusReason))
+        canvas.entered.connect(lambda: self.card.first_focus_widget().setFocus(Qt.FocusReason.TabFocusReason))
         canvas.toggled.connect(self._toggle)
-        canvas.quiet_wanted.connect(self._show_quiet)
-        canvas.letter.connect(self._letter)
-        canvas.menu_wanted.connect(self._show_menu)
-        self.card.closed.connect(lambda: canvas.choose(None))
-        self.card.inspected.connect(self._open)
-        self.card.plotted.connect(lambda key: self.context.plot(key, ""))
-        self.card.warned.connect(self.context.run)
-        self.card.record_wanted.connect(lambda key: self.context.run(f"record.topic:{key}"))
-        self.card.chose.connect(self._choose_key)
+        canvas.quiet_nodes_requested.connect(self._show_quiet)
+        canvas.key_pressed.connect(self._handle_key)
+        canvas.menu_requested.connect(self._show_menu)
+        self.card.closed.connect(lambda: canvas.select(None))
+        self.card.inspect_requested.connect(self._open)
+        self.card.plot_requested.connect(lambda key: self.context.plot(key, ""))
+        self.card.alarm_requested.connect(self.context.run)
+        self.card.record_requested.connect(lambda key: self.context.run(f"record.topic:{key}"))
+        self.card.select_requested.connect(self._select_item)
 
     def _make_page(self) -> QWidget:
         left = QWidget()
@@ -183,20 +187,20 @@ class GraphPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         if self._ticks % QUIET_UPDATE_TICKS == 1:
-            self._look_who_is_quiet()
-        facts = self._facts()
+            self._update_quiet_nodes()
+        facts = self._snapshot()
         if facts != self._seen:
             self._seen = facts
             self._rebuild()
-        self._take_layout()
+        self._apply_layout()
         values = (self.session.topics.values_revision, self.session.networks.values_revision)
-        if values != self._values or (self._has_gone() and self._ticks % QUIET_UPDATE_TICKS == 0):
+        if values != self._values or (self._has_gone_nodes() and self._ticks % QUIET_UPDATE_TICKS == 0):
             self._values = values
-            self.canvas.renew_soon()
-            self._say_card()
-        self.canvas.renew(self._figures_of)
+            self.canvas.schedule_update()
+            self._update_card()
+        self.canvas.update_stats(self._stats_of)
 
-    def _facts(self) -> tuple[object, ...]:
+    def _snapshot(self) -> tuple[object, ...]:
         session = self.session
         view = session.graph
         graph = (view.epoch, view.revision) if view is not None else None
@@ -215,90 +219,93 @@ class GraphPanel(PanelWidget):
             page_nodes(session.web_pages),
         )
 
-    def _look_who_is_quiet(self) -> None:
+    def _update_quiet_nodes(self) -> None:
         facts, now = self._graph_facts(), time.monotonic()
         self._quiet.update(facts, now)
         self._calls.update(facts, now)
         self._hertz = self._calls.rates_hz()
-        self._choose(quiet=self._quiet.quiet(now))
+        self._update_choices(quiet=self._quiet.quiet_keys(now))
 
     def _rebuild(self) -> None:
         facts = self._graph_facts()
         choices = self._choices
-        if len(facts.nodes) > MAX_EXPANDED_NODES and not (choices.starts_closed or choices.toggled):
+        if len(facts.nodes) > MAX_EXPANDED_NODES and not (choices.starts_collapsed or choices.toggled):
             self._layout = None
-            self._choose(starts_closed=True)
+            self._update_choices(starts_closed=True)
         graph = node_graph(facts, self._choices)
         self.pages.setCurrentIndex(0 if facts.nodes else 1)
         self.export.setVisible(bool(facts.nodes))
         if not facts.nodes:
-            self._choose(starts_closed=False)
-            self._say_empty()
-        self._say_counts(graph)
+            self._update_choices(starts_closed=False)
+            self._update_empty_state()
+        self._update_counts(graph)
         if graph != self._asked:
             self._asked, self._sizes_asked = graph, self._sizes()
-            self._thread.ask(graph, self._layout, self._sizes_asked)
+            self._thread.submit(graph, self._layout, self._sizes_asked)
 
-    def _take_layout(self) -> None:
+    def _apply_layout(self) -> None:
         # A large scene is shown one tick after it was built, to keep ticks short.
         scene, self._coming = self._coming, None
         made = self._thread.pop_result()
         if made is not None:
             graph, self._layout = made
             scene = GraphScene(self.theme, graph, self._layout, self._sizes_asked, self._host)
-            if len(scene.lines) > MAX_AT_ONCE:
+            if len(scene.lines) > MAX_LINES_PER_TICK:
                 self._coming = scene
                 return
         if scene is not None:
             self._show(scene)
 
     def _show(self, scene: GraphScene) -> None:
-        scene.dim(self.tools.words())
+        scene.dim_unmatched(self.tools.filter_words())
         boxes = {node.entry_key: node.key for node in scene.graph.nodes if node.entry_key}
         self._box_of = lambda entry: boxes.get(entry, "")
         self.canvas.show_scene(scene)
-        self._say_note(scene.layout)
-        self._say_card()
+        self._update_note(scene.layout)
+        self._update_card()
 
-    def _figures_of(self, line: GraphLine) -> LineFigures:
-        return line_figures(line, self.session.topic, self._hertz, self._box_of)
+    def _stats_of(self, line: GraphLine) -> LineStats:
+        return line_stats(line, self.session.topic, self._hertz, self._box_of)
 
-    def _has_gone(self) -> bool:
+    def _has_gone_nodes(self) -> bool:
         graph = self._asked
         return graph is not None and any(node.is_gone for node in graph.nodes)
 
     def _sizes(self) -> LayoutSizes:
         return LayoutSizes().scaled(self.theme.scaled(1.0))
 
-    def _say_empty(self) -> None:
+    def _update_empty_state(self) -> None:
         if self.session.master.kind == "none":
             self.empty.set_texts(
                 _("No master is running"), _("A master lets programs find each other."), "radio-tower"
             )
             start = self.session.launcher.ensure_master
-            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
+            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", is_primary=True)])
             return
         said = _("Programs appear here as soon as they join the master.")
         self.empty.set_texts(_("No nodes yet"), said, "workflow")
         doctor = EmptyAction(
-            _("Open the connection doctor"), lambda: self.context.why(self, ""), "stethoscope", primary=True
+            _("Open the connection doctor"),
+            lambda: self.context.open_doctor(self, ""),
+            "stethoscope",
+            is_primary=True,
         )
         self.empty.set_actions([doctor])
 
-    def _say_counts(self, graph: NodeGraph) -> None:
-        self.count.setText(counts_words(graph))
-        if graph.nodes_there:
-            self.tools.say_quiet(graph.quiet_hidden, self._choices.hides_quiet)
+    def _update_counts(self, graph: NodeGraph) -> None:
+        self.count.setText(counts_text(graph))
+        if graph.node_count:
+            self.tools.show_quiet_count(graph.hidden_quiet_count, self._choices.hides_quiet)
 
-    def _say_note(self, layout: GraphLayout) -> None:
+    def _update_note(self, layout: GraphLayout) -> None:
         words = []
-        if layout.left_out:
+        if layout.omitted_routes:
             left = ngettext(
                 "{count} line is hidden: too many to draw",
                 "{count} lines are hidden: too many to draw",
-                layout.left_out,
+                layout.omitted_routes,
             )
-            words.append(left.format(count=grouped(layout.left_out)))
+            words.append(left.format(count=group_digits(layout.omitted_routes)))
         if layout.is_plain:
             words.append(_("The nodes are shown in rows: no better layout was found"))
         self.note.setText(". ".join(words))
@@ -306,7 +313,7 @@ class GraphPanel(PanelWidget):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def _choose(self, **changes: object) -> None:
+    def _update_choices(self, **changes: object) -> None:
         self._choices = replace(self._choices, **changes)  # type: ignore[arg-type]
         self.tools.show_choices(self._choices)
 
@@ -314,41 +321,41 @@ class GraphPanel(PanelWidget):
         for group_by in GROUPS:
             if group_by == name:
                 self._layout = None
-                self._choose(group_by=group_by, toggled=frozenset(), quiet_shown=frozenset())
+                self._update_choices(group_by=group_by, toggled=frozenset(), quiet_shown=frozenset())
 
     def _toggle(self, group: str) -> None:
         self._layout = None
-        self._choose(toggled=self._choices.toggled ^ {group})
+        self._update_choices(toggled=self._choices.toggled ^ {group})
 
     def _show_quiet(self, group: str) -> None:
-        self._choose(quiet_shown=self._choices.quiet_shown | {group})
+        self._update_choices(quiet_shown=self._choices.quiet_visible_groups | {group})
 
-    def _arrange_anew(self) -> None:
+    def _reset_layout(self) -> None:
         self._layout = self._asked = self._coming = None
         self._seen = ()
         self.canvas.show_all()
 
     def _filter(self) -> None:
         if self.canvas.scene is not None:
-            self.canvas.scene.dim(self.tools.words())
+            self.canvas.scene.dim_unmatched(self.tools.filter_words())
             self.canvas.update()
 
-    def _letter(self, letter: str) -> None:
+    def _handle_key(self, letter: str) -> None:
         if letter == "/":
             self.focus_filter()
         elif letter == "g":
             now = GROUPS.index(self._choices.group_by)
             self._group_by(GROUPS[(now + 1) % len(GROUPS)])
         elif letter == "h":
-            self._choose(hides_quiet=not self._choices.hides_quiet, quiet_shown=frozenset())
+            self._update_choices(hides_quiet=not self._choices.hides_quiet, quiet_shown=frozenset())
         elif letter == "s":
-            self._choose(shows_services=not self._choices.shows_services)
+            self._update_choices(shows_services=not self._choices.shows_services)
 
     def _open(self, key: str) -> None:
         if self.session.topic(key) is not None:
             show_messages(self.context, key)
 
-    def _show_menu(self, choice: GraphChoice, at: QPoint) -> None:
+    def _show_menu(self, choice: GraphSelection, at: QPoint) -> None:
         menu = self.menu_of(choice)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if menu.actions():
@@ -356,62 +363,62 @@ class GraphPanel(PanelWidget):
         else:
             menu.deleteLater()
 
-    def menu_of(self, choice: GraphChoice) -> Menu:
+    def menu_of(self, choice: GraphSelection) -> Menu:
         """Return the context menu of a node, or of the topics and services of a line."""
         menu, scene = Menu(self.theme, self), self.canvas.scene
         graph = scene.graph if scene is not None else NodeGraph()
         if choice.kind == "node":
-            return filled(menu, self.theme, self._node_actions(graph.node(choice.key)))
+            return fill_menu(menu, self.theme, self._node_actions(graph.node(choice.key)))
         line = graph.line_of(choice.key)
         topics = line.topics if line is not None else (choice.key,)
         if len(topics) == 1:
-            return filled(menu, self.theme, self._topic_actions(topics[0]))
+            return fill_menu(menu, self.theme, self._topic_actions(topics[0]))
         for topic in sorted(topics, key=lambda each: each != choice.key)[:MAX_MENU_TOPICS]:
-            part = Menu(self.theme, menu, plain.entry(split_key(topic)[1]))
-            menu.addMenu(filled(part, self.theme, self._topic_actions(topic)))
+            part = Menu(self.theme, menu, plain.escape_menu_text(split_key(topic)[1]))
+            menu.addMenu(fill_menu(part, self.theme, self._topic_actions(topic)))
         return menu
 
     def _topic_actions(self, key: str) -> list[RowAction]:
         if self.session.topic(key) is None:
             network, name = split_key(key)
-            return [copies(self.context, name)] if network else service_actions(self.context, name)
+            return [copy_action(self.context, name)] if network else service_actions(self.context, name)
         return topic_actions(self.context, key)
 
     def _node_actions(self, node: DrawnNode | None) -> list[RowAction]:
         if node is None:
             return []
         if node.entry is None:
-            return [RowAction(_("Expand the group"), "box", lambda: self.canvas.open_group(node.key))]
+            return [RowAction(_("Expand the group"), "box", lambda: self.canvas.expand_group(node.key))]
         return node_actions(self.context, node.entry.network, node.entry.name)
 
-    def _chosen(self, _choice: object) -> None:
-        self._say_card()
+    def _selection_changed(self, _choice: object) -> None:
+        self._update_card()
 
-    def _choose_key(self, kind: str, key: str) -> None:
+    def _select_item(self, kind: str, key: str) -> None:
         if kind == "node":
-            self.canvas.choose(GraphChoice("node", key), by_key=True)
+            self.canvas.select(GraphSelection("node", key), by_key=True)
         elif self._asked is not None and self._asked.line_of(key) is not None:
-            self.canvas.choose(GraphChoice("topic", key), by_key=True)
+            self.canvas.select(GraphSelection("topic", key), by_key=True)
         else:
             self._open(key)  # a topic without subscribers has no line
 
     # -- card and texts -----------------------------------------------------------------------------------
 
-    def _card_facts(self) -> CardFacts:
+    def _card_facts(self) -> CardSources:
         scene = self.canvas.scene
         nodes = scene.graph.nodes if scene is not None else ()
         names = {entry.key: entry.name for entry in (*self.session.nodes, *self.session.networks.nodes)}
         names |= {node.entry_key: node_name(node, self._host) for node in nodes if node.entry_key}
-        return CardFacts(
+        return CardSources(
             self.session.topic,
             self.session.graph,
             lambda entry: names.get(entry, split_key(entry)[1]),
             self._box_of,
             self._hertz,
-            lambda name: is_shown(name, self._choices),
+            lambda name: is_drawn(name, self._choices),
         )
 
-    def _say_card(self) -> None:
+    def _update_card(self) -> None:
         choice, scene = self.canvas.choice, self.canvas.scene
         content = None
         if choice is not None and scene is not None:
@@ -428,17 +435,17 @@ class GraphPanel(PanelWidget):
         view = self.session.graph
         found: list[tuple[str, bool]] = []
         for name, service in view.services.items() if view is not None else ():
-            if is_shown(name, self._choices):
+            if is_drawn(name, self._choices):
                 found += [(name, True)] if any(each.node_id == entry for each in service.servers) else []
                 found += [(name, False)] if any(each.node_id == entry for each in service.clients) else []
         return found
 
-    def _described(self, choice: GraphChoice | None) -> str:
+    def _description_of(self, choice: GraphSelection | None) -> str:
         scene = self.canvas.scene
         if choice is None or scene is None:
             return ""
         if choice.kind == "topic":
-            return self._topic_words(choice.key)
+            return self._topic_description(choice.key)
         node = scene.graph.node(choice.key)
         if node is None:
             return ""
@@ -449,7 +456,7 @@ class GraphPanel(PanelWidget):
             node=node_name(node, self._host), facts=node_line(node), out=len(outgoing), into=len(incoming)
         )
 
-    def _topic_words(self, key: str) -> str:
+    def _topic_description(self, key: str) -> str:
         topic = self.session.topic(key)
         scene = self.canvas.scene
         line = scene.graph.line_of(key) if scene is not None else None
@@ -458,9 +465,9 @@ class GraphPanel(PanelWidget):
             said = _("from {sources} to {targets}")
             ends = said.format(sources=self._names(line.sources), targets=self._names(line.targets))
         figures = [split_key(key)[1]]
-        rate = known_figure(topic.rate_hz) if topic is not None else None
+        rate = finite_or_none(topic.rate_hz) if topic is not None else None
         if topic is not None and rate is not None:
-            figures += [short_rate(rate), bandwidth_words(known_figure(topic.bandwidth_Bps))]
+            figures += [short_rate(rate), bandwidth_text(finite_or_none(topic.bandwidth_Bps))]
         return ", ".join(filter(None, (*figures, ends)))
 
     def _names(self, keys: tuple[str, ...]) -> str:
@@ -476,7 +483,7 @@ class GraphPanel(PanelWidget):
 
     # -- files --------------------------------------------------------------------------------------------
 
-    def _ask_file(self, kind: FileKind) -> None:
+    def _prompt_file(self, kind: FileKind) -> None:
         suggestion = Path.home() / _("graph")
         self.context.files.save_as(_("Export the graph"), suggestion, (kind,), self.save)
 
@@ -499,7 +506,7 @@ class GraphPanel(PanelWidget):
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return b""
-        scene.complete(self._figures_of)
+        scene.complete(self._stats_of)
         area = scene.bounds.adjusted(-20, -20, 20, 20)
         buffer = QBuffer()
         buffer.open(QIODevice.OpenModeFlag.WriteOnly)
@@ -519,7 +526,7 @@ class GraphPanel(PanelWidget):
         """Return the graph in the DOT language of Graphviz."""
         graph = self.canvas.scene.graph if self.canvas.scene is not None else NodeGraph()
         names = {group.key: group_name(group.key, self._host) for group in graph.groups}
-        return dot_of(graph, names, lambda line: self._figures_of(line).words)
+        return dot_of(graph, names, lambda line: self._stats_of(line).label)
 
     # -- overrides ----------------------------------------------------------------------------------------
 
@@ -530,7 +537,7 @@ class GraphPanel(PanelWidget):
 
     def show_topic(self, name: str) -> None:
         if self._asked is not None and self._asked.line_of(name) is not None:
-            self.canvas.choose(GraphChoice("topic", name), by_key=True)
+            self.canvas.select(GraphSelection("topic", name), by_key=True)
 
     def more_actions(self) -> list[QAction]:
         return [self._anew, self._own]
@@ -540,7 +547,7 @@ class GraphPanel(PanelWidget):
         self._fit()
 
     def _fit(self) -> None:
-        is_wide = self.width() >= self.theme.scaled(CARD_BESIDE_WIDTH)
+        is_wide = self.width() >= self.theme.scaled(MIN_SIDE_CARD_WIDTH)
         ways = QBoxLayout.Direction
         self._beside.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)
         wide = round(self.theme.scaled(WIDTH))
@@ -554,7 +561,7 @@ class GraphPanel(PanelWidget):
         super().theme_changed()
         self._fit()
         if self._asked is not None and self._sizes() != self._sizes_asked:
-            self._arrange_anew()
+            self._reset_layout()
 
     def save_state(self) -> dict[str, object]:
         choices = self._choices
@@ -562,17 +569,17 @@ class GraphPanel(PanelWidget):
             "group_by": choices.group_by,
             "services": choices.shows_services,
             "hides_quiet": choices.hides_quiet,
-            "own": choices.shows_own,
+            "own": choices.shows_internal,
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         for group_by in GROUPS:
             if state.get("group_by") == group_by:
-                self._choose(group_by=group_by)
+                self._update_choices(group_by=group_by)
         if isinstance(services := state.get("services"), bool):
-            self._choose(shows_services=services)
+            self._update_choices(shows_services=services)
         if isinstance(hides := state.get("hides_quiet"), bool):
-            self._choose(hides_quiet=hides)
+            self._update_choices(hides_quiet=hides)
         if isinstance(own := state.get("own"), bool):
             self._own.setChecked(own)
 

@@ -14,15 +14,15 @@ from dataclasses import dataclass, field
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QFont, QFontMetricsF, QPainterPath, QPolygonF
 
-from app.core.graph.layout import MAX_LED, GraphLayout, LayoutSizes, Place
+from app.core.graph.layout import MAX_AVOIDING_ROUTES, GraphLayout, LayoutSizes, Position
 from app.core.graph.node_graph import DrawnNode, GraphGroup, GraphLine, NodeGraph
 from app.ui.panels.graph.words import (
-    LineFigures,
+    LineStats,
     group_name,
     line_name,
     node_line,
     node_name,
-    quiet_words,
+    quiet_text,
 )
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -32,7 +32,7 @@ ARROW_LENGTH, ARROW_WIDTH = 9.0, 8.0
 LINE_MARGIN = 14.0
 """Margin in px around lines, to include arrows and thick pens."""
 CELL_SIZE = (160.0, 48.0)
-LABEL_FIGURE_CHARS = 7
+LABEL_RATE_CHARS = 7
 """Characters reserved in a label for the rate."""
 MIN_TEXT_PX = 7.0
 """Font height in px below which text is not painted, because it would be illegible."""
@@ -40,11 +40,11 @@ TINY_SCALE = 0.2
 """Scale below which rates and line widths are left out, because thousands of lines are visible."""
 HIT_TOLERANCE_PX = 6.0
 """Maximum distance of a click from a line, in px."""
-JOIN = 48.0
+BRIDGE_END_WIDTH = 48.0
 """Width in px of the right part of a bridge, which names the other network."""
 
 
-FiguresOf = Callable[[GraphLine], LineFigures]
+StatsOf = Callable[[GraphLine], LineStats]
 
 
 @dataclass(slots=True)
@@ -54,7 +54,7 @@ class NodeItem:
     node: DrawnNode
     rect: QRectF
     name: str
-    said: str = ""
+    detail: str = ""
     line: str = ""
     """`said`, elided to the available width."""
     is_dim: bool = False
@@ -65,15 +65,15 @@ class LineItem:
     """Line between two boxes: its routes, and the rectangle of its label if there was room for it."""
 
     line: GraphLine
-    ways: dict[tuple[str, str], Sequence[Place]]
+    routes: dict[tuple[str, str], Sequence[Position]]
     bounds: QRectF
     label: QRectF | None = None
     is_placed: bool = False
-    figures: LineFigures = field(default_factory=lambda: LineFigures("", 1.25))
+    stats: LineStats = field(default_factory=lambda: LineStats("", 1.25))
     is_dim: bool = False
     _path: QPainterPath | None = None
     _arrows: list[QPolygonF] | None = None
-    _plain: list[QPolygonF] | None = None
+    _sharp_routes: list[QPolygonF] | None = None
 
     # Created on first paint: creating all paths of a large graph at once would block the window.
 
@@ -81,21 +81,23 @@ class LineItem:
         """Return the routes with rounded corners."""
         if self._path is None:
             self._path = QPainterPath()
-            for points in self.ways.values():
+            for points in self.routes.values():
                 _add_rounded(self._path, points)
         return self._path
 
     def arrows(self) -> list[QPolygonF]:
         """Return the arrow head of each route."""
         if self._arrows is None:
-            self._arrows = [_arrow(points) for points in self.ways.values()]
+            self._arrows = [_arrow(points) for points in self.routes.values()]
         return self._arrows
 
-    def plain(self) -> list[QPolygonF]:
+    def sharp_routes(self) -> list[QPolygonF]:
         """Return the routes with sharp corners, which are painted faster at small scales."""
-        if self._plain is None:
-            self._plain = [QPolygonF([QPointF(*at) for at in points]) for points in self.ways.values()]
-        return self._plain
+        if self._sharp_routes is None:
+            self._sharp_routes = [
+                QPolygonF([QPointF(*at) for at in points]) for points in self.routes.values()
+            ]
+        return self._sharp_routes
 
 
 @dataclass(slots=True)
@@ -105,7 +107,7 @@ class GroupItem:
     group: GraphGroup
     rect: QRectF
     name: str
-    quiet: QRectF | None
+    quiet_rect: QRectF | None
 
 
 class GraphScene:
@@ -126,25 +128,25 @@ class GraphScene:
             node.key: NodeItem(
                 node,
                 QRectF(x - wide / 2, y - high / 2, wide, high),
-                self._elided(self.name_font, node_name(node, host), self._words_width(node)),
+                self._elided(self.name_font, node_name(node, host), self._text_width(node)),
             )
             for node in graph.nodes
-            if (place := layout.places.get(node.key)) is not None
+            if (place := layout.positions.get(node.key)) is not None
             for x, y in (place,)
         }
         self.groups = [self._group_item(group) for group in graph.groups if group.key in layout.groups]
-        ways: dict[object, dict[tuple[str, str], Sequence[Place]]] = {}
+        ways: dict[object, dict[tuple[str, str], Sequence[Position]]] = {}
         for (key, source, target), points in layout.routes.items():
             ways.setdefault(key, {})[source, target] = points
         self.lines = [_line_item(line, ways[line.key]) for line in graph.lines if line.key in ways]
         left, top, width, height = layout.bounds(sizes)
         self.bounds = QRectF(left, top, width, height)
         heads = (
-            QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.head - 8)) for item in self.groups
+            QRectF(item.rect.topLeft(), QSizeF(item.rect.width(), sizes.header - 8)) for item in self.groups
         )
-        led = self.lines if len(layout.routes) <= MAX_LED else []
-        self._crossed = _TakenRoom(_thin(*part) for item in led for part in _parts(item))
-        self._taken = _TakenRoom([*(item.rect for item in self.nodes.values()), *heads])
+        led = self.lines if len(layout.routes) <= MAX_AVOIDING_ROUTES else []
+        self._crossed = _OccupiedAreas(_segment_rect(*part) for item in led for part in _segments(item))
+        self._taken = _OccupiedAreas([*(item.rect for item in self.nodes.values()), *heads])
 
     def _fonts(self) -> None:
         theme = self.theme
@@ -154,8 +156,8 @@ class GraphScene:
         self.label_font, self.title_font = theme.font("code"), theme.font("title")
         self.letter = QFontMetricsF(self.label_font).horizontalAdvance("0")
 
-    def _words_width(self, node: DrawnNode) -> float:
-        return self.sizes.node[0] - 46 - (JOIN if node.joins else 0)
+    def _text_width(self, node: DrawnNode) -> float:
+        return self.sizes.node[0] - 46 - (BRIDGE_END_WIDTH if node.bridged_network else 0)
 
     @staticmethod
     def _elided(font: QFont, text: str, width: float) -> str:
@@ -164,9 +166,9 @@ class GraphScene:
     def _group_item(self, group: GraphGroup) -> GroupItem:
         rect = QRectF(*self.layout.groups[group.key])
         chip = None
-        if group.quiet:
-            words = paint.width_of(self.small_font, quiet_words(group)) + 24
-            high = self.sizes.foot * 0.7
+        if group.quiet_count:
+            words = paint.width_of(self.small_font, quiet_text(group)) + 24
+            high = self.sizes.footer * 0.7
             width = min(words, rect.width() - 16)
             chip = QRectF(rect.right() - 10 - width, rect.bottom() - 8 - high, width, high)
         room = rect.width() - 48
@@ -181,47 +183,47 @@ class GraphScene:
         nodes = [item for item in self.nodes.values() if item.rect.intersects(area)]
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
-    def renew(self, item: NodeItem | LineItem, figures: FiguresOf, *, with_words: bool) -> QRectF | None:
+    def update_stats(self, item: NodeItem | LineItem, figures: StatsOf, *, with_words: bool) -> QRectF | None:
         """Update rates and counts of one item. Return the area to repaint, or None if nothing changed.
 
         The label of a line is placed on the first call with `with_words`.
         """
         if isinstance(item, NodeItem):
-            said = node_line(item.node) if with_words else item.said
-            if said == item.said:
+            said = node_line(item.node) if with_words else item.detail
+            if said == item.detail:
                 return None
-            item.said = said
-            item.line = self._elided(self.small_font, said, self._words_width(item.node))
+            item.detail = said
+            item.line = self._elided(self.small_font, said, self._text_width(item.node))
             return item.rect
-        now, before = figures(item.line), item.figures
-        item.figures = now
-        if now.width != before.width or now.lost != before.lost:
+        now, before = figures(item.line), item.stats
+        item.stats = now
+        if now.width != before.width or now.losses != before.losses:
             area: QRectF | None = item.bounds
         else:
-            area = item.label if now.words != before.words else None
+            area = item.label if now.label != before.label else None
         if with_words and not item.is_placed:
             item.is_placed = True
-            item.label = self._room_for(item)
+            item.label = self._label_rect_for(item)
             area = area or item.label
         return area
 
-    def complete(self, figures: FiguresOf) -> None:
+    def complete(self, figures: StatsOf) -> None:
         """Update the rates and counts of all items at once, for an exported picture."""
         every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
         for item in every:
-            self.renew(item, figures, with_words=True)
+            self.update_stats(item, figures, with_words=True)
 
-    def _room_for(self, item: LineItem) -> QRectF | None:
+    def _label_rect_for(self, item: LineItem) -> QRectF | None:
         # Tries the longest horizontal segment first, and prefers places that no other line crosses.
-        letters = len(line_name(item.line.topics)) + LABEL_FIGURE_CHARS
+        letters = len(line_name(item.line.topics)) + LABEL_RATE_CHARS
         wide, high = letters * self.letter + 4, QFontMetricsF(self.label_font).height()
-        rooms = [rect for rect in _rooms(item, wide, high) if self._taken.is_free(rect)]
+        rooms = [rect for rect in _label_candidates(item, wide, high) if self._taken.is_free(rect)]
         found = next((rect for rect in rooms if self._crossed.is_free(rect)), rooms[0] if rooms else None)
         if found is not None:
             self._taken.add(found)
         return found
 
-    def dim(self, words: Sequence[str]) -> None:
+    def dim_unmatched(self, words: Sequence[str]) -> None:
         """Fade the items that lack one of `words`. Nodes connected to matching topics stay."""
         bright = {
             key for key, item in self.nodes.items() if all(word in _haystack(item.node) for word in words)
@@ -240,16 +242,16 @@ class GraphScene:
             box.is_dim = bool(words) and key not in bright and key not in ends
 
     @property
-    def dimmed(self) -> int:
+    def dimmed_count(self) -> int:
         """Number of nodes faded by the filter."""
         return sum(item.is_dim for item in self.nodes.values())
 
     @staticmethod
-    def has_figures(scale: float) -> bool:
+    def has_stats(scale: float) -> bool:
         """Return False for scales at which lines are drawn 1 px wide, without arrows and rates."""
         return scale >= TINY_SCALE
 
-    def has_words(self, scale: float) -> bool:
+    def has_small_text(self, scale: float) -> bool:
         """Return True for scales at which the small text is legible."""
         return scale * self.small_font.pixelSize() >= MIN_TEXT_PX
 
@@ -265,9 +267,9 @@ class GraphScene:
         The bool is True for its title, False for its number of quiet nodes.
         """
         for item in self.groups:
-            if item.quiet is not None and item.quiet.contains(at):
+            if item.quiet_rect is not None and item.quiet_rect.contains(at):
                 return item.group, False
-            head = QRectF(item.rect.left(), item.rect.top(), item.rect.width(), self.sizes.head - 4)
+            head = QRectF(item.rect.left(), item.rect.top(), item.rect.width(), self.sizes.header - 4)
             if head.contains(at):
                 return item.group, True
         return None
@@ -283,20 +285,20 @@ class GraphScene:
             (_distance(at, points), number)
             for number, item in enumerate(self.lines)
             if item.bounds.adjusted(-reach, -reach, reach, reach).contains(at)
-            for points in item.ways.values()
+            for points in item.routes.values()
         ]
         distance, number = min(near, default=(math.inf, 0))
         return self.lines[number] if distance <= reach else None
 
 
-def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Place]]) -> LineItem:
+def _line_item(line: GraphLine, ways: dict[tuple[str, str], Sequence[Position]]) -> LineItem:
     xs = [x for points in ways.values() for x, _y in points]
     ys = [y for points in ways.values() for _x, y in points]
     left, top = min(xs) - LINE_MARGIN, min(ys) - LINE_MARGIN
     return LineItem(line, ways, QRectF(left, top, max(xs) + LINE_MARGIN - left, max(ys) + LINE_MARGIN - top))
 
 
-def _add_rounded(path: QPainterPath, points: Sequence[Place]) -> None:
+def _add_rounded(path: QPainterPath, points: Sequence[Position]) -> None:
     path.moveTo(*points[0])
     for before, at, after in zip(points, points[1:], points[2:], strict=False):
         radius = min(CORNER_RADIUS, math.dist(before, at) / 2, math.dist(at, after) / 2)
@@ -306,12 +308,12 @@ def _add_rounded(path: QPainterPath, points: Sequence[Place]) -> None:
     path.lineTo(*points[-1])
 
 
-def _towards(at: Place, other: Place, length: float) -> Place:
+def _towards(at: Position, other: Position, length: float) -> Position:
     whole = math.dist(at, other) or 1.0
     return at[0] + (other[0] - at[0]) * length / whole, at[1] + (other[1] - at[1]) * length / whole
 
 
-def _arrow(points: Sequence[Place]) -> QPolygonF:
+def _arrow(points: Sequence[Position]) -> QPolygonF:
     tip = points[-1]
     before = next((each for each in reversed(points[:-1]) if each != tip), (tip[0] - 1, tip[1]))
     base = _towards(tip, before, ARROW_LENGTH)
@@ -328,9 +330,9 @@ def _arrow(points: Sequence[Place]) -> QPolygonF:
     )
 
 
-def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
+def _label_candidates(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
     # Best candidates first: horizontal segments, then vertical ones.
-    parts = _parts(item)
+    parts = _segments(item)
     level = [each for each in parts if abs(each[1][1] - each[0][1]) < 1]
     for begin, end in sorted(level, key=_length, reverse=True)[:6]:
         left, room = min(begin[0], end[0]), abs(end[0] - begin[0]) - wide
@@ -345,24 +347,26 @@ def _rooms(item: LineItem, wide: float, high: float) -> Iterator[QRectF]:
             yield QRectF(begin[0] - 5 - wide, top + room * share, wide, high)
 
 
-def _parts(item: LineItem) -> list[tuple[Place, Place]]:
-    return [part for points in item.ways.values() for part in itertools.pairwise(points)]
+def _segments(item: LineItem) -> list[tuple[Position, Position]]:
+    return [part for points in item.routes.values() for part in itertools.pairwise(points)]
 
 
-def _thin(begin: Place, end: Place) -> QRectF:
+def _segment_rect(begin: Position, end: Position) -> QRectF:
     left, top = min(begin[0], end[0]), min(begin[1], end[1])
     return QRectF(left, top, abs(end[0] - begin[0]) + 0.5, abs(end[1] - begin[1]) + 0.5)
 
 
-def _length(part: tuple[Place, Place]) -> float:
+def _length(part: tuple[Position, Position]) -> float:
     return math.dist(*part)
 
 
-def _distance(at: QPointF, points: Sequence[Place]) -> float:
-    return min(_distance_to_part((at.x(), at.y()), begin, end) for begin, end in itertools.pairwise(points))
+def _distance(at: QPointF, points: Sequence[Position]) -> float:
+    return min(
+        _distance_to_segment((at.x(), at.y()), begin, end) for begin, end in itertools.pairwise(points)
+    )
 
 
-def _distance_to_part(at: Place, begin: Place, end: Place) -> float:
+def _distance_to_segment(at: Position, begin: Position, end: Position) -> float:
     wide, high = end[0] - begin[0], end[1] - begin[1]
     square = wide * wide + high * high
     share = ((at[0] - begin[0]) * wide + (at[1] - begin[1]) * high) / square if square else 0.0
@@ -378,7 +382,7 @@ def _haystack(node: DrawnNode) -> str:
     return f"{node.name} {entry.host} {entry.language} {entry.generation} {topics}".casefold()
 
 
-class _TakenRoom:
+class _OccupiedAreas:
     """Spatial index of occupied rectangles, so that thousands of labels can be placed without overlap."""
 
     def __init__(self, rects: Iterable[QRectF]) -> None:

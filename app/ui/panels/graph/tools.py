@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.core.graph.node_graph import GraphChoices
+from app.core.graph.node_graph import GraphOptions
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Segments, label, paint
 from app.ui.widgets.buttons import ToggleButton
@@ -47,27 +47,27 @@ class GraphTools(QWidget):
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
-        self.show_choices(GraphChoices())
+        self.show_choices(GraphOptions())
 
-    def words(self) -> list[str]:
+    def filter_words(self) -> list[str]:
         """Return the words of the filter. Items that lack one of them are faded."""
         return self.filter.text().casefold().split()
 
-    def show_choices(self, choices: GraphChoices) -> None:
+    def show_choices(self, choices: GraphOptions) -> None:
         """Update the buttons to the current choices."""
         self.group.set_value(choices.group_by)
         self.quiet.setChecked(choices.hides_quiet)
         self.services.setChecked(choices.shows_services)
 
-    def say_quiet(self, hidden: int, hides: bool) -> None:
+    def show_quiet_count(self, hidden: int, hides: bool) -> None:
         """Show the number of hidden quiet nodes."""
         if hides and hidden:
             words = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden)
-            self.quiet.set_word(words.format(count=hidden))
+            self.quiet.set_label(words.format(count=hidden))
         else:
-            self.quiet.set_word(_("Hide quiet nodes"))
+            self.quiet.set_label(_("Hide quiet nodes"))
 
-    def say_scale(self, scale: float) -> None:
+    def show_scale(self, scale: float) -> None:
         """Show the zoom level."""
         self.scale.setText(f"{number(scale * 100, '.0f')} %")
 
@@ -94,7 +94,7 @@ class GraphLegend(QWidget):
 class _Entry(QWidget):
     """Legend entry: a sample with its text."""
 
-    SIGN = 36.0
+    SAMPLE_WIDTH = 36.0
 
     def __init__(self, theme: Theme, kind: str, words: str) -> None:
         super().__init__()
@@ -105,7 +105,7 @@ class _Entry(QWidget):
 
     def sizeHint(self) -> QSize:
         font = self._theme.font("small")
-        wide = self.SIGN + 8 + paint.width_of(font, self._words)
+        wide = self.SAMPLE_WIDTH + 8 + paint.width_of(font, self._words)
         return QSize(round(wide) + 1, round(max(18.0, paint.height_of(font))))
 
     def minimumSizeHint(self) -> QSize:
@@ -123,13 +123,13 @@ class _Entry(QWidget):
         if self._kind == "gone":
             painter.drawRoundedRect(QRectF(5, middle - 7, 26, 14), 4, 4)
         else:
-            painter.drawLine(QPointF(0, middle), QPointF(self.SIGN - 8, middle))
+            painter.drawLine(QPointF(0, middle), QPointF(self.SAMPLE_WIDTH - 8, middle))
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(colour)
-            tip = self.SIGN
+            tip = self.SAMPLE_WIDTH
             painter.drawPolygon(
                 [QPointF(tip, middle), QPointF(tip - 9, middle - 4), QPointF(tip - 9, middle + 4)]
             )
-        area = QRectF(self.SIGN + 8, 0, self.width(), self.height())
-        paint.words(painter, area, self._words, theme.font("small"), theme.colour("textSecondary"))
+        area = QRectF(self.SAMPLE_WIDTH + 8, 0, self.width(), self.height())
+        paint.text_line(painter, area, self._words, theme.font("small"), theme.colour("textSecondary"))
         painter.end()

@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from app.core.graph.node_graph import BRIDGE_TO, WEB_GROUP, DrawnNode, GraphGroup, GraphLine, NodeGraph
+from app.core.graph.node_graph import BRIDGE_SEPARATOR, WEB_GROUP, DrawnNode, GraphGroup, GraphLine, NodeGraph
 from app.core.network.topics import Topic, key_of, split_key
-from app.core.networks.kinds import kind_named
-from app.ui.text.nodes import cpu_words, generation_words
-from app.ui.text.numbers import grouped
+from app.core.networks.kinds import find_kind
+from app.ui.text.nodes import cpu_text, generation_text
+from app.ui.text.numbers import group_digits
 from nep.i18n import _, ngettext, number, pgettext
 
 BRIDGE_PREFIX = "bridge-"
@@ -34,12 +34,12 @@ FindTopic = Callable[[str], "Topic | None"]
 
 
 @dataclass(frozen=True, slots=True)
-class LineFigures:
+class LineStats:
     """Label and width (px) of a line; `lost` maps the box of a subscriber to its loss ratio."""
 
-    words: str
+    label: str
     width: float
-    lost: tuple[tuple[str, float], ...] = ()
+    losses: tuple[tuple[str, float], ...] = ()
 
 
 def node_icon(node: DrawnNode) -> str:
@@ -53,8 +53,8 @@ def node_name(node: DrawnNode, host: str) -> str:
     """Return the label of a node or collapsed group."""
     if node.kind == "group":
         return group_name(node.key, host)
-    if node.joins:  # the rest of the name is painted in the bridge's right part
-        return node.name.removeprefix(BRIDGE_PREFIX).rpartition(BRIDGE_TO)[0] or node.name
+    if node.bridged_network:  # the rest of the name is painted in the bridge's right part
+        return node.name.removeprefix(BRIDGE_PREFIX).rpartition(BRIDGE_SEPARATOR)[0] or node.name
     return node.name
 
 
@@ -65,73 +65,73 @@ def node_line(node: DrawnNode) -> str:
     """
     entry = node.entry
     if entry is None:
-        return _members(node.members, node.quiet)
+        return _members(node.member_count, node.quiet_count)
     if entry.gone_s is not None:
         return _("gone for {seconds} s").format(seconds=int(entry.gone_s))
     if node.kind == "page":
-        return node.page.where if node.page is not None else _("web page")
+        return node.page.location if node.page is not None else _("web page")
     if node.kind == "original":
-        return generation_words(entry)
-    cpu = cpu_words(entry.cpu_ratio)
+        return generation_text(entry)
+    cpu = cpu_text(entry.cpu_ratio)
     if node.kind == "studio":
         return _("this window")
     if node.kind == "bridge":
         return pgettext("node", "bridge")
-    language = _("behaviour") if node.kind == "behaviour" else entry.language or _of_network(node)
+    language = _("behaviour") if node.kind == "behaviour" else entry.language or _network_text(node)
     return ", ".join(filter(None, (language, cpu)))
 
 
-def _of_network(node: DrawnNode) -> str:
+def _network_text(node: DrawnNode) -> str:
     entry = node.entry
-    return generation_words(entry) if entry is not None and entry.network else ""
+    return generation_text(entry) if entry is not None and entry.network else ""
 
 
 def _members(members: int, quiet: int) -> str:
-    words = ngettext("{count} node", "{count} nodes", members).format(count=grouped(members))
+    words = ngettext("{count} node", "{count} nodes", members).format(count=group_digits(members))
     if quiet < members:
         return words
-    return ngettext("{count} quiet node", "{count} quiet nodes", quiet).format(count=grouped(quiet))
+    return ngettext("{count} quiet node", "{count} quiet nodes", quiet).format(count=group_digits(quiet))
 
 
-def quiet_words(group: GraphGroup) -> str:
+def quiet_text(group: GraphGroup) -> str:
     """Return the text with the number of hidden quiet nodes of a group."""
-    return ngettext("{count} quiet node", "{count} quiet nodes", group.quiet).format(
-        count=grouped(group.quiet)
+    return ngettext("{count} quiet node", "{count} quiet nodes", group.quiet_count).format(
+        count=group_digits(group.quiet_count)
     )
 
 
-def counts_words(graph: NodeGraph) -> str:
+def counts_text(graph: NodeGraph) -> str:
     """Return a summary such as "7 of 9 nodes, 3 of them web pages, 13 topics"; "" without nodes."""
-    there = graph.nodes_there
+    there = graph.node_count
     if not there:
         return ""
-    shown = there - graph.quiet_hidden
+    shown = there - graph.hidden_quiet_count
     nodes = ngettext("{shown} of {count} node", "{shown} of {count} nodes", there)
     if shown == there:
         nodes = ngettext("{count} node", "{count} nodes", there)
-    parts = [nodes.format(shown=grouped(shown), count=grouped(there))]
-    if graph.pages_there:
-        pages = ngettext("{count} of them a web page", "{count} of them web pages", graph.pages_there)
-        parts.append(pages.format(count=grouped(graph.pages_there)))
-    topics = ngettext("{count} topic", "{count} topics", graph.topics_there)
-    parts.append(topics.format(count=grouped(graph.topics_there)))
-    if graph.services_there:
-        services = ngettext("{count} service", "{count} services", graph.services_there)
-        parts.append(services.format(count=grouped(graph.services_there)))
+    parts = [nodes.format(shown=group_digits(shown), count=group_digits(there))]
+    if graph.page_count:
+        pages = ngettext("{count} of them a web page", "{count} of them web pages", graph.page_count)
+        parts.append(pages.format(count=group_digits(graph.page_count)))
+    topics = ngettext("{count} topic", "{count} topics", graph.topic_count)
+    parts.append(topics.format(count=group_digits(graph.topic_count)))
+    if graph.service_count:
+        services = ngettext("{count} service", "{count} services", graph.service_count)
+        parts.append(services.format(count=group_digits(graph.service_count)))
     return ", ".join(parts)
 
 
 def group_note(group: GraphGroup) -> str:
     """Return the note next to a group's name: the address of its computer, or the number of web pages."""
-    return grouped(group.members) if group.key == WEB_GROUP else group.address
+    return group_digits(group.member_count) if group.key == WEB_GROUP else group.address
 
 
 def group_name(key: str, host: str) -> str:
     """Return the displayed name of a group; `host` is the name of this computer."""
     kind, _colon, name = key.partition(":")
     if kind == "network":
-        known = kind_named(name)
-        return known.words if known is not None else name
+        known = find_kind(name)
+        return known.product_name if known is not None else name
     if kind == "web":
         return _("Web pages")
     if kind == "robot":
@@ -139,9 +139,9 @@ def group_name(key: str, host: str) -> str:
     return _("This computer") if name == host else name or _("Unknown computer")
 
 
-def line_figures(
+def line_stats(
     line: GraphLine, topic_of: FindTopic, hertz: Mapping[str, float], box_of: Callable[[str], str]
-) -> LineFigures:
+) -> LineStats:
     """Return label, width and losses of a line.
 
     Args:
@@ -152,12 +152,12 @@ def line_figures(
     names = line_name(line.topics)
     if line.kind == "service":
         known = [hertz[name] for name in line.topics if name in hertz]
-        return LineFigures(f"{names} {short_rate(sum(known))}" if known else names, MIN_WIDTH)
+        return LineStats(f"{names} {short_rate(sum(known))}" if known else names, MIN_WIDTH)
     topics = [topic for name in line.topics if (topic := topic_of(name)) is not None]
-    rates = [hz for topic in topics if (hz := known_figure(topic.rate_hz)) is not None]
+    rates = [hz for topic in topics if (hz := finite_or_none(topic.rate_hz)) is not None]
     rate = short_rate(sum(rates)) if rates else ""
-    sent = sum(known_figure(topic.bandwidth_Bps) or 0.0 for topic in topics)
-    return LineFigures(f"{names} {rate}".rstrip(), line_width(sent), _losses(topics, box_of))
+    sent = sum(finite_or_none(topic.bandwidth_Bps) or 0.0 for topic in topics)
+    return LineStats(f"{names} {rate}".rstrip(), line_width(sent), _losses(topics, box_of))
 
 
 def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tuple[str, float], ...]:
@@ -172,7 +172,7 @@ def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tupl
     return tuple(sorted(found.items()))
 
 
-def known_figure(value: float | None) -> float | None:
+def finite_or_none(value: float | None) -> float | None:
     """Return the value, or None if it is missing, NaN or infinite."""
     return value if value is not None and math.isfinite(value) else None
 
@@ -187,7 +187,7 @@ def line_name(topics: Sequence[str]) -> str:
 def short_rate(rate_hz: float) -> str:
     """Format a rate such as "52/s", "0.5/s" or "2/min"; lower rates are "0/s"."""
     if rate_hz >= 9.95:
-        return f"{grouped(round(rate_hz))}/s"
+        return f"{group_digits(round(rate_hz))}/s"
     if rate_hz >= 0.095:
         return f"{number(rate_hz, '.1f')}/s"
     return f"{round(rate_hz * 60)}/min" if rate_hz * 60 >= 0.5 else "0/s"
@@ -201,6 +201,6 @@ def line_width(bytes_per_s: float) -> float:
     return MIN_WIDTH + (MAX_WIDTH - MIN_WIDTH) * round(share * WIDTH_STEPS) / WIDTH_STEPS
 
 
-def percent_words(share: float) -> str:
+def percent_text(share: float) -> str:
     """Format a ratio as "0.7 %" or "12 %"."""
     return number(share, ".1%").replace("%", " %")

@@ -14,34 +14,41 @@ from nep.i18n import _, lazy
 
 
 @dataclass(frozen=True)
-class PictureRow:
+class ActionSpec:
     """Definition of an action.
 
     The first key is shown in menus; `above` adds a separator before the action.
     """
 
     name: str
-    words: str
+    text: str
     keys: tuple[str, ...]
     icon: str | None = None
-    above: bool = False
-    check: bool = False
+    has_separator: bool = False
+    is_checkable: bool = False
 
 
-ROWS: tuple[PictureRow, ...] = (
-    PictureRow("larger", lazy("Zoom in"), ("+", "Ctrl++"), "zoom-in"),
-    PictureRow("smaller", lazy("Zoom out"), ("-", "Ctrl+-"), "zoom-out"),
-    PictureRow("fit", lazy("Fit image"), ("0", "Ctrl+0"), "maximize"),
-    PictureRow("exact", lazy("Actual size"), ("1",)),
-    PictureRow("right", lazy("Rotate right"), ("R",), "rotate-cw", above=True),
-    PictureRow("left", lazy("Rotate left"), ("Shift+R",), "rotate-ccw"),
-    PictureRow("across", lazy("Flip horizontally"), ("H",), "move-horizontal", check=True),
-    PictureRow("down", lazy("Flip vertically"), ("V",), "arrow-up-down", check=True),
-    PictureRow("freeze", lazy("Freeze this image"), ("Space",), "snowflake", above=True, check=True),
-    PictureRow("save", lazy("Save as PNG"), ("S",), "download"),
-    PictureRow("copy", lazy("Copy the picture"), ("Ctrl+C",), "copy"),
-    PictureRow(
-        "point", lazy("Publish a point on click"), ("P",), "mouse-pointer-click", above=True, check=True
+ROWS: tuple[ActionSpec, ...] = (
+    ActionSpec("larger", lazy("Zoom in"), ("+", "Ctrl++"), "zoom-in"),
+    ActionSpec("smaller", lazy("Zoom out"), ("-", "Ctrl+-"), "zoom-out"),
+    ActionSpec("fit", lazy("Fit image"), ("0", "Ctrl+0"), "maximize"),
+    ActionSpec("exact", lazy("Actual size"), ("1",)),
+    ActionSpec("right", lazy("Rotate right"), ("R",), "rotate-cw", has_separator=True),
+    ActionSpec("left", lazy("Rotate left"), ("Shift+R",), "rotate-ccw"),
+    ActionSpec("across", lazy("Flip horizontally"), ("H",), "move-horizontal", is_checkable=True),
+    ActionSpec("down", lazy("Flip vertically"), ("V",), "arrow-up-down", is_checkable=True),
+    ActionSpec(
+        "freeze", lazy("Freeze this image"), ("Space",), "snowflake", has_separator=True, is_checkable=True
+    ),
+    ActionSpec("save", lazy("Save as PNG"), ("S",), "download"),
+    ActionSpec("copy", lazy("Copy the picture"), ("Ctrl+C",), "copy"),
+    ActionSpec(
+        "point",
+        lazy("Publish a point on click"),
+        ("P",),
+        "mouse-pointer-click",
+        has_separator=True,
+        is_checkable=True,
     ),
 )
 
@@ -55,10 +62,10 @@ class PictureActions(QObject):
         does: dict[str, Callable[[], object]] = {
             "larger": lambda: view.zoom_by(STEP),
             "smaller": lambda: view.zoom_by(1 / STEP),
-            "fit": view.show_whole,
-            "exact": view.show_exact,
-            "right": lambda: self._turn(90),
-            "left": lambda: self._turn(-90),
+            "fit": view.fit_to_view,
+            "exact": view.show_actual_size,
+            "right": lambda: self._rotate(90),
+            "left": lambda: self._rotate(-90),
             "across": lambda: self._flip(across=True),
             "down": lambda: self._flip(across=False),
             **own,
@@ -67,26 +74,26 @@ class PictureActions(QObject):
         self._by_key: dict[str, QAction] = {}
         self._listed: list[QAction] = []  # with separators
         for row in ROWS:
-            action = QAction(f"{_(row.words)}\t{row.keys[0]}", view)
+            action = QAction(f"{_(row.text)}\t{row.keys[0]}", view)
             if row.icon is not None:
                 action.setIcon(theme.icon(row.icon))
-            action.setCheckable(row.check)
+            action.setCheckable(row.is_checkable)
             action.triggered.connect(lambda _on=False, do=does[row.name]: do())
             self._by_name[row.name] = action
-            if row.above:
+            if row.has_separator:
                 line = QAction(self)
                 line.setSeparator(True)
                 self._listed.append(line)
             self._listed.append(action)
             self._by_key.update(dict.fromkeys(row.keys, action))
         view.keys = frozenset(self._by_key)
-        view.key_pressed.connect(self._key)
-        view.place_changed.connect(self.show_checks)
+        view.key_pressed.connect(self._trigger)
+        view.placement_changed.connect(self.update_checks)
 
     def __getitem__(self, name: str) -> QAction:
         return self._by_name[name]
 
-    def listed(self) -> list[QAction]:
+    def menu_actions(self) -> list[QAction]:
         """Return all actions with separators, for a menu."""
         return list(self._listed)
 
@@ -95,18 +102,18 @@ class PictureActions(QObject):
         for action in self._by_name.values():
             action.setEnabled(there)
 
-    def show_checks(self) -> None:
+    def update_checks(self) -> None:
         """Check the flip actions that are active."""
-        self["across"].setChecked(self._view.place.flipped_across)
-        self["down"].setChecked(self._view.place.flipped_down)
+        self["across"].setChecked(self._view.place.is_flipped_horizontally)
+        self["down"].setChecked(self._view.place.is_flipped_vertically)
 
-    def _key(self, name: str) -> None:
+    def _trigger(self, name: str) -> None:
         self._by_key[name].trigger()
 
-    def _turn(self, degrees: int) -> None:
-        self._view.place.turn(degrees)
-        self._view.told()
+    def _rotate(self, degrees: int) -> None:
+        self._view.place.rotate(degrees)
+        self._view.notify_changed()
 
     def _flip(self, *, across: bool) -> None:
         self._view.place.flip(across=across)
-        self._view.told()
+        self._view.notify_changed()

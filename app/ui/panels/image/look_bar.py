@@ -30,10 +30,10 @@ MAP_NAMES = {
 """Names of the colour maps."""
 
 
-class _EndEdit(NumberEdit):
+class _RangeEdit(NumberEdit):
     """Number field that formats its value as briefly as possible."""
 
-    def written(self, value: float) -> str:
+    def format_number(self, value: float) -> str:
         return f"{value:.7g}"
 
 
@@ -56,10 +56,12 @@ class LookBar(QWidget):
         maps = [(name, _(MAP_NAMES[name])) for name in COLOUR_MAPS]
         names = [("", _("Default colours")), *maps]
         self.colours = ComboBox(theme, names, name=_("Colour map"))
-        self.colours.activated.connect(lambda _at: self._set(replace(self.look, colours=self.colours.value)))
+        self.colours.activated.connect(
+            lambda _at: self._apply(replace(self.look, colours=self.colours.value))
+        )
         self.own_range = ToggleButton(theme, _("Custom range"), "ruler")
-        self.own_range.toggled.connect(self._set_own_range)
-        self.low, self.high = (_EndEdit(theme, None, None) for _end in range(2))
+        self.own_range.toggled.connect(self._set_manual_range)
+        self.low, self.high = (_RangeEdit(theme, None, None) for _end in range(2))
         for field, name in (
             (self.low, _("Value of the first colour")),
             (self.high, _("Value of the last colour")),
@@ -68,7 +70,7 @@ class LookBar(QWidget):
             field.setFixedWidth(92)
             field.number.connect(lambda _value: self._read_range())
         self.again = Button(theme, _("Original"), "undo-2", size="small")
-        self.again.clicked.connect(lambda: self._set(PLAIN, show=True))
+        self.again.clicked.connect(lambda: self._apply(PLAIN, show=True))
         flow = Flow(self, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 12, 6)
         parts: tuple[QWidget, ...] = (
@@ -113,13 +115,13 @@ class LookBar(QWidget):
     def refresh(self) -> None:
         """Enable only the settings that affect the current image."""
         picture = self._picture()
-        of_numbers = picture is None or picture.one_channel
+        of_numbers = picture is None or picture.has_one_channel
         if of_numbers != self._of_numbers:
             self._of_numbers = of_numbers
             for part in (self.colours, self.own_range, self.low, self.high):
                 part.setEnabled(of_numbers)
 
-    def _set(self, look: PictureLook, *, show: bool = False) -> None:
+    def _apply(self, look: PictureLook, *, show: bool = False) -> None:
         if show:
             self.show_look(look)
         if look != self.look or show:
@@ -127,17 +129,17 @@ class LookBar(QWidget):
             self.changed.emit(look)
 
     def _set_brightness(self, value: int) -> None:
-        self._set(replace(self.look, brightness=value / SLIDER_STEPS - 1))
+        self._apply(replace(self.look, brightness=value / SLIDER_STEPS - 1))
 
     def _set_contrast(self, value: int) -> None:
-        self._set(replace(self.look, contrast=exp((value / SLIDER_STEPS - 1) * log(MAX_CONTRAST))))
+        self._apply(replace(self.look, contrast=exp((value / SLIDER_STEPS - 1) * log(MAX_CONTRAST))))
 
-    def _set_own_range(self, on: bool) -> None:
+    def _set_manual_range(self, on: bool) -> None:
         picture = self._picture()
         scale = picture.scale if picture is not None else None
         low, high = (scale.low, scale.high) if scale is not None else (0.0, 255.0)
         low, high = (low, high) if low < high else (low, low + 1)
-        self._set(replace(self.look, low=low if on else None, high=high if on else None), show=True)
+        self._apply(replace(self.look, low=low if on else None, high=high if on else None), show=True)
 
     def _read_range(self) -> None:
         try:
@@ -145,4 +147,4 @@ class LookBar(QWidget):
         except ValueError:  # a field is incomplete; it marks itself
             return
         if low < high:
-            self._set(replace(self.look, low=low, high=high))
+            self._apply(replace(self.look, low=low, high=high))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from app.core.messages.annotations import Drawn, drawn_by
+from app.core.messages.annotations import Shape, shapes_in
 from app.core.messages.reader import LARGE_BYTES
 from app.core.network.topics import Topic
 from app.core.network.watches import Suspendable, Watch
@@ -17,7 +17,7 @@ FACES_NAME = "face_positions"
 MAX_OVERLAYS = 8
 
 
-def may_draw(topic: Topic) -> bool:
+def may_contain_annotations(topic: Topic) -> bool:
     """Return True if type or name of the topic suggest that it contains annotations for images."""
     if topic.codec not in {"json", "msgpack"}:
         return False
@@ -32,43 +32,47 @@ class Overlays:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._watches: dict[str, Watch] = {}
-        self._drawn: dict[str, tuple[Message | None, tuple[int, int], tuple[Drawn, ...]]] = {}
+        self._drawn: dict[str, tuple[Message | None, tuple[int, int], tuple[Shape, ...]]] = {}
 
     @property
-    def chosen(self) -> tuple[str, ...]:
+    def selected(self) -> tuple[str, ...]:
         """Keys of the chosen topics."""
         return tuple(self._watches)
 
     def choices(self) -> list[str]:
         """Return the keys of available overlay topics, and of chosen ones even if they no longer exist."""
         every = (*self._session.topics, *self._session.networks.topics)
-        there = [topic.key for topic in every if topic.gone_s is None and may_draw(topic)]
+        there = [topic.key for topic in every if topic.gone_s is None and may_contain_annotations(topic)]
         return [*there, *(key for key in self._watches if key not in there)]
 
-    def choose(self, topic: str, shown: bool) -> None:
+    def set_visible(self, topic: str, shown: bool) -> None:
         """Show or hide the annotations of a topic. At most `MAX_OVERLAYS` topics can be shown."""
         if shown and topic not in self._watches and len(self._watches) < MAX_OVERLAYS:
-            self._watches[topic] = self._session.watch_shown(topic)
+            self._watches[topic] = self._session.watch_displayed(topic)
         elif not shown and topic in self._watches:
             self._watches.pop(topic).close()
             self._drawn.pop(topic, None)
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Watch the chosen topics in the new source after the source changed."""
-        chosen = self.chosen
+        chosen = self.selected
         self.close()
         for topic in chosen:
-            self.choose(topic, shown=True)
+            self.set_visible(topic, shown=True)
 
-    def on(self, width: int, height: int) -> tuple[Drawn, ...]:
+    def annotations_for(self, width: int, height: int) -> tuple[Shape, ...]:
         """Return the annotations for an image of this size in px. Each message is decoded once."""
-        found: list[Drawn] = []
+        found: list[Shape] = []
         for key in self._watches:
             topic = self._session.topic(key)
             message = topic.newest if topic is not None and topic.gone_s is None else None
             before = self._drawn.get(key)
             if before is None or before[0] is not message or before[1] != (width, height):
-                before = self._drawn[key] = message, (width, height), _drawn(message, width, height)
+                before = self._drawn[key] = (
+                    message,
+                    (width, height),
+                    _decode_annotations(message, width, height),
+                )
             found += before[2]
         return tuple(found)
 
@@ -84,11 +88,11 @@ class Overlays:
         self._drawn.clear()
 
 
-def _drawn(message: Message | None, width: int, height: int) -> tuple[Drawn, ...]:
+def _decode_annotations(message: Message | None, width: int, height: int) -> tuple[Shape, ...]:
     # large messages are not decoded on the GUI thread
     if message is None or message.size_bytes > LARGE_BYTES:
         return ()
     try:
-        return drawn_by(message.payload, width, height)
+        return shapes_in(message.payload, width, height)
     except (NepError, ValueError):
         return ()

@@ -11,21 +11,21 @@ from PySide6.QtGui import QAction, QGuiApplication, QImage, QKeySequence, QResiz
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.messages import snapshots
-from app.core.messages.picture_look import PLAIN, PictureLook, restored
-from app.core.networks.networks import topic_words
-from app.ui.other_programs import open_outside
-from app.ui.panels.base import Hindrance, Panel, PanelContext, PanelWidget, paused_hindrance
+from app.core.messages.picture_look import PLAIN, PictureLook, parse_look
+from app.core.networks.networks import topic_label
+from app.ui.other_programs import open_externally
+from app.ui.panels.base import Blocker, Panel, PanelContext, PanelWidget, paused_blocker
 from app.ui.panels.image.actions import PictureActions
 from app.ui.panels.image.look_bar import LookBar
 from app.ui.panels.image.overlays import Overlays
 from app.ui.panels.image.point_bar import PointBar
 from app.ui.panels.image.snapshot import SnapshotJob
-from app.ui.pictures.boxes import boxes_on, owner_of
+from app.ui.pictures.boxes import boxes_in_camera, robot_of_camera
 from app.ui.pictures.clicks import ClickablePicture
-from app.ui.pictures.placement import PicturePlace
+from app.ui.pictures.placement import PicturePlacement
 from app.ui.text import plain
 from app.ui.widgets import EmptyAction, EmptyState, IconButton
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
@@ -35,13 +35,13 @@ if TYPE_CHECKING:
 
 CODEC = "image"
 ALL_BUTTONS_WIDTH = 320
-MAX_PLACES = 200
+MAX_SAVED_VIEWS = 200
 
 
 class ImagePanel(PanelWidget):
     """Panel with the image stream of one topic: the first available one until the user chooses another."""
 
-    shows_pictures = True
+    shows_video = True
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Image"))
@@ -49,7 +49,7 @@ class ImagePanel(PanelWidget):
         self._stream: ImageStream | None = None
         self._watch: Watch | None = None
         self._watched_robot = ""
-        self._places: dict[str, PicturePlace] = {}
+        self._places: dict[str, PicturePlacement] = {}
         self._looks: dict[str, PictureLook] = {}
         self.overlays = Overlays(self.session)
         self._revision = (-1, -1)
@@ -64,17 +64,17 @@ class ImagePanel(PanelWidget):
         self.view.customContextMenuRequested.connect(self._show_actions)
         self._make_actions()
         self.empty = EmptyState(self.theme, "image", "", "")
-        self.pages = self.show_one_of(self.empty, self._with_look_bar())
+        self.pages = self.make_page_stack(self.empty, self._make_content())
         self.setFocusProxy(self.view)
-        self._say_nothing()
+        self._update_empty_state()
 
-    def _with_look_bar(self) -> QWidget:
+    def _make_content(self) -> QWidget:
         self.look_bar = LookBar(self.theme, lambda: self.view.picture)
         self.look_bar.changed.connect(self._set_look)
         self.look_bar.hide()
         self.tune.toggled.connect(self.look_bar.setVisible)
         self.points = PointBar(self.context, self.view)
-        self.points.left.connect(lambda: self._publish_points(on=False))
+        self.points.exited.connect(lambda: self._publish_points(on=False))
         self.view.clicked.connect(self.points.send)
         self.shown = QWidget()
         column = QVBoxLayout(self.shown)
@@ -89,11 +89,11 @@ class ImagePanel(PanelWidget):
         if isinstance(look, PictureLook):
             self._looks[self._topic] = look
             if self._stream is not None:
-                self._stream.show_as(look)
+                self._stream.set_look(look)
 
     def _make_actions(self) -> None:
         own = {
-            "freeze": self._freeze_or_not,
+            "freeze": self._toggle_freeze,
             "save": self.save_picture,
             "copy": self.copy_picture,
             "point": lambda: self._publish_points(on=not self.points.is_on),
@@ -114,8 +114,8 @@ class ImagePanel(PanelWidget):
             self.theme, "snowflake", _("Freeze this image"), "Space", checkable=True, size=26
         )
         self.keep = IconButton(self.theme, "download", _("Save as PNG"), "S", size=26)
-        self.fit.clicked.connect(self.view.show_whole)
-        self.freeze.toggled.connect(self._hold)
+        self.fit.clicked.connect(self.view.fit_to_view)
+        self.freeze.toggled.connect(self._set_frozen)
         self.keep.clicked.connect(self.save_picture)
         tune = _("Brightness, contrast and colours")
         self.tune: IconButton = IconButton(self.theme, "sliders-horizontal", tune, checkable=True, size=26)
@@ -132,38 +132,38 @@ class ImagePanel(PanelWidget):
         """Switch to another topic."""
         if name == self._topic and self._stream is not None:
             return
-        self._leave_stream()
+        self._close_stream()
         if name != self._topic:
-            self._show_place_of(name)
+            self._restore_view_of(name)
         self._topic = name
         self.view.clear()
-        self.points.show_pictures(name)
+        self.points.set_image_topic(name)
         self.freeze.setChecked(False)
-        self.set_title(_("Image"), topic_words(name))
+        self.set_title(_("Image"), topic_label(name))
         if name:
             self._stream = self.session.images.stream(name)
-            self._stream.show_as(self._looks.get(name, PLAIN))
+            self._stream.set_look(self._looks.get(name, PLAIN))
             self.look_bar.show_look(self._looks.get(name, PLAIN))
             self.session.mark_seen(name)
-        self._say_nothing()
+        self._update_empty_state()
 
     def source_changed(self) -> None:
         topic = self._topic
-        self._leave_stream()
+        self._close_stream()
         self._stream, self._revision = None, (-1, -1)
-        self.overlays.begin_anew()
+        self.overlays.restart()
         plays = self.session.replay is not None  # Space plays and pauses the replay in this case
         self.actions_of["freeze"].setShortcut(QKeySequence() if plays else QKeySequence(Qt.Key.Key_Space))
         if topic:
             self.show_topic(topic)
 
-    def _show_place_of(self, topic: str) -> None:
+    def _restore_view_of(self, topic: str) -> None:
         # Zoom, rotation and image settings are remembered per topic.
-        if len(self._places) >= MAX_PLACES:
+        if len(self._places) >= MAX_SAVED_VIEWS:
             self._places.clear()
             self._looks.clear()
-        self.view.place = self._places.setdefault(topic, PicturePlace())
-        self.actions_of.show_checks()
+        self.view.place = self._places.setdefault(topic, PicturePlacement())
+        self.actions_of.update_checks()
 
     def refresh(self) -> None:
         revision = self.session.topics.revision, self.session.networks.revision
@@ -176,45 +176,45 @@ class ImagePanel(PanelWidget):
         self.points.refresh()
         if self._stream is None:
             return
-        self._look_at_robot()
+        self._watch_robot()
         link = self.session.fleet.link(self._watched_robot) if self._watched_robot else None
-        boxes = boxes_on(link, self._topic) if link is not None else ()
-        self.view.show_image(self._stream, boxes, self.overlays.on)
+        boxes = boxes_in_camera(link, self._topic) if link is not None else ()
+        self.view.show_image(self._stream, boxes, self.overlays.annotations_for)
         self.look_bar.refresh()
         if self._stream.picture is not None:
-            self._page(there=True)
+            self._show_page(there=True)
         elif self._stream.error:
             self.empty.set_texts(_("Can't be shown as an image"), f"{self._stream.error}.", "circle-x")
             look = EmptyAction(_("Open the message"), self._inspect, "list-tree")
-            self.empty.set_actions([look, self.why(self._topic)])
+            self.empty.set_actions([look, self.doctor_action(self._topic)])
         # the playhead is before the topic's first image
         elif self.session.replay is not None and self._there:
             self.view.clear()
-            self._say_nothing()
+            self._update_empty_state()
 
-    def _look_at_robot(self) -> None:
+    def _watch_robot(self) -> None:
         is_live = self.session.replay is None  # live detections don't belong on recorded images
-        link = owner_of(self.session, self._topic) if is_live else None
+        link = robot_of_camera(self.session, self._topic) if is_live else None
         name = link.name if link is not None else ""
         if name != self._watched_robot:
-            self._leave_robot()
+            self._close_robot_watch()
             self._watched_robot = name
             if name:
-                self._watch = self.session.fleet.look_at(name)
+                self._watch = self.session.fleet.watch_sensors(name)
 
-    def _say_nothing(self) -> None:
+    def _update_empty_state(self) -> None:
         if self._topic:
-            words = _("The next image on {topic} appears here.").format(topic=topic_words(self._topic))
+            words = _("The next image on {topic} appears here.").format(topic=topic_label(self._topic))
             self.empty.set_texts(_("No images yet"), words, "image")
-            self.empty.set_actions([self.why(self._topic)])
+            self.empty.set_actions([self.doctor_action(self._topic)])
         else:
             words = _("Images appear here as soon as a camera publishes them.")
             self.empty.set_texts(_("No images yet"), words, "image")
             robot = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
-            self.empty.set_actions([robot, self.why()])
-        self._page(there=False)
+            self.empty.set_actions([robot, self.doctor_action()])
+        self._show_page(there=False)
 
-    def _page(self, *, there: bool) -> None:
+    def _show_page(self, *, there: bool) -> None:
         if self._there is there:
             return
         self._there = there
@@ -235,24 +235,24 @@ class ImagePanel(PanelWidget):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def waits_for(self) -> str:
+    def awaited_topic(self) -> str:
         return self._topic if self.view.picture is None else ""
 
-    def hindrances(self) -> list[Hindrance]:
+    def blockers(self) -> list[Blocker]:
         is_held = self.freeze.isChecked()
-        return [paused_hindrance(self.title(), lambda: self.freeze.setChecked(False))] if is_held else []
+        return [paused_blocker(self.title(), lambda: self.freeze.setChecked(False))] if is_held else []
 
-    def _freeze_or_not(self) -> None:
+    def _toggle_freeze(self) -> None:
         self.freeze.setChecked(not self.freeze.isChecked())
 
     def _publish_points(self, *, on: bool) -> None:
-        self.points.turn(on)
+        self.points.set_active(on)
         self.actions_of["point"].setChecked(on)
 
-    def _hold(self, held: bool) -> None:
+    def _set_frozen(self, held: bool) -> None:
         self.actions_of["freeze"].setChecked(held)
         if self._stream is not None:
-            self._stream.hold(held)
+            self._stream.set_frozen(held)
 
     def save_picture(self) -> None:
         """Save the image as PNG at its original size."""
@@ -280,7 +280,7 @@ class ImagePanel(PanelWidget):
     def _saved(self, path: str) -> None:
         folder = QUrl.fromLocalFile(str(Path(path).parent))
         said = _("Saved {file}").format(file=Path(path).name)
-        self.context.toast(said, _("Open folder"), lambda: open_outside(folder))
+        self.context.toast(said, _("Open folder"), lambda: open_externally(folder))
 
     def _copied(self, image: QImage) -> None:
         QGuiApplication.clipboard().setImage(image)
@@ -290,7 +290,7 @@ class ImagePanel(PanelWidget):
     def _failed(self, sentence: str) -> None:
         said = _("can't save the image: {reason}").format(reason=sentence)
         self.session.console.add("error", "image", said)
-        self.session.alerts.put(
+        self.session.alerts.raise_alert(
             "snapshot", "error", _("Can't save the image."), sentence, button=_("Open the console"),
             action="panel:console",
         )  # fmt: skip
@@ -307,42 +307,42 @@ class ImagePanel(PanelWidget):
     def _show_layers(self) -> None:
         menu = Menu(self.theme, self)
         for name in self.overlays.choices():
-            action = menu.addAction(plain.entry(topic_words(name)))
+            action = menu.addAction(plain.escape_menu_text(topic_label(name)))
             action.setCheckable(True)
-            action.setChecked(name in self.overlays.chosen)
-            action.toggled.connect(lambda on, name=name: self.overlays.choose(name, on))
+            action.setChecked(name in self.overlays.selected)
+            action.toggled.connect(lambda on, name=name: self.overlays.set_visible(name, on))
         if menu.isEmpty():
             menu.addAction(_("No topic has image annotations")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        drop_below(menu, self.layers)
+        open_below(menu, self.layers)
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
         for name in self.topics():
-            action = menu.addAction(plain.entry(topic_words(name)))
+            action = menu.addAction(plain.escape_menu_text(topic_label(name)))
             action.setCheckable(True)
             action.setChecked(name == self._topic)
             action.triggered.connect(lambda _on=False, name=name: self.show_topic(name))
         if menu.isEmpty():  # Qt shows no empty menu, and would never delete it
             menu.addAction(_("No camera is publishing images")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        drop_below(menu, self.choose)
+        open_below(menu, self.choose)
 
     def more_actions(self) -> list[QAction]:
         for action in (self._look_inside, self._sequence):
             action.setEnabled(bool(self._topic))
         plays = self.session.replay is not None
         self._sequence.setText(_("Save the sequence as files") if plays else _("Record a sequence"))
-        return [*self.actions_of.listed(), self._line, self._sequence, self._look_inside]
+        return [*self.actions_of.menu_actions(), self._line, self._sequence, self._look_inside]
 
     def save_state(self) -> dict[str, object]:
         return {
             "topic": self._topic,
-            "place": self.view.place.saved(),
-            "look": self.look_bar.look.saved(),
+            "place": self.view.place.to_json(),
+            "look": self.look_bar.look.to_json(),
             "tune": self.tune.isChecked(),
-            "layers": list(self.overlays.chosen),
-            "point": self.points.saved(),
+            "layers": list(self.overlays.selected),
+            "point": self.points.to_json(),
         }
 
     def restore_state(self, state: Mapping[str, object]) -> None:
@@ -350,8 +350,8 @@ class ImagePanel(PanelWidget):
         if isinstance(topic, str) and topic:
             self.show_topic(topic)
         self.view.place.restore(state.get("place"))
-        self.actions_of.show_checks()
-        self._set_look(look := restored(state.get("look")))
+        self.actions_of.update_checks()
+        self._set_look(look := parse_look(state.get("look")))
         self.look_bar.show_look(look)
         self.tune.setChecked(state.get("tune") is True)
         self.points.restore(state.get("point"))
@@ -359,9 +359,9 @@ class ImagePanel(PanelWidget):
         layers = state.get("layers")
         for name in layers if isinstance(layers, list) else ():
             if isinstance(name, str):
-                self.overlays.choose(name, shown=True)
+                self.overlays.set_visible(name, shown=True)
 
-    def _leave_robot(self) -> None:
+    def _close_robot_watch(self) -> None:
         if self._watch is not None:
             self._watch.close()
         self._watch, self._watched_robot = None, ""
@@ -371,15 +371,15 @@ class ImagePanel(PanelWidget):
 
     def dispose(self) -> None:
         self.points.dispose()
-        self._leave_stream()
+        self._close_stream()
         self.overlays.close()
 
-    def _leave_stream(self) -> None:
+    def _close_stream(self) -> None:
         self.job.wait()
-        self._leave_robot()
+        self._close_robot_watch()
         if self._stream is not None:
             self._stream.close()
             self._stream = None
 
 
-PANEL = Panel("image", lazy("Image"), "image", (CODEC,), ImagePanel, several=True)
+PANEL = Panel("image", lazy("Image"), "image", (CODEC,), ImagePanel, allows_multiple=True)

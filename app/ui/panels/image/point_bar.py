@@ -9,13 +9,13 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QLineEdit, QVBoxLayout, QWidget
 
 from app.core.network.topics import split_key
-from app.core.run.acting.acting import heard_words
+from app.core.run.acting.acting import subscribers_text
 from app.core.run.acting.arming import Target
-from app.core.run.acting.picture_point import TYPES, PicturePoint, topic_of
+from app.core.run.acting.picture_point import TYPES, PicturePoint, default_topic
 from app.core.run.acting.sending import SendOrder, SendResult
 from app.ui.panels.armed_strip import ArmedStrip
 from app.ui.panels.base import PanelContext
-from app.ui.pictures.clicks import KEYS_WORDS, ClickablePicture
+from app.ui.pictures.clicks import KEYBOARD_HINT, ClickablePicture
 from app.ui.text import plain
 from app.ui.widgets import Button, ComboBox, IconButton, label
 from app.ui.widgets.flow_layout import Flow
@@ -34,13 +34,13 @@ class PointStrip(ArmedStrip):
         self._arm, self._said = arm, said
         super().__init__(context)
 
-    def off_words(self) -> str:
+    def disarmed_text(self) -> str:
         return _("Clicks are not sent until you arm sending")
 
     def arm(self) -> str:
         return self._arm()
 
-    def more_words(self) -> str:
+    def summary_text(self) -> str:
         return self._said()
 
 
@@ -51,7 +51,7 @@ class PointBar(QWidget):
     armed elsewhere. `left` is emitted when the user closes the bar.
     """
 
-    left = Signal()
+    exited = Signal()
 
     def __init__(self, context: PanelContext, view: ClickablePicture) -> None:
         super().__init__()
@@ -67,28 +67,28 @@ class PointBar(QWidget):
         self.topic.setMaxLength(MAX_TOPIC_LENGTH)
         self.topic.setMinimumWidth(round(theme.scaled(TOPIC_WIDTH_PX)))
         self.topic.setProperty("focusRadius", theme.radius("control"))
-        self.topic.textEdited.connect(lambda _text: self._changed())
+        self.topic.textEdited.connect(lambda _text: self._target_changed())
         EditMenu(theme, self.topic)
         self.kind = ComboBox(theme, [(each, each) for each in TYPES], name=_("Point type"))
         self.close_button = IconButton(theme, "x", _("Stop publishing points"), size=26)
-        self.close_button.clicked.connect(self.left)
+        self.close_button.clicked.connect(self.exited)
         self.problem = label("", "small", role="error", wrap=True)
         self.problem.setMinimumWidth(0)
         self.problem.setContentsMargins(12, 0, 12, 6)
         self.let = Button(theme, "", "lock", size="small")
-        self.let.let_shrink()
-        self.let.clicked.connect(self._let_clicks)
-        self.strip = PointStrip(context, self.arm, self._count_words)
+        self.let.allow_shrinking()
+        self.let.clicked.connect(self._arm_clicked)
+        self.strip = PointStrip(context, self.arm, self._count_text)
         self._arrange()
         self.hide()
-        self._changed()
+        self._target_changed()
 
     def _arrange(self) -> None:
         row = QWidget()
         flow = Flow(row, gap=8, row_gap=4)
         flow.setContentsMargins(12, 6, 6, 6)
         about = label(_("Publish clicked points to"), "small", role="textSecondary")
-        about.setToolTip(plain.tip(_(KEYS_WORDS)))
+        about.setToolTip(plain.tip(_(KEYBOARD_HINT)))
         flow.addWidget(about)
         flow.add_elastic(self.topic, greedy=True)
         for widget in (self.kind, self.let, self.close_button):
@@ -119,7 +119,7 @@ class PointBar(QWidget):
 
     def refresh(self) -> None:
         """Update the bar. Clicks are accepted only while they can be published."""
-        self._view.takes_clicks = self.is_armed
+        self._view.accepts_clicks = self.is_armed
         if not self.is_on:
             return
         acting = self._acting
@@ -127,15 +127,15 @@ class PointBar(QWidget):
         self.let.setVisible(waits and not self.problem.text() and not self._context.session.is_replaying)
         self.strip.refresh()
 
-    def show_pictures(self, key: str) -> None:
+    def set_image_topic(self, key: str) -> None:
         """Set the topic of the images; the target topic is derived from it."""
         if key != self._pictures:
             self._pictures = key
-            self._view.forget_click()
-            self.topic.setPlaceholderText(topic_of(split_key(key)[1]) if key else "")
-            self._changed()
+            self._view.discard_click()
+            self.topic.setPlaceholderText(default_topic(split_key(key)[1]) if key else "")
+            self._target_changed()
 
-    def _changed(self) -> None:
+    def _target_changed(self) -> None:
         # Another target has to be armed again.
         self._disarm()
         self.count = self.heard = 0
@@ -146,19 +146,19 @@ class PointBar(QWidget):
             problem = str(error) if self._pictures else ""
         self.problem.setText(problem)
         self.problem.setVisible(bool(problem))
-        self.let.set_word(_("Send points"), "lock")
+        self.let.set_label(_("Send points"), "lock")
         self.let.setAccessibleName(_("Send the points to {topic}").format(topic=self.target.name))
         self.refresh()
 
-    def _count_words(self) -> str:
+    def _count_text(self) -> str:
         if not self.count:
             return ""
         said = ngettext("{count} point sent", "{count} points sent", self.count).format(count=self.count)
-        return f"{said}, {heard_words(self.heard)}"
+        return f"{said}, {subscribers_text(self.heard)}"
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def turn(self, on: bool) -> None:
+    def set_active(self, on: bool) -> None:
         """Show or hide the bar. Clicks are not published before the bar is armed as well."""
         if on != self.is_on:
             self.is_on = on
@@ -173,14 +173,14 @@ class PointBar(QWidget):
             return self.problem.text()
         arming, target = self._acting.arming, self.target
         why_not = self._acting.arm() if not arming.is_on else ""
-        return why_not or self._acting.allow(target, partial(self._let, arming.turn, target))
+        return why_not or self._acting.allow(target, partial(self._arming_confirmed, arming.turn, target))
 
-    def _let(self, turn: int, target: Target) -> None:
+    def _arming_confirmed(self, turn: int, target: Target) -> None:
         if self.is_on and target == self.target:
             self._armed = (turn, target)
             self.refresh()
 
-    def _let_clicks(self) -> None:
+    def _arm_clicked(self) -> None:
         why_not = self.arm()
         if why_not:
             self._context.toast(why_not)
@@ -204,22 +204,22 @@ class PointBar(QWidget):
         name = _("Point ({x}, {y})").format(x=point.x, y=point.y)
         order = SendOrder(
             "image", name, self.target.name, self.kind.value, lambda: payload, source=str(payload),
-            asker="image", told=partial(self._told, point),
+            origin="image", on_result=partial(self._handle_result, point),
         )  # fmt: skip
         why_not = self._acting.send_order(order)
         if why_not:
             self._context.toast(why_not)
 
-    def _told(self, point: PicturePoint, result: SendResult) -> None:
+    def _handle_result(self, point: PicturePoint, result: SendResult) -> None:
         if result.kind != "sent":
-            self._context.toast(result.sentence)
+            self._context.toast(result.message)
         elif result.order.target == self.target:
-            self.count, self.heard = self.count + 1, result.heard
+            self.count, self.heard = self.count + 1, result.subscriber_count
             self._view.mark(point)
 
     # -- saved state --------------------------------------------------------------------------------------
 
-    def saved(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """Return the state for the layout, without the armed state."""
         return {"on": self.is_on, "topic": self.topic.text().strip(), "type": self.kind.value}
 
@@ -232,10 +232,10 @@ class PointBar(QWidget):
             self.topic.setText(topic[:MAX_TOPIC_LENGTH])
         if isinstance(kind, str):
             self.kind.set_value(kind)
-        self._changed()
-        self.turn(saved.get("on") is True)
+        self._target_changed()
+        self.set_active(saved.get("on") is True)
 
     def dispose(self) -> None:
         """Disarm the bar; called before the panel is closed."""
-        self._view.forget_click()
+        self._view.discard_click()
         self._disarm()

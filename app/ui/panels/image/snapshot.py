@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 POLL_MS = 30
-Made = Path | QImage | str
+JobResult = Path | QImage | str
 """Result of a job: path of the saved file, the image for the clipboard, or an error sentence."""
 
 
@@ -38,13 +38,13 @@ class SnapshotJob(QObject):
         super().__init__(parent)
         self._folder = folder
         self._thread: threading.Thread | None = None
-        self._made: queue.SimpleQueue[Made] = queue.SimpleQueue()
+        self._made: queue.SimpleQueue[JobResult] = queue.SimpleQueue()
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
         self._timer.timeout.connect(self._report)
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """True while a job is running or its result has not been emitted."""
         return self._thread is not None
 
@@ -63,18 +63,18 @@ class SnapshotJob(QObject):
         if self._thread is not None:
             self._thread.join(2.0)
 
-    def _start(self, work: Callable[[], Made]) -> None:
-        if not self.busy:
+    def _start(self, work: Callable[[], JobResult]) -> None:
+        if not self.is_busy:
             self._thread = threading.Thread(
-                target=self._do, args=(work,), name="studio-snapshot", daemon=True
+                target=self._run, args=(work,), name="studio-snapshot", daemon=True
             )
             self._thread.start()
             self._timer.start()
 
-    def _do(self, work: Callable[[], Made]) -> None:
+    def _run(self, work: Callable[[], JobResult]) -> None:
         # Runs in the background thread. Exceptions are returned as a sentence.
         try:
-            made: Made = work()
+            made: JobResult = work()
         except NepError as error:
             made = str(error)
         except OSError as error:

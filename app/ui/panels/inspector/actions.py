@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QKeyCombination, QObject, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 
 from app.ui.panels.inspector.tree_model import field_of
-from app.ui.panels.inspector.values import plain_words
+from app.ui.panels.inspector.values import clipboard_text
 from nep.i18n import _
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class InspectorActions(QObject):
                 return True
         return super().eventFilter(watched, event)
 
-    def listed(self) -> list[QAction]:
+    def menu_actions(self) -> list[QAction]:
         """Return all actions, for a menu."""
         return list(self._actions)
 
@@ -96,19 +96,19 @@ class InspectorActions(QObject):
 
     def copy_value(self) -> None:
         """Copy the selected value to the clipboard."""
-        node = self._chosen()
+        node = self._selected_node()
         if node is not None:
-            self._copied(plain_words(node.value), _("Copied {path}").format(path=node.path))
+            self._copy_text(clipboard_text(node.value), _("Copied {path}").format(path=node.path))
 
     def copy_path(self) -> None:
         """Copy the field path of the selected value to the clipboard."""
-        node = self._chosen()
+        node = self._selected_node()
         if node is not None:
-            self._copied(node.path, _("Copied the path {path}").format(path=node.path))
+            self._copy_text(node.path, _("Copied the path {path}").format(path=node.path))
 
     def plot(self) -> None:
         """Plot the selected value if it is a number, text, boolean or list of numbers."""
-        node = self._chosen()
+        node = self._selected_node()
         path = field_of(node) if node is not None else ""
         if path:
             self._plot(path)
@@ -126,13 +126,13 @@ class InspectorActions(QObject):
         if message.codec == "json":
             text = str(message.data, "utf-8", "replace")
         else:
-            text = plain_words(self._value())
-        self._copied(text, _("Copied the message of {topic}").format(topic=message.topic))
+            text = clipboard_text(self._value())
+        self._copy_text(text, _("Copied the message of {topic}").format(topic=message.topic))
 
-    def _chosen(self) -> TreeNode | None:
+    def _selected_node(self) -> TreeNode | None:
         index = self._body.tree.currentIndex()
         return self._body.model.node(index) if index.isValid() else None
 
-    def _copied(self, text: str, said: str) -> None:
+    def _copy_text(self, text: str, said: str) -> None:
         QGuiApplication.clipboard().setText(text)
         self._toast(said)

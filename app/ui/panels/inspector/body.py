@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
-from app.ui.panels.inspector.diff import Counts, changes_words
+from app.ui.panels.inspector.diff import Counts, changes_text
 from app.ui.panels.inspector.find import FindBar
 from app.ui.panels.inspector.footer import Footer
 from app.ui.panels.inspector.hex_view import HexView
@@ -17,7 +17,7 @@ from app.ui.panels.inspector.objects import ObjectsView
 from app.ui.panels.inspector.query import QueryStrip
 from app.ui.panels.inspector.tree_model import TreeModel
 from app.ui.panels.inspector.tree_view import TreeView
-from app.ui.text.numbers import size_words
+from app.ui.text.numbers import size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ElidedLabel, EmptyAction, EmptyState, IconButton, Segments, Separator, label
 from nep.i18n import _
@@ -33,14 +33,14 @@ MODES = {TREE: "tree", TABLE: "table", RAW: "raw"}
 class CompareStrip(QWidget):
     """Strip above the tree during a comparison: reference message, summary, and filter for changes."""
 
-    only_changed = Signal(bool)
+    changes_only_toggled = Signal(bool)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._with = ""
         self.words = ElidedLabel("small", "textSecondary")
         self.only = IconButton(theme, "filter", _("Show changes only"), checkable=True, size=24)
-        self.only.toggled.connect(self.only_changed)
+        self.only.toggled.connect(self.changes_only_toggled)
         row = QHBoxLayout(self)
         row.setContentsMargins(12, 3, 8, 3)
         row.setSpacing(6)
@@ -54,7 +54,7 @@ class CompareStrip(QWidget):
         `whole` is False if the counts are incomplete.
         """
         said = _("{compared_with}: {changes}")
-        self.words.setText(said.format(compared_with=compared_with, changes=changes_words(counts, whole)))
+        self.words.setText(said.format(compared_with=compared_with, changes=changes_text(counts, whole)))
         self.setAccessibleDescription(self.words.text())
 
 
@@ -80,7 +80,7 @@ class InspectorBody(QWidget):
         self.tree.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.finder = FindBar(theme, looked_through)
         self.finder.found.connect(self.reveal)
-        self.finder.field.leave.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.finder.field.exited.connect(lambda: self.tree.setFocus(Qt.FocusReason.ShortcutFocusReason))
         modes = [("tree", _("Tree"), None), ("table", _("Table"), None), ("raw", _("Raw"), None)]
         self.mode = Segments(theme, modes, size="small", name=_("Show as"))
         compare = _("Compare with the previous message")
@@ -132,13 +132,13 @@ class InspectorBody(QWidget):
         self.pages.setCurrentIndex(page)
         for widget in (self.bar, self.line, self.foot):
             widget.setVisible(page in MODES)
-        self.query.show_on(tree=page in {TREE, TABLE})
+        self.query.set_tree_visible(tree=page in {TREE, TABLE})
         self.strip.setVisible(page == TREE and comparing)
         self.foot.legend.setVisible(page == TREE)
         if page in MODES:
             self.mode.set_value(MODES[page])
 
-    def say_waiting(self, topic: str, published: bool, why: EmptyAction) -> None:
+    def show_waiting(self, topic: str, published: bool, why: EmptyAction) -> None:
         """Show the empty state of a topic without a message yet; `why` opens the connection doctor."""
         if published:
             words = _("The next message on {topic} appears here.")
@@ -150,7 +150,7 @@ class InspectorBody(QWidget):
             self.empty.set_texts(_("No message yet"), words)
             self.empty.set_actions([why])
 
-    def say_unread(self, topic: str, reason: str, why: EmptyAction) -> None:
+    def show_undecodable(self, topic: str, reason: str, why: EmptyAction) -> None:
         """Show the reason why messages of the topic can't be decoded."""
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
@@ -158,22 +158,22 @@ class InspectorBody(QWidget):
             self.empty.set_texts(_("Can't decode the messages"), words)
             self.empty.set_actions([why])
 
-    def say_nothing(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
+    def show_empty(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
         """Show the empty state of a topic without messages, or without a selected topic."""
         self._waiting = ""
         if topic:
-            self.say_waiting(topic, published=True, why=why)
+            self.show_waiting(topic, published=True, why=why)
         else:
             self.empty.set_texts(_("Nothing selected"), _("Click a topic to see its newest message."))
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
-    def say_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
+    def show_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
         """Show that the message is large, with a button that calls `read` to decode it."""
-        self.large.set_texts(_("Large message ({size})").format(size=size_words(size_bytes)), words)
+        self.large.set_texts(_("Large message ({size})").format(size=size_text(size_bytes)), words)
         if read is None:
             self.large.set_actions([])
         elif self.page != LARGE:
-            action = EmptyAction(_("Decode the newest message"), read, "list-tree", primary=True)
+            action = EmptyAction(_("Decode the newest message"), read, "list-tree", is_primary=True)
             self.large.set_actions([action])
 
     def reveal(self, path: object) -> None:

@@ -18,14 +18,14 @@ MAX_CHILDREN = 5000  # maximum number of a value's children that are checked for
 MAX_VALUES = 20_000  # maximum number of a message's values that are counted
 Part = tuple[Key, object, object, Mark]
 Counts = dict[Mark, int]
-MARK_WORDS: Mapping[Mark, str] = {
+MARK_TEXTS: Mapping[Mark, str] = {
     "changed": lazy("changed"),
     "added": lazy("added"),
     "removed": lazy("removed"),
 }
 
 
-class _Nothing:
+class _Sentinel:
     """Sentinel for a missing value, distinct from null."""
 
     def __init__(self, words: str) -> None:
@@ -35,10 +35,10 @@ class _Nothing:
         return self._words
 
 
-OFF: Final = _Nothing("nothing to compare with")
+NO_BASE: Final = _Sentinel("nothing to compare with")
 
 
-MISSING: Final = _Nothing("missing")
+MISSING: Final = _Sentinel("missing")
 
 
 def differs(before: object, after: object) -> bool:
@@ -46,13 +46,13 @@ def differs(before: object, after: object) -> bool:
     if before is after or (before != before and after != after):  # noqa: PLR0124
         return False
     if is_container(before) and is_container(after):
-        return _kind(before) != _kind(after) or not _same(before, after)
+        return _kind(before) != _kind(after) or not _are_equal(before, after)
     return type(before) is not type(after) or before != after
 
 
 def mark_of(value: object, base: object) -> Mark:
     """Return the kind of difference between a value and its counterpart in the base message."""
-    if base is OFF:
+    if base is NO_BASE:
         return ""
     if base is MISSING:
         return "added"
@@ -75,9 +75,9 @@ def parts_of(
         pairs = zip(keys_of(value, count), values_of(value, count), strict=False)
         return [(key, below, MISSING, whole) for key, below in pairs], size_of(value)
     if changes_only:
-        found = [part for part in islice(_compared(value, base), MAX_CHILDREN) if part[3]]
+        found = [part for part in islice(_compare_children(value, base), MAX_CHILDREN) if part[3]]
         return found[:count], len(found)
-    return list(islice(_compared(value, base), count)), _total(value, base)
+    return list(islice(_compare_children(value, base), count)), _total(value, base)
 
 
 def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[Counts, bool]:
@@ -87,7 +87,7 @@ def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[
     lists.
     """
     counts: Counts = {"changed": 0, "added": 0, "removed": 0}
-    if base is OFF:
+    if base is NO_BASE:
         return counts, True
     whole = True
     waiting: list[tuple[object, object, Mark]] = [(value, base, mark_of(value, base))]
@@ -104,15 +104,15 @@ def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[
     return counts, whole and not waiting
 
 
-def changes_words(counts: Counts, whole: bool = True) -> str:
+def changes_text(counts: Counts, whole: bool = True) -> str:
     """Format counts as ``3 changed, 1 added`` or ``no difference``, with "at least" if `whole` is False."""
-    said = ", ".join(_count_words(mark, count) for mark, count in counts.items() if count)
+    said = ", ".join(_count_text(mark, count) for mark, count in counts.items() if count)
     if not said:
         return _("no difference") if whole else _("no difference at the start of long lists")
     return said if whole else _("at least {changes}").format(changes=said)
 
 
-def _count_words(mark: Mark, count: int) -> str:
+def _count_text(mark: Mark, count: int) -> str:
     if mark == "added":
         return ngettext("{count} added", "{count} added", count).format(count=count)
     if mark == "removed":
@@ -120,7 +120,7 @@ def _count_words(mark: Mark, count: int) -> str:
     return ngettext("{count} changed", "{count} changed", count).format(count=count)
 
 
-def _compared(value: object, base: object) -> Iterator[Part]:
+def _compare_children(value: object, base: object) -> Iterator[Part]:
     # Lazy, because callers may need only the first children.
     if isinstance(value, Mapping) and isinstance(base, Mapping):
         before = {str(key): key for key in base}
@@ -148,15 +148,15 @@ def _kind(value: object) -> str:
     return "object" if isinstance(value, Mapping) else "list"
 
 
-def _same(before: object, after: object) -> bool:
+def _are_equal(before: object, after: object) -> bool:
     # Equality at every depth, in which true is not 1 and the order of keys is ignored. Lazy containers
     # compare their JSON texts.
     if isinstance(before, (LazyList, LazyObject)) and isinstance(after, (LazyList, LazyObject)):
         return before == after
-    return size_of(before) == size_of(after) and _written(before) == _written(after)
+    return size_of(before) == size_of(after) and _serialized(before) == _serialized(after)
 
 
-def _written(value: object) -> object:
+def _serialized(value: object) -> object:
     # The serialized form compares as JSON does; values that JSON lacks (bytes in msgpack) are returned
     # unchanged.
     try:

@@ -37,8 +37,8 @@ def find_in_text(index: JsonIndex, words: str, most: int = MAX_MATCHES) -> list[
 class FindField(SearchField):
     """Find field. Return: next match, Shift+Return: previous, Esc: clear, Down: focus the tree."""
 
-    step_wanted = Signal(int)
-    leave = Signal()
+    step_requested = Signal(int)
+    exited = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, _("Find a key or value, or $ and a path"))
@@ -64,17 +64,17 @@ class FindField(SearchField):
             painter = QPainter(self)
             room = QRectF(self.rect()).adjusted(0, 0, -8, 0)
             ink = self._theme.colour("textTertiary")
-            paint.words(painter, room, self._count, self._theme.font("small"), ink, paint.RIGHT)
+            paint.text_line(painter, room, self._count, self._theme.font("small"), ink, paint.RIGHT)
             painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         back = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_F3}:
-            self.step_wanted.emit(-1 if back else 1)
+            self.step_requested.emit(-1 if back else 1)
         elif event.key() == Qt.Key.Key_Escape and self.text():
             self.clear()
         elif event.key() == Qt.Key.Key_Down and is_plain(event):
-            self.leave.emit()
+            self.exited.emit()
         else:
             super().keyPressEvent(event)
 
@@ -90,7 +90,7 @@ class FindBar(QWidget):
     """
 
     found = Signal(object)
-    queried = Signal(str)
+    query_changed = Signal(str)
     """Query (text that begins with ``$``), or "" after the text is no longer a query."""
 
     def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
@@ -102,7 +102,7 @@ class FindBar(QWidget):
         self._place = -1
         self.field = FindField(theme)
         self.field.textChanged.connect(self.search)
-        self.field.step_wanted.connect(self.step)
+        self.field.step_requested.connect(self.step)
         self.before = IconButton(theme, "chevron-up", _("Previous"), "Shift+Return", size=22)
         self.after = IconButton(theme, "chevron-down", _("Next"), "Return", size=22)
         self.before.clicked.connect(lambda: self.step(-1))
@@ -131,7 +131,7 @@ class FindBar(QWidget):
         if is_query:
             self.field.show_count("")
             self.mark(wrong=False)
-        self.queried.emit(words if is_query else "")
+        self.query_changed.emit(words if is_query else "")
         if is_query:
             return
         self._search(words)
@@ -139,7 +139,7 @@ class FindBar(QWidget):
         if self.matches:
             self.step(1)
 
-    def forget(self) -> None:
+    def invalidate_matches(self) -> None:
         """Discard the matches because the message changed."""
         self._matches = None
 

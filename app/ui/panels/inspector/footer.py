@@ -10,9 +10,9 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.recording.replay.scale import clock_words
+from app.core.recording.replay.scale import clock_text
 from app.ui.text import plain
-from app.ui.text.numbers import age_words, grouped, latency_words, size_words
+from app.ui.text.numbers import age_text, group_digits, latency_text, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import FixedWidthLabel, IconButton, Separator, label, paint
 from nep.i18n import _, lazy
@@ -39,37 +39,37 @@ def message_facts(
         network: Foreign network, or None. Properties that it does not report are named.
         recorded: Show the time of day instead of the latency.
     """
-    facts = [size_words(message.size_bytes)]
+    facts = [size_text(message.size_bytes)]
     if message.seq is not None:
-        facts.insert(0, _("seq {number}").format(number=grouped(message.seq)))
+        facts.insert(0, _("seq {number}").format(number=group_digits(message.seq)))
     if message.stamp_ns is not None:
         if recorded:
-            facts.append(_("sent {clock}").format(clock=clock_words(min(message.stamp_ns, 2**62))))
+            facts.append(_("sent {clock}").format(clock=clock_text(min(message.stamp_ns, 2**62))))
         elif message.is_latched and message.stamp_ns < since_ns:
             age_s = (time.time_ns() - message.stamp_ns) / 1e9
-            facts.append(_("latched, sent {age} ago").format(age=age_words(age_s)))
+            facts.append(_("latched, sent {age} ago").format(age=age_text(age_s)))
         else:
             facts += _latency_facts(message)
     if network is not None:
-        facts += _untold(message, network.words)
+        facts += _unreported_info(message, network.product_name)
     return "   ".join(facts)
 
 
 def _latency_facts(message: Message) -> list[str]:
     latency_s, uncertainty_s = message.latency_s or 0.0, message.latency_uncertainty_s
     if uncertainty_s and -uncertainty_s <= latency_s < 0:
-        return [_("latency under {latency}").format(latency=latency_words(uncertainty_s))]
+        return [_("latency under {latency}").format(latency=latency_text(uncertainty_s))]
     if not 0 <= latency_s < 3600:
         return [] if uncertainty_s is not None else [_("clocks of two computers, uncorrected")]
-    words = latency_words(latency_s)
+    words = latency_text(latency_s)
     if uncertainty_s:
         words = _("{latency} ± {uncertainty}").format(
-            latency=words, uncertainty=latency_words(max(uncertainty_s, _MIN_SHOWN_LATENCY_S))
+            latency=words, uncertainty=latency_text(max(uncertainty_s, _MIN_SHOWN_LATENCY_S))
         )
     return [_("latency {latency}").format(latency=words)]
 
 
-def _untold(message: Message, network: str) -> Iterator[str]:
+def _unreported_info(message: Message, network: str) -> Iterator[str]:
     if message.seq is None and message.stamp_ns is None:
         yield _("{network} does not report sequence numbers or latency").format(network=network)
     elif message.seq is None:
@@ -81,12 +81,12 @@ def _untold(message: Message, network: str) -> Iterator[str]:
 class Legend(QWidget):
     """Legend of the coloured bars at the left of changed rows."""
 
-    WORDS = lazy("changed")
+    TEXT = lazy("changed")
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._words = _(self.WORDS)
+        self._words = _(self.TEXT)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("A bar at the left marks changed values"))
 
@@ -99,7 +99,7 @@ class Legend(QWidget):
         colour = self._theme.colour("changed")
         painter.fillRect(QRectF(0, self.height() / 2 - 7, 3, 14), colour)
         words = QRectF(self.rect()).adjusted(7, 0, 3, 0)
-        paint.words(painter, words, self._words, self._theme.font("small"), colour)
+        paint.text_line(painter, words, self._words, self._theme.font("small"), colour)
         painter.end()
 
 

@@ -35,7 +35,7 @@ class HexView(QAbstractScrollArea):
     def show_bytes(self, data: memoryview | bytes) -> None:
         """Show other bytes. The scroll position is kept."""
         self._data = memoryview(data)
-        self._arrange()
+        self._update_scroll_range()
         self.viewport().update()
 
     def text(self) -> str:
@@ -57,7 +57,7 @@ class HexView(QAbstractScrollArea):
     def _height(self) -> int:
         return round(self._theme.scaled(20))
 
-    def _arrange(self) -> None:
+    def _update_scroll_range(self) -> None:
         lines = -(-len(self._data) // self.per_line())
         bar = self.verticalScrollBar()
         bar.setPageStep(max(1, self.viewport().height() // self._height()))
@@ -65,7 +65,7 @@ class HexView(QAbstractScrollArea):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._arrange()
+        self._update_scroll_range()
 
     def scrollContentsBy(self, _dx: int, _dy: int) -> None:
         self.viewport().update()

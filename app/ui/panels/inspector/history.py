@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.core.messages.history import MessageHistory
-from app.core.recording.replay.scale import clock_words
+from app.core.recording.replay.scale import clock_text
 from app.core.series.feed import SeriesFeed
 from app.ui.theme.theme import Theme
 from app.ui.widgets import FixedWidthLabel, IconButton
@@ -25,7 +25,7 @@ class HistoryStrip(QWidget):
     `moved` is emitted when the user selects another message; `at` is its number, None for the newest.
     """
 
-    moved = Signal()
+    selection_changed = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -43,8 +43,8 @@ class HistoryStrip(QWidget):
         self.words = FixedWidthLabel("small", "textSecondary")
         self.back.clicked.connect(lambda: self.step(-1))
         self.on.clicked.connect(lambda: self.step(1))
-        self.newest.clicked.connect(lambda: self.go(None))
-        self.track.valueChanged.connect(self._slid)
+        self.newest.clicked.connect(lambda: self.select(None))
+        self.track.valueChanged.connect(self._slider_moved)
         row = QHBoxLayout(self)
         row.setContentsMargins(10, 2, 8, 2)
         row.setSpacing(3)
@@ -55,7 +55,7 @@ class HistoryStrip(QWidget):
         row.addWidget(self.words, 3)
         self.hide()
 
-    def begin(self, feed: SeriesFeed, topic: str) -> None:
+    def start(self, feed: SeriesFeed, topic: str) -> None:
         """Start to collect messages. A different topic clears the history."""
         self.pause()
         if topic != self._topic:
@@ -63,15 +63,15 @@ class HistoryStrip(QWidget):
             self.at = None
         self._feed, self._topic = feed, topic
         if topic:
-            feed.join(topic, self.kept, deep=False)
+            feed.register(topic, self.kept, deep=False)
 
     def pause(self) -> None:
         """Stop collecting messages until the next `begin`. Collected messages are kept."""
         if self._feed is not None:
-            self._feed.leave(self._topic, self.kept)
+            self._feed.unregister(self._topic, self.kept)
             self._feed = None
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Stop collecting messages and clear the history, because the source changed."""
         self.pause()
         self._topic = ""
@@ -92,16 +92,16 @@ class HistoryStrip(QWidget):
         if not len(self.kept):
             return
         wanted = (self.at if self.at is not None else self.kept.end - 1) + by
-        self.go(None if wanted >= self.kept.end else self.kept.nearest(wanted))
+        self.select(None if wanted >= self.kept.end else self.kept.nearest(wanted))
 
-    def go(self, number: int | None) -> None:
+    def select(self, number: int | None) -> None:
         """Select a message by its number; None follows the newest."""
         if number != self.at:
             self.at = number
             self.refresh(at_once=True)
-            self.moved.emit()
+            self.selection_changed.emit()
 
-    def follow(self) -> None:
+    def clamp_selection(self) -> None:
         """Select the newest message if the source was seeked back to before the selected one."""
         if self.at is not None and self.at >= self.kept.end:
             self.at = None
@@ -114,7 +114,7 @@ class HistoryStrip(QWidget):
             beside: True if other parts of the panel are repainted in this refresh anyway.
         """
         self._ticks += 1
-        self.follow()
+        self.clamp_selection()
         kept = self.kept
         state = (kept.first, kept.end, self.at)
         is_there = len(kept) > 1 or self.at is not None
@@ -134,9 +134,9 @@ class HistoryStrip(QWidget):
         self.back.setEnabled(place > 0)
         self.on.setEnabled(self.at is not None)
         self.newest.setEnabled(self.at is not None)
-        self.words.setText(self._words(place))
+        self.words.setText(self._position_text(place))
 
-    def _words(self, place: int) -> str:
+    def _position_text(self, place: int) -> str:
         if self.at is None:
             return _("the newest of {count}").format(count=len(self.kept))
         message = self.selected_message()
@@ -144,9 +144,9 @@ class HistoryStrip(QWidget):
             return _("no longer available")
         words = _("{place} of {count}").format(place=place + 1, count=len(self.kept))
         if message.stamp_ns is not None and 0 <= message.stamp_ns < 2**62:
-            words = f"{words}   {clock_words(message.stamp_ns)}"
+            words = f"{words}   {clock_text(message.stamp_ns)}"
         return words
 
-    def _slid(self, place: int) -> None:
+    def _slider_moved(self, place: int) -> None:
         last = place >= len(self.kept) - 1
-        self.go(None if last else self.kept.first + place)
+        self.select(None if last else self.kept.first + place)

@@ -24,12 +24,12 @@ from app.core.messages.object_table import (
     table_csv,
     value_at,
 )
-from app.ui.panels.inspector.values import size_of, words_of
+from app.ui.panels.inspector.values import size_of, value_text
 from app.ui.text import plain
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ElidedLabel, EmptyState, IconButton, Separator
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
 from nep.i18n import _, ngettext
@@ -48,7 +48,7 @@ class ObjectsView(QWidget):
     `revealed` is emitted with the path of an object to select in the tree.
     """
 
-    revealed = Signal(object)
+    reveal_requested = Signal(object)
 
     def __init__(self, theme: Theme, toast: Callable[[str], None]) -> None:
         super().__init__()
@@ -62,7 +62,7 @@ class ObjectsView(QWidget):
         self.table: TableView[ObjectRow] | None = None
         self.words = ElidedLabel("small", "textSecondary")
         self.choose = IconButton(theme, "chevron-down", _("Choose a list in the message"), size=24)
-        self.choose.clicked.connect(self._show_lists)
+        self.choose.clicked.connect(self._show_list_menu)
         self.copy = IconButton(theme, "copy", _("Copy the table as CSV"), size=24)
         self.copy.clicked.connect(self.copy_csv)
         self.empty = EmptyState(
@@ -94,12 +94,12 @@ class ObjectsView(QWidget):
         if self.table is not None:
             self.table.set_row_height(height, large=False)
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Reset the table for another topic."""
         self._wanted, self._steps, self._value = (), None, None
         self._drop_table()
 
-    def want(self, steps: Steps) -> None:
+    def select_list(self, steps: Steps) -> None:
         """Select the list to show in this and later messages.
 
         Without a list at this path, the nearest list above it is shown.
@@ -140,19 +140,21 @@ class ObjectsView(QWidget):
             return
         if columns != self._columns or self.table is None:
             self._make_table(columns, rows)
-        self._put(rows, now)
+        self._update_rows(rows, now)
         self._set_status(len(rows), total, path)
 
     def _set_status(self, shown: int, total: int, path: str) -> None:
         if shown < total and shown >= MAX_ROWS:
-            words = _("the first {shown} of {count} rows").format(shown=grouped(shown), count=grouped(total))
+            words = _("the first {shown} of {count} rows").format(
+                shown=group_digits(shown), count=group_digits(total)
+            )
         else:
-            words = ngettext("{count} row", "{count} rows", shown).format(count=grouped(shown))
+            words = ngettext("{count} row", "{count} rows", shown).format(count=group_digits(shown))
         if len(self._columns) >= MAX_COLUMNS:
             words = _("{rows}, the first {count} columns").format(rows=words, count=MAX_COLUMNS)
         self.words.setText(f"{path}   {words}" if path else words)
 
-    def _put(self, rows: list[ObjectRow], now: float) -> None:
+    def _update_rows(self, rows: list[ObjectRow], now: float) -> None:
         # Keeps the previous order except for one re-sort per second.
         table = self.table
         if table is None:
@@ -162,20 +164,20 @@ class ObjectsView(QWidget):
             rows = table.order.sort(rows)
         else:
             place = {row.name: number for number, row in enumerate(self._model.rows())}
-            rows.sort(key=lambda row: place.get(row.name, len(place) + row.place))
+            rows.sort(key=lambda row: place.get(row.name, len(place) + row.index))
         self._model.set_rows(rows)
-        table.tell_visible_changed()
+        table.refresh_visible()
 
     def _resort(self) -> None:
         if self.table is not None:
-            self._model.set_rows(self.table.order.sort(sorted(self._model.rows(), key=lambda row: row.place)))
-            self.table.tell_visible_changed()
+            self._model.set_rows(self.table.order.sort(sorted(self._model.rows(), key=lambda row: row.index)))
+            self.table.refresh_visible()
 
     def _make_table(self, columns: tuple[Steps, ...], rows: Sequence[ObjectRow]) -> None:
         before = self.table.saved_state() if self.table is not None else None
         self._drop_table()
         self._columns = columns
-        made = [_place_column(rows)]
+        made = [_index_column(rows)]
         made += [_column(column, rows) for column in columns]
         self._model = _ObjectModel(made, lambda row: row.name)
         table = self.table = TableView(self._theme, self._model, "#")
@@ -184,7 +186,7 @@ class ObjectsView(QWidget):
             table.restore(before)
         table.set_row_height(self._row_height, large=False)
         table.order_changed.connect(self._resort)
-        table.menu_wanted.connect(self._show_menu)
+        table.menu_requested.connect(self._show_menu)
         self.pages.addWidget(table)
         self.pages.setCurrentWidget(table)
         self.setFocusProxy(table)
@@ -203,23 +205,23 @@ class ObjectsView(QWidget):
             QGuiApplication.clipboard().setText(table_csv("#", self._columns, self._model.rows()))
             count = len(self._model.rows())
             said = ngettext("Copied {count} row as CSV", "Copied {count} rows as CSV", count)
-            self._toast(said.format(count=grouped(count)))
+            self._toast(said.format(count=group_digits(count)))
 
-    def _show_lists(self) -> None:
+    def _show_list_menu(self) -> None:
         menu = Menu(self._theme, self)
         for steps in lists_of_objects(self._value):
-            action = menu.addAction(plain.entry(path_text(steps) if steps else _("Message")))
+            action = menu.addAction(plain.escape_menu_text(path_text(steps) if steps else _("Message")))
             action.setCheckable(True)
             action.setChecked(steps == self._steps)
-            action.triggered.connect(lambda _on=False, steps=steps: self._choose(steps))
+            action.triggered.connect(lambda _on=False, steps=steps: self._list_selected(steps))
         if menu.isEmpty():  # Qt shows no empty menu, and would never delete it
             menu.deleteLater()
             return
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        drop_below(menu, self.choose)
+        open_below(menu, self.choose)
 
-    def _choose(self, steps: Steps) -> None:
-        self.want(steps)
+    def _list_selected(self, steps: Steps) -> None:
+        self.select_list(steps)
         self.show_message(self._value, self._sorted_at)
 
     def _show_menu(self, key: str, at: QPoint) -> None:
@@ -227,7 +229,7 @@ class ObjectsView(QWidget):
         menu.addAction(self._theme.icon("copy"), _("Copy the table as CSV"), self.copy_csv)
         if self._steps is not None:
             steps = (*self._steps, int(key))
-            show = lambda: self.revealed.emit(steps)  # noqa: E731
+            show = lambda: self.reveal_requested.emit(steps)  # noqa: E731
             menu.addAction(self._theme.icon("list-tree"), _("Show in the tree"), show)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(at)
@@ -237,13 +239,13 @@ class _ObjectModel(TableModel[ObjectRow]):
     """Table model that provides its rows in display order."""
 
     def rows(self) -> list[ObjectRow]:
-        return list(self._rows.shown)
+        return list(self._rows.rows)
 
 
-def _place_column(rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
+def _index_column(rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
     # Index of the object in the list.
     width = _width("#", [row.name for row in rows])
-    return Column("#", "#", width, _name_cell, lambda row: row.place, verbatim=True)
+    return Column("#", "#", width, _name_cell, lambda row: row.index, verbatim=True)
 
 
 def _name_cell(row: ObjectRow) -> Cell:
@@ -257,19 +259,19 @@ def _column(steps: Steps, rows: Sequence[ObjectRow]) -> Column[ObjectRow]:
     return Column(
         name,
         name,
-        _width(name, [_words(value) for value in first]),
-        lambda row: Cell(_words(value := row.at(steps)), role=_role(value), mono=True),
+        _width(name, [_cell_text(value) for value in first]),
+        lambda row: Cell(_cell_text(value := row.at(steps)), role=_role(value), mono=True),
         lambda row: sort_key(row.at(steps)),
-        figures=figures,
-        tip=lambda row: _words(row.at(steps)),
+        is_numeric=figures,
+        tip=lambda row: _cell_text(row.at(steps)),
         verbatim=True,
     )
 
 
-def _words(value: object) -> str:
+def _cell_text(value: object) -> str:
     if value is MISSING:
         return ""
-    return value.replace("\n", "⏎") if isinstance(value, str) else words_of(value)
+    return value.replace("\n", "⏎") if isinstance(value, str) else value_text(value)
 
 
 def _role(value: object) -> str:

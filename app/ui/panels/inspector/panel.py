@@ -12,17 +12,17 @@ from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.messages.reader import LARGE_BYTES, Reader, Reading
 from app.core.network.topics import split_key
-from app.core.networks.kinds import kind_named
-from app.core.networks.networks import topic_words
-from app.core.recording.replay.scale import clock_words
-from app.ui.panels.base import ANY_TYPE, Hindrance, Panel, PanelContext, PanelWidget, paused_hindrance
+from app.core.networks.kinds import find_kind
+from app.core.networks.networks import topic_label
+from app.core.recording.replay.scale import clock_text
+from app.ui.panels.base import ANY_TYPE, Blocker, Panel, PanelContext, PanelWidget, paused_blocker
 from app.ui.panels.inspector.actions import InspectorActions
 from app.ui.panels.inspector.body import LARGE, NOTHING, RAW, TABLE, TREE, InspectorBody
-from app.ui.panels.inspector.diff import OFF, count_changes
+from app.ui.panels.inspector.diff import NO_BASE, count_changes
 from app.ui.panels.inspector.footer import message_facts
-from app.ui.panels.inspector.pace import ReadingPace
+from app.ui.panels.inspector.pace import UpdateLimiter
 from app.ui.panels.inspector.tree_model import TreeNode, field_of, steps_of
-from app.ui.panels.inspector.values import payload_or, read_at_once
+from app.ui.panels.inspector.values import decode_now, payload_or
 from app.ui.widgets import Chip, IconButton
 from app.ui.widgets.field_drag import drag_field
 from app.ui.widgets.menus import Menu
@@ -31,7 +31,7 @@ from nep.messages.fields import path_text
 
 if TYPE_CHECKING:
     from app.core.messages.lazy_json import JsonIndex
-    from app.core.messages.query import QueryAnswer
+    from app.core.messages.query import QueryResult
     from app.core.network.topics import Topic
     from app.core.network.watches import Suspendable, Watch
     from nep.messages.message import Message
@@ -54,17 +54,17 @@ class InspectorPanel(PanelWidget):
         self._reading: Reading | None = None  # decoded message in the tree
         self._raw_wanted = self._table_wanted = False
         self._since_ns = 0  # start of the subscription
-        self._pace, self._fades = ReadingPace(), ReadingPace(burst=1, hz=FADE_HZ)
+        self._pace, self._fades = UpdateLimiter(), UpdateLimiter(burst=1, hz=FADE_HZ)
         self._facts_of: tuple[Message | None, str] = (None, "")
         self._value: object = None
-        self._before: object = OFF  # previous value of the topic, for comparison
-        self._pinned: object = OFF
+        self._before: object = NO_BASE  # previous value of the topic, for comparison
+        self._pinned: object = NO_BASE
         self._pinned_words = ""
         self.reader = Reader()
-        self.body = InspectorBody(self.theme, self._looked_through, context.toast)
+        self.body = InspectorBody(self.theme, self._search_source, context.toast)
         self._make_header()
         self._make_body()
-        self._say_nothing()
+        self._show_empty()
 
     # -- construction -------------------------------------------------------------------------------------
 
@@ -83,24 +83,24 @@ class InspectorPanel(PanelWidget):
         self.model, self.tree, self.finder = body.model, body.tree, body.finder
         self.mode, self.strip, self.foot, self.bytes = body.mode, body.strip, body.foot, body.bytes
         self.query, self.history = body.query, body.history
-        self.history.moved.connect(self._moved)
-        self.finder.queried.connect(self._queried)
+        self.history.selection_changed.connect(self._history_selected)
+        self.finder.query_changed.connect(self._query_changed)
         self.own = InspectorActions(
-            self.theme, self, body, lambda: self._shown, self._whole,
+            self.theme, self, body, lambda: self._shown, self._full_value,
             find=self.focus_filter, toast=self.context.toast,
             plot=lambda path: self.context.plot(self._topic, path),
         )  # fmt: skip
         self.foot.copy_value.clicked.connect(self.own.copy_value)
         self.foot.copy_path.clicked.connect(self.own.copy_path)
         self.foot.plot.clicked.connect(self.own.plot)
-        self.tree.dragged.connect(self._drag)
-        body.objects.revealed.connect(self._reveal)
-        self.tree.selectionModel().currentChanged.connect(self._chosen)
+        self.tree.drag_started.connect(self._start_drag)
+        body.objects.reveal_requested.connect(self._reveal)
+        self.tree.selectionModel().currentChanged.connect(self._row_selected)
         self.tree.customContextMenuRequested.connect(self._show_menu)
         self.mode.changed.connect(self._set_mode)
         self.compare = body.compare
         self.compare.toggled.connect(lambda _on: self._show_value())
-        self.strip.only_changed.connect(lambda _on: self._show_value())
+        self.strip.changes_only_toggled.connect(lambda _on: self._show_value())
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(body)
@@ -111,26 +111,26 @@ class InspectorPanel(PanelWidget):
         """Switch to another topic."""
         if name == self._topic:
             return
-        self._leave()
-        self.history.forget()
+        self._close_watch()
+        self.history.reset()
         self._topic = name
         self._shown = self._allowed = self._reading = None
-        self._value, self._before, self._pinned = None, OFF, OFF
+        self._value, self._before, self._pinned = None, NO_BASE, NO_BASE
         self._raw_wanted = False
         self.model.clear()
-        self.query.forget()
-        self.body.objects.begin_anew()
+        self.query.discard_pending()
+        self.body.objects.reset()
         self.foot.clear()
-        self._pace.begin_anew()
+        self._pace.reset()
         for button in (self.freeze, self.pin):
             button.setChecked(False)
-        self.set_title(_("Inspector"), topic_words(name))
+        self.set_title(_("Inspector"), topic_label(name))
         if name:
             self._since_ns = time.time_ns()
-            self._watch = self.session.watch_shown(name)
-            self.history.begin(self.session.series, name)
+            self._watch = self.session.watch_displayed(name)
+            self.history.start(self.session.series, name)
             self.session.mark_seen(name)
-        self._say_nothing()
+        self._show_empty()
 
     def source_changed(self) -> None:
         topic = self._topic
@@ -141,78 +141,78 @@ class InspectorPanel(PanelWidget):
         if not self._topic:
             return
         topic, recorded = self.session.topic(self._topic), self.session.replay is not None
-        self.history.follow()
+        self.history.clamp_selection()
         earlier = self.history.at is not None
-        self.live.set(*chip_words(topic, self.frozen, recorded=recorded, earlier=earlier))
+        self.live.set(*chip_state(topic, self.is_frozen, recorded=recorded, earlier=earlier))
         newest, taken = topic.newest if topic is not None and topic.gone_s is None else None, False
-        if topic is not None and newest is not None and newest is not self._shown and not self.holds:
-            taken = self._pace.may(self.clock())
+        if topic is not None and newest is not None and newest is not self._shown and not self.is_held:
+            taken = self._pace.try_acquire(self.clock())
             if taken:
-                self._add_message(newest)
-        elif recorded and newest is None and self._shown is not None and not self.holds:
-            self._show_none_yet()
+                self._show_message(newest)
+        elif recorded and newest is None and self._shown is not None and not self.is_held:
+            self._show_no_message()
         if self.body.page == NOTHING:
-            self._say_waiting(topic)
+            self._show_waiting(topic)
         done = self.reader.pop_result()
         if done is not None and not self._raw_wanted:
-            self._show_read(done)
-        answer = self.query.pop_answer(self.clock())
+            self._show_decoded(done)
+        answer = self.query.pop_result(self.clock())
         if answer is not None and self._value is not None:
-            self._show_found(answer)
+            self._show_query_result(answer)
         self.history.refresh(beside=taken)
-        self._show_fading(taken=taken)
+        self._repaint_fading(taken=taken)
 
-    def _show_fading(self, *, taken: bool) -> None:
+    def _repaint_fading(self, *, taken: bool) -> None:
         # A message that was just shown has painted its marks already.
         if taken:
-            self._fades.spend(self.clock())
-        elif self.body.page == TREE and self.tree.fading() and self._fades.may(self.clock()):
+            self._fades.drain(self.clock())
+        elif self.body.page == TREE and self.tree.is_fading() and self._fades.try_acquire(self.clock()):
             self.tree.viewport().update()
 
     def _refresh_now(self) -> None:
-        self._pace.begin_anew()
+        self._pace.reset()
         self.refresh()
 
-    def _show_none_yet(self) -> None:
+    def _show_no_message(self) -> None:
         # The playhead is before the topic's first message.
-        self.reader.forget()
+        self.reader.clear()
         self._shown = self._allowed = self._reading = None
-        self._value, self._before = None, OFF
+        self._value, self._before = None, NO_BASE
         self.model.clear()
-        self.query.forget()
+        self.query.discard_pending()
         self.foot.clear()
-        self._page(NOTHING)
+        self._show_page(NOTHING)
 
-    def _say_waiting(self, topic: Topic | None) -> None:
-        unread = self.session.networks.unread(self._topic)
+    def _show_waiting(self, topic: Topic | None) -> None:
+        unread = self.session.networks.read_problem(self._topic)
         if unread:
-            self.body.say_unread(topic_words(self._topic), unread, self.why(self._topic))
+            self.body.show_undecodable(topic_label(self._topic), unread, self.doctor_action(self._topic))
         else:
             published = topic is not None and topic.publishers > 0
-            self.body.say_waiting(topic_words(self._topic), published, self.why(self._topic))
+            self.body.show_waiting(topic_label(self._topic), published, self.doctor_action(self._topic))
 
-    def _add_message(self, message: Message) -> None:
+    def _show_message(self, message: Message) -> None:
         large = message.size_bytes > LARGE_BYTES and message.codec != "image"
         if self._raw_wanted:
             self._show_raw(message, "")
         elif large and message.codec != "json" and message is not self._allowed:
             self._offer_large(message)
         elif large:
-            self._read_elsewhere(message)
+            self._decode_in_background(message)
         else:
-            self._show_read(read_at_once(message))
+            self._show_decoded(decode_now(message))
 
-    def _read_elsewhere(self, message: Message) -> None:
+    def _decode_in_background(self, message: Message) -> None:
         # Decoded in the reader's thread; the old contents are shown until then.
         if self.history.at is not None:  # the user waits for exactly this message
-            self.reader.ask(message)
-        elif not self.reader.ask_at_leisure(message, self.clock()):
+            self.reader.submit(message)
+        elif not self.reader.submit_throttled(message, self.clock()):
             return
         if self._shown is None or self.body.page == LARGE:
-            self.body.say_large(message.size_bytes, _("Reading the message."))
-            self._page(LARGE)
+            self.body.show_large(message.size_bytes, _("Reading the message."))
+            self._show_page(LARGE)
 
-    def _show_read(self, done: Reading) -> None:
+    def _show_decoded(self, done: Reading) -> None:
         message = done.message
         if done.error is not None:
             self._show_raw(message, done.error)
@@ -220,23 +220,23 @@ class InspectorPanel(PanelWidget):
         fresh = message is not self._shown
         self._shown, self._reading = message, done
         if fresh:
-            self._before = self._value if self._value is not None else OFF
+            self._before = self._value if self._value is not None else NO_BASE
             topic = self.session.topic(self._topic)
             previous = topic.previous if topic is not None else None
             if self.history.at is not None:
                 previous = self.history.before()
             if message.size_bytes <= LARGE_BYTES and previous is not None:
                 self._before = payload_or(previous, self._before)
-            self.finder.forget()
+            self.finder.invalidate_matches()
         self._value = done.value
         self._show_value()
         self.foot.show_facts(self._facts(message))
-        self._page(TABLE if self._table_wanted else TREE)
+        self._show_page(TABLE if self._table_wanted else TREE)
 
     def _facts(self, message: Message) -> str:
         # Cached per message, because latency and age are those at its arrival.
         if message is not self._facts_of[0]:
-            kind = kind_named(split_key(self._topic)[0])
+            kind = find_kind(split_key(self._topic)[0])
             recorded = self.session.replay is not None
             self._facts_of = (message, message_facts(message, self._since_ns, kind, recorded=recorded))
         return self._facts_of[1]
@@ -244,27 +244,27 @@ class InspectorPanel(PanelWidget):
     def _show_value(self) -> None:
         if self._shown is None or self._value is None:
             return
-        if self.query.asking:
+        if self.query.has_query:
             self.strip.hide()
-            self.query.ask(self._value)
+            self.query.request_evaluation(self._value)
             return
         if self._table_wanted:
             self.strip.hide()
             self.body.objects.show_message(self._value, self.clock())
             return
         first = not self.model.rowCount()
-        base: object = OFF
-        if self.comparing:
+        base: object = NO_BASE
+        if self.is_comparing:
             base = self._pinned if self.pin.isChecked() else self._before
             compared_with = self._pinned_words if self.pin.isChecked() else _(BEFORE)
             self.strip.set_summary(compared_with, *count_changes(self._value, base))
-        self.strip.setVisible(self.comparing and self.body.page == TREE)
-        only = self.comparing and base is not OFF and self.strip.only.isChecked()
+        self.strip.setVisible(self.is_comparing and self.body.page == TREE)
+        only = self.is_comparing and base is not NO_BASE and self.strip.only.isChecked()
         self.model.set_value(self._value, self.clock(), base, changes_only=only)
         if first:
             self.tree.expand_small(MAX_EXPANDED_ROWS)
 
-    def _show_found(self, answer: QueryAnswer) -> None:
+    def _show_query_result(self, answer: QueryResult) -> None:
         if self._table_wanted:
             self.body.objects.show_found(answer.found.items(), self.clock())
             return
@@ -279,85 +279,85 @@ class InspectorPanel(PanelWidget):
         self.bytes.show_bytes(message.data)
         said = _("Can't be decoded as {codec}: {reason}.").format(codec=message.codec, reason=sentence)
         self.body.sentence.setText(said if sentence else "")
-        self._page(RAW)
+        self._show_page(RAW)
 
     def _offer_large(self, message: Message) -> None:
         self._shown = message
         words = _("{codec} messages larger than 1 MB are decoded only on request.").format(
             codec=message.codec
         )
-        self.body.say_large(message.size_bytes, words, self._read_large)
-        self._page(LARGE)
+        self.body.show_large(message.size_bytes, words, self._decode_large)
+        self._show_page(LARGE)
 
-    def _read_large(self) -> None:
+    def _decode_large(self) -> None:
         # Also freezes the panel, because the next message would replace this one.
         if self._shown is not None:
             self._allowed = self._shown
             self.freeze.setChecked(True)
-            self.reader.ask(self._shown)
-            self.body.say_large(self._shown.size_bytes, _("Reading the message."))
+            self.reader.submit(self._shown)
+            self.body.show_large(self._shown.size_bytes, _("Reading the message."))
 
-    def _page(self, page: int) -> None:
-        self.body.show_page(page, comparing=self.comparing)
+    def _show_page(self, page: int) -> None:
+        self.body.show_page(page, comparing=self.is_comparing)
         self.own.set_enabled(page == TREE)
 
-    def _say_nothing(self) -> None:
+    def _show_empty(self) -> None:
         choose = lambda: self.context.run("panel:topics")  # noqa: E731
-        self.body.say_nothing(topic_words(self._topic), choose, self.why(self._topic))
+        self.body.show_empty(topic_label(self._topic), choose, self.doctor_action(self._topic))
         if not self._topic:
             self.live.set("")
         for button in (self.freeze, self.pin):
             button.setVisible(bool(self._topic))
-        self._page(NOTHING)
+        self._show_page(NOTHING)
 
     # -- user actions -------------------------------------------------------------------------------------
 
     @property
-    def frozen(self) -> bool:
+    def is_frozen(self) -> bool:
         """True if the panel is frozen."""
         return self.freeze.isChecked()
 
     @property
-    def holds(self) -> bool:
+    def is_held(self) -> bool:
         """True if the message shown does not change: frozen, or selected in the history."""
-        return self.frozen or self.history.at is not None
+        return self.is_frozen or self.history.at is not None
 
     @property
-    def comparing(self) -> bool:
+    def is_comparing(self) -> bool:
         """True if the tree shows the differences to another message."""
-        return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.asking
+        return (self.compare.isChecked() or self.pin.isChecked()) and not self.query.has_query
 
-    def waits_for(self) -> str:
+    def awaited_topic(self) -> str:
         return self._topic if self._shown is None else ""
 
-    def hindrances(self) -> list[Hindrance]:
-        return [paused_hindrance(self.title(), self._go_on)] if self.holds else []
+    def blockers(self) -> list[Blocker]:
+        return [paused_blocker(self.title(), self._resume_updates)] if self.is_held else []
 
-    def _go_on(self) -> None:
-        self.history.go(None)
+    def _resume_updates(self) -> None:
+        self.history.select(None)
         self.freeze.setChecked(False)
 
     def _pin(self, pinned: bool) -> None:
-        self._pinned = self._value if pinned and self._value is not None else OFF
+        self._pinned = self._value if pinned and self._value is not None else NO_BASE
         stamp_ns = self._shown.stamp_ns if self._shown is not None else None
         self._pinned_words = _(PINNED)
         if self.history.at is not None and stamp_ns is not None and 0 <= stamp_ns < 2**62:
-            at = clock_words(stamp_ns)
+            at = clock_text(stamp_ns)
             self._pinned_words = _("{message} of {clock}").format(message=_(PINNED), clock=at)
         self._show_value()
 
-    def _moved(self) -> None:
-        self.reader.forget()
+    def _history_selected(self) -> None:
+        self.reader.clear()
         message = self.history.selected_message()
         if message is not None:
-            self._add_message(message)
+            self._show_message(message)
         elif self.history.at is None:
             self.freeze.setChecked(False)
             self._refresh_now()
 
-    def _queried(self, text: str) -> None:
+    def _query_changed(self, text: str) -> None:
         # "" ends the query.
-        if not text and not self.query.asking:
+        if not text and not self.query.has_query:
             return
         self.finder.mark(wrong=not self.query.set_query(text))
         self.compare.setVisible(not text)  # parts of messages can't be compared, and the query needs the room
@@ -366,18 +366,18 @@ class InspectorPanel(PanelWidget):
 
     def _set_mode(self, mode: str) -> None:
         self._raw_wanted, self._table_wanted = mode == "raw", mode == "table"
-        if self._table_wanted and self.body.page == TREE and not self.query.asking:
+        if self._table_wanted and self.body.page == TREE and not self.query.has_query:
             index = self.tree.currentIndex()
-            self.body.objects.want(steps_of(self.model.node(index)) if index.isValid() else ())
+            self.body.objects.select_list(steps_of(self.model.node(index)) if index.isValid() else ())
         shown = self._shown
         if shown is None:
             return
         if self._reading is not None and self._reading.message is shown and not self._raw_wanted:
-            self._show_read(self._reading)
+            self._show_decoded(self._reading)
         elif self.session.topic(self._topic) is not None:
-            self._add_message(shown)
+            self._show_message(shown)
 
-    def _chosen(self, index: QModelIndex) -> None:
+    def _row_selected(self, index: QModelIndex) -> None:
         self.foot.show_path(self.model.node(index).path if index.isValid() else "")
 
     def _reveal(self, steps: object) -> None:
@@ -386,22 +386,22 @@ class InspectorPanel(PanelWidget):
         self.body.reveal(steps)
         self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _drag(self, node: TreeNode) -> None:
+    def _start_drag(self, node: TreeNode) -> None:
         path = field_of(node)
         if path:
             drag_field(self.tree, self._topic, path, press=lambda key: self.context.run(f"key:{key}"))
 
-    def _whole(self) -> object:
+    def _full_value(self) -> object:
         # A query or the table may show only parts of the message.
-        shows_parts = self.query.asking or self._table_wanted
+        shows_parts = self.query.has_query or self._table_wanted
         return self._value if shows_parts else self.model.value()
 
-    def _looked_through(self) -> tuple[object, JsonIndex | None]:
-        return self._whole(), self._reading.index if self._reading is not None else None
+    def _search_source(self) -> tuple[object, JsonIndex | None]:
+        return self._full_value(), self._reading.index if self._reading is not None else None
 
     def _show_menu(self, at: QPoint) -> None:
         menu = Menu(self.theme, self)
-        menu.addActions(self.own.listed())
+        menu.addActions(self.own.menu_actions())
         index = self.tree.currentIndex()
         if index.isValid() and self._topic and not split_key(self._topic)[0]:
             what = f"alarm.value:{self._topic} {path_text(steps_of(self.model.node(index)))}"
@@ -415,7 +415,7 @@ class InspectorPanel(PanelWidget):
         menu.popup(self.tree.viewport().mapToGlobal(at))
 
     def more_actions(self) -> list[QAction]:
-        return self.own.listed()
+        return self.own.menu_actions()
 
     def focus_filter(self) -> bool:
         if self.body.bar.isVisible():
@@ -448,17 +448,17 @@ class InspectorPanel(PanelWidget):
         if isinstance(query, str) and query.startswith("$"):
             self.finder.field.setText(query)
 
-    def _leave(self) -> None:
-        self.reader.forget()
+    def _close_watch(self) -> None:
+        self.reader.clear()
         self.history.pause()
         if self._watch is not None:
             self._watch.close()
             self._watch = None
 
     def resume(self) -> None:
-        if self._watch is not None and self._watch.resting:
+        if self._watch is not None and self._watch.is_suspended:
             self._since_ns = time.time_ns()
-            self.history.begin(self.session.series, self._topic)
+            self.history.start(self.session.series, self._topic)
         super().resume()
 
     def suspend(self) -> None:
@@ -469,12 +469,12 @@ class InspectorPanel(PanelWidget):
         return (self._watch,)
 
     def dispose(self) -> None:
-        self._leave()
+        self._close_watch()
         self.reader.close()
         self.query.close_worker()
 
 
-def chip_words(
+def chip_state(
     topic: Topic | None, frozen: bool, *, recorded: bool = False, earlier: bool = False
 ) -> tuple[str, str, str]:
     """Return text, status and icon of the chip that shows the state of topic and panel."""
@@ -487,11 +487,11 @@ def chip_words(
     if topic is None:
         return pgettext("topic", "gone"), "off", ""
     # no messages arrive any more
-    if topic.stale and not (topic.counted is not None and topic.counted[0] > 0):
+    if topic.is_stale and not (topic.measured_rates is not None and topic.measured_rates[0] > 0):
         return pgettext("topic", "not responding"), "warn", ""
     if topic.gone_s is not None:
         return _("gone for {seconds} s").format(seconds=int(topic.gone_s)), "off", ""
     return pgettext("message", "live"), "info", ""
 
 
-PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel, several=True)
+PANEL = Panel("inspector", lazy("Inspector"), "list-tree", (ANY_TYPE,), InspectorPanel, allows_multiple=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.core.messages.newest_only import NewestOnly
-from app.core.messages.query import JsonQuery, QueryAnswer
+from app.core.messages.query import JsonQuery, QueryResult
 from app.errors import QueryError
 from app.ui.widgets import label
 from app.ui.widgets.labels import set_role
@@ -20,21 +20,21 @@ LOAD_DIVISOR = 4
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _QueryJob:
     query: JsonQuery
     value: object
 
 
 @dataclass(frozen=True, slots=True)
-class _Answered:
-    answer: QueryAnswer
-    took_s: float
+class _QueryOutcome:
+    result: QueryResult
+    duration_s: float
 
 
-def _answer(asked: _Asked) -> _Answered:
+def _evaluate(asked: _QueryJob) -> _QueryOutcome:
     began = time.perf_counter()
-    answer = asked.query.answer(asked.value)
-    return _Answered(answer, time.perf_counter() - began)
+    answer = asked.query.evaluate(asked.value)
+    return _QueryOutcome(answer, time.perf_counter() - began)
 
 
 class QueryStrip(QWidget):
@@ -42,7 +42,7 @@ class QueryStrip(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._worker = NewestOnly(_answer, "studio-query")
+        self._worker = NewestOnly(_evaluate, "studio-query")
         self._query: JsonQuery | None = None
         self._typed = ""
         self._value: object = None
@@ -56,14 +56,14 @@ class QueryStrip(QWidget):
         self.hide()
 
     @property
-    def asking(self) -> bool:
+    def has_query(self) -> bool:
         """True if a query was entered, even if its syntax is invalid."""
         return bool(self._typed)
 
     def set_query(self, text: str) -> bool:
         """Set the query, or remove it (""). Return False if its syntax is invalid."""
         self._typed, self._query = text, None
-        self._worker.forget()
+        self._worker.clear()
         self._not_before = 0.0
         sentence = ""
         if text:
@@ -74,31 +74,31 @@ class QueryStrip(QWidget):
         self._set_status(sentence, wrong=bool(sentence))
         return not sentence
 
-    def ask(self, value: object) -> None:
+    def request_evaluation(self, value: object) -> None:
         """Queue a message for evaluation; `pop_answer` returns the result."""
         self._value, self._due = value, True
 
-    def pop_answer(self, now: float) -> QueryAnswer | None:
+    def pop_result(self, now: float) -> QueryResult | None:
         """Return the result of the last evaluation once, else None.
 
         Call on every refresh; `now` is monotonic time in s.
         """
         done = self._worker.pop_result()
         if done is not None:
-            self._not_before = now + (LOAD_DIVISOR - 1) * done.took_s
-            self._set_status(found_words(done.answer), wrong=False)
-        if self._due and self._query is not None and not self._worker.busy and now >= self._not_before:
+            self._not_before = now + (LOAD_DIVISOR - 1) * done.duration_s
+            self._set_status(result_text(done.result), wrong=False)
+        if self._due and self._query is not None and not self._worker.is_busy and now >= self._not_before:
             self._due = False
-            self._worker.ask(_Asked(self._query, self._value))
-        return done.answer if done is not None else None
+            self._worker.submit(_QueryJob(self._query, self._value))
+        return done.result if done is not None else None
 
-    def forget(self) -> None:
+    def discard_pending(self) -> None:
         """Discard pending evaluations because another topic is shown."""
-        self._worker.forget()
+        self._worker.clear()
         self._value, self._due = None, False
         self._set_status("", wrong=False)
 
-    def show_on(self, *, tree: bool) -> None:
+    def set_tree_visible(self, *, tree: bool) -> None:
         """Show the strip if the tree is visible and the strip has text."""
         self._on_tree = tree
         show_when(self, tree and bool(self.words.text()))
@@ -110,10 +110,10 @@ class QueryStrip(QWidget):
     def _set_status(self, words: str, *, wrong: bool) -> None:
         self.words.setText(words)
         set_role(self.words, "warn" if wrong else "textSecondary")
-        self.show_on(tree=self._on_tree)
+        self.set_tree_visible(tree=self._on_tree)
 
 
-def found_words(answer: QueryAnswer) -> str:
+def result_text(answer: QueryResult) -> str:
     """Format the number of results, such as ``12 found``, with the reason if the result is incomplete."""
     count = len(answer.found)
     said = ngettext("{count} found.", "{count} found.", count).format(count=count)

@@ -14,8 +14,8 @@ from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelInde
 
 from app.core.messages.query import FoundPath
 from app.core.series.field_path import ALL, FieldPath, Step, kind_of_value
-from app.ui.panels.inspector.diff import MARK_WORDS, MISSING, OFF, Mark, Part, differs, parts_of
-from app.ui.panels.inspector.values import is_container, keys_of, size_of, values_of, words_of
+from app.ui.panels.inspector.diff import MARK_TEXTS, MISSING, NO_BASE, Mark, Part, differs, parts_of
+from app.ui.panels.inspector.values import is_container, keys_of, size_of, value_text, values_of
 from app.ui.text import plain
 from nep.i18n import _
 
@@ -43,7 +43,7 @@ class TreeNode:
     depth: int = 0
     children: list[TreeNode] | None = None
     changed_s: float | None = None
-    base: object = OFF
+    base: object = NO_BASE
     mark: Mark = ""
     total: int = 0
 
@@ -137,7 +137,7 @@ class TreeModel(QAbstractItemModel):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(node.path)
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            said = (str(node.key), words_of(node.value), _(MARK_WORDS.get(node.mark, "")))
+            said = (str(node.key), value_text(node.value), _(MARK_TEXTS.get(node.mark, "")))
             return ", ".join(part for part in said if part)
         return None
 
@@ -163,7 +163,9 @@ class TreeModel(QAbstractItemModel):
         self.changed_at_s = None
         self.endResetModel()
 
-    def set_value(self, value: object, now: float, base: object = OFF, *, changes_only: bool = False) -> None:
+    def set_value(
+        self, value: object, now: float, base: object = NO_BASE, *, changes_only: bool = False
+    ) -> None:
         """Update the tree to the next message; `now` is the change time of changed values (monotonic, s).
 
         A message that is not a container becomes one row called ``value``. No value of the first message
@@ -183,14 +185,14 @@ class TreeModel(QAbstractItemModel):
 
     def _size(self, node: TreeNode) -> int:
         # In a comparison, the count of an unloaded node is only known to be zero or not.
-        if node.base is OFF:
+        if node.base is NO_BASE:
             return size_of(node.value)
         return node.total if node.children is not None else size_of(node.value) or size_of(node.base)
 
     def _parts(self, node: TreeNode, count: int) -> list[Part]:
-        if node.base is OFF:
+        if node.base is NO_BASE:
             pairs = zip(keys_of(node.value, count), values_of(node.value, count), strict=False)
-            return [(key, value, OFF, "") for key, value in pairs]
+            return [(key, value, NO_BASE, "") for key, value in pairs]
         only = self._changes_only
         parts, node.total = parts_of(node.value, node.base, node.mark, count, changes_only=only)
         return parts
@@ -209,7 +211,7 @@ class TreeModel(QAbstractItemModel):
         parts = self._parts(node, max(len(loaded), PAGE_SIZE) if loaded or is_container(value) else 0)
         wanted = [each[0] for each in parts]
         if [child.key for child in loaded] != wanted[: len(loaded)] or len(wanted) < len(loaded):
-            self._fit(node, loaded, parts)
+            self._sync_children(node, loaded, parts)
         elif len(wanted) > len(loaded):
             self._load(node, len(wanted))
         if not is_container(value) and node is not self._root:
@@ -233,14 +235,14 @@ class TreeModel(QAbstractItemModel):
         first = len(node.children)
         if len(parts) <= first:
             return
-        fresh = [_made(node, row, parts[row]) for row in range(first, len(parts))]
+        fresh = [_make_node(node, row, parts[row]) for row in range(first, len(parts))]
         before, self._changing = self._changing, True  # receivers of the signals must not load the same rows
         self.beginInsertRows(self.index_of(node), first, len(parts) - 1)
         node.children.extend(fresh)
         self._changing = before
         self.endInsertRows()
 
-    def _fit(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[Part]) -> None:
+    def _sync_children(self, node: TreeNode, loaded: list[TreeNode], parts: Sequence[Part]) -> None:
         # Nodes that still exist keep their expanded state.
         wanted = [part[0] for part in parts]
         keep = set(wanted)
@@ -248,7 +250,7 @@ class TreeModel(QAbstractItemModel):
             if loaded[row].key not in keep:
                 self.beginRemoveRows(self.index_of(node), row, row)
                 del loaded[row]
-                _number(loaded)
+                _renumber(loaded)
                 self.endRemoveRows()
         have = {child.key for child in loaded}
         if [key for key in wanted if key in have] != [child.key for child in loaded]:
@@ -256,8 +258,8 @@ class TreeModel(QAbstractItemModel):
         for row, part in enumerate(parts):
             if part[0] not in have:
                 self.beginInsertRows(self.index_of(node), row, row)
-                loaded.insert(row, _made(node, row, part))
-                _number(loaded)
+                loaded.insert(row, _make_node(node, row, part))
+                _renumber(loaded)
                 self.endInsertRows()
 
     def _reorder(self, loaded: list[TreeNode], wanted: Sequence[str | int]) -> None:
@@ -266,7 +268,7 @@ class TreeModel(QAbstractItemModel):
         before = self.persistentIndexList()
         nodes = [self.node(index) for index in before]
         loaded.sort(key=lambda child: place[child.key])
-        _number(loaded)
+        _renumber(loaded)
         self.changePersistentIndexList(before, [self.index_of(node) for node in nodes])
         self.layoutChanged.emit()
 
@@ -285,15 +287,15 @@ class TreeModel(QAbstractItemModel):
         return self.index_of(node)
 
 
-def _made(parent: TreeNode, row: int, part: Part) -> TreeNode:
+def _make_node(parent: TreeNode, row: int, part: Part) -> TreeNode:
     key, value, base, mark = part
     return TreeNode(key, value, parent, row, parent.depth + 1, base=base, mark=mark)
 
 
 def _as_container(value: object) -> object:
-    return value if value is OFF or value is MISSING or is_container(value) else {"value": value}
+    return value if value is NO_BASE or value is MISSING or is_container(value) else {"value": value}
 
 
-def _number(nodes: Sequence[TreeNode]) -> None:
+def _renumber(nodes: Sequence[TreeNode]) -> None:
     for row, node in enumerate(nodes):
         node.row = row

@@ -19,9 +19,9 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QFocusEvent, QFontMetricsF, QMouseEvent, QPainter, QPen
 from PySide6.QtWidgets import QApplication, QStyledItemDelegate, QStyleOptionViewItem, QTreeView
 
-from app.ui.panels.inspector.diff import OFF
+from app.ui.panels.inspector.diff import NO_BASE
 from app.ui.panels.inspector.tree_model import NODE_ROLE, TreeModel, TreeNode
-from app.ui.panels.inspector.values import is_container, size_of, words_of
+from app.ui.panels.inspector.values import is_container, size_of, value_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 
@@ -33,7 +33,7 @@ SIGNS = {"added": "+ ", "removed": "\u2212 "}
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
-def mixed(under: QColor, over: QColor, share: float) -> QColor:
+def blend(under: QColor, over: QColor, share: float) -> QColor:
     """Blend `over` onto `under` with opacity `share` (0 to 1)."""
     keep = 1.0 - share
     return QColor.fromRgbF(
@@ -43,7 +43,7 @@ def mixed(under: QColor, over: QColor, share: float) -> QColor:
     )
 
 
-class _Height(QStyledItemDelegate):
+class _RowHeightDelegate(QStyledItemDelegate):
     """Delegate that sets the row height; the view paints everything else."""
 
     def __init__(self, view: TreeView) -> None:
@@ -61,7 +61,7 @@ class TreeView(QTreeView):
         clock: Returns the time in the time base of the nodes' change times.
     """
 
-    dragged = Signal(object)
+    drag_started = Signal(object)
 
     def __init__(self, theme: Theme, model: TreeModel, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
@@ -72,7 +72,7 @@ class TreeView(QTreeView):
         self._keyboard = False
         self._pressed_at: tuple[QPoint, TreeNode] | None = None
         self.setModel(model)
-        self.setItemDelegate(_Height(self))
+        self.setItemDelegate(_RowHeightDelegate(self))
         self.setHeaderHidden(True)
         self.setUniformRowHeights(True)
         self.setIndentation(INDENT)
@@ -83,11 +83,11 @@ class TreeView(QTreeView):
         self.setExpandsOnDoubleClick(False)
         self.setMouseTracking(True)
 
-    def share_changed(self, node: TreeNode) -> float:
+    def highlight_opacity(self, node: TreeNode) -> float:
         """Return the intensity of a node's highlight: 1 for a fresh change, 0 after the fade."""
         if node.mark:
             return 1.0
-        if node.changed_s is None or node.base is not OFF:
+        if node.changed_s is None or node.base is not NO_BASE:
             return 0.0
         fade_s = self.theme.duration("changedFade") / 1000
         age = self._clock() - node.changed_s
@@ -95,7 +95,7 @@ class TreeView(QTreeView):
             return 1.0 if age < 1.0 else 0.0
         return max(0.0, 1.0 - age / fade_s)
 
-    def fading(self) -> bool:
+    def is_fading(self) -> bool:
         """Return True if a highlight may still be fading, so that the view has to be repainted."""
         changed = self._tree.changed_at_s
         return changed is not None and self._clock() - changed < 1.2
@@ -131,9 +131,9 @@ class TreeView(QTreeView):
         ground = self.theme.colour("selected" if chosen else "panel")
         if chosen:
             painter.fillRect(rect, ground)
-        share = self.share_changed(node)
+        share = self.highlight_opacity(node)
         if share > 0:
-            bar = mixed(ground, self.theme.colour(BAR_ROLES[node.mark]), share)
+            bar = blend(ground, self.theme.colour(BAR_ROLES[node.mark]), share)
             painter.fillRect(QRect(0, rect.top() + 4, BAR_WIDTH, rect.height() - 8), bar)
         key_end = self._paint_key(painter, rect, node, chosen=chosen)
         if not node.is_container:
@@ -165,7 +165,7 @@ class TreeView(QTreeView):
         painter.drawText(QRectF(x, rect.top(), width + 2, rect.height()), LEFT, key)
         x += width
         if node.is_container:
-            count = words_of(node.value)
+            count = value_text(node.value)
             painter.setPen(theme.colour("accentText" if chosen else "textTertiary"))
             painter.drawText(QRectF(x + 7, rect.top(), 90, rect.height()), LEFT, count)
         return x
@@ -177,29 +177,29 @@ class TreeView(QTreeView):
         metrics = QFontMetricsF(theme.font("code"))
         right = rect.right() - VALUE_EDGE - 5
         room = max(30.0, right - key_end - 16)
-        text = metrics.elidedText(words_of(node.value), Qt.TextElideMode.ElideRight, room)
+        text = metrics.elidedText(value_text(node.value), Qt.TextElideMode.ElideRight, room)
         width = metrics.horizontalAdvance(text)
         colour = theme.colour(_role(node.value))
         if share > 0 and node.mark not in SIGNS:
             painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(mixed(ground, theme.colour("changedTint"), share))
+            painter.setBrush(blend(ground, theme.colour("changedTint"), share))
             painter.drawRoundedRect(
                 QRectF(right - width - 5, rect.top() + 3, width + 10, rect.height() - 6), 4, 4
             )
-            colour = mixed(colour, theme.colour("changed"), share)
+            colour = blend(colour, theme.colour("changed"), share)
         if node.mark in SIGNS:
             colour = theme.colour(BAR_ROLES[node.mark])
         painter.setFont(theme.font("code"))
         painter.setPen(colour)
         painter.drawText(QRectF(right - width, rect.top(), width + 2, rect.height()), LEFT, text)
-        self._paint_before(painter, rect, node, right - width - 10, key_end + 12)
+        self._paint_old_value(painter, rect, node, right - width - 10, key_end + 12)
 
-    def _paint_before(
+    def _paint_old_value(
         self, painter: QPainter, rect: QRect, node: TreeNode, right: float, left: float
     ) -> None:
         if node.mark != "changed" or is_container(node.base):
             return
-        text = f"{words_of(node.base)} \u2192"
+        text = f"{value_text(node.base)} \u2192"
         width = QFontMetricsF(painter.font()).horizontalAdvance(text)
         if right - width >= left:
             painter.setPen(self.theme.colour("textTertiary"))
@@ -225,7 +225,7 @@ class TreeView(QTreeView):
             far = (event.position().toPoint() - began).manhattanLength()
             if far >= QApplication.startDragDistance():
                 self._pressed_at = None
-                self.dragged.emit(node)
+                self.drag_started.emit(node)
             return
         super().mouseMoveEvent(event)
 

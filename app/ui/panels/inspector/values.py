@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from app.core.messages.lazy_json import LazyList, LazyObject
 from app.core.messages.reader import LARGE_BYTES, Reading, read
-from app.ui.text.numbers import size_words
+from app.ui.text.numbers import size_text
 from nep.errors import NepError
 from nep.i18n import _, ngettext
 
@@ -48,7 +48,7 @@ def size_of(value: object) -> int:
     return len(value) if is_container(value) else 0  # type: ignore[arg-type]
 
 
-def words_of(value: object) -> str:
+def value_text(value: object) -> str:
     """Format a value as one line: quoted text, size of containers, first bytes of binary data."""
     if value is None:
         return "null"
@@ -81,14 +81,14 @@ def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tup
         path, here = waiting.pop()
         if path and (
             wanted in str(path[-1]).casefold()
-            or (not is_container(here) and wanted in words_of(here).casefold())
+            or (not is_container(here) and wanted in value_text(here).casefold())
         ):
             yield path
         inside = zip(keys_of(here, limit), values_of(here, limit), strict=False)
         waiting.extend(((*path, key), below) for key, below in reversed(list(inside)))
 
 
-def plain_words(value: object) -> str:
+def clipboard_text(value: object) -> str:
     """Format a value for the clipboard: text unchanged, others as JSON."""
     if isinstance(value, str):
         return value
@@ -99,7 +99,7 @@ def plain_words(value: object) -> str:
     return json.dumps(value, indent=2, ensure_ascii=False, default=str)
 
 
-def read_at_once(message: Message) -> Reading:
+def decode_now(message: Message) -> Reading:
     """Decode a small message, or the summary of an image, on the calling (GUI) thread."""
     if message.codec != "image":
         return read(message)
@@ -130,5 +130,5 @@ def image_summary(message: Message) -> Mapping[str, object]:
         "width": width,
         "height": height,
         "channels": depth[0] if depth else 1,
-        "size": size_words(message.size_bytes),
+        "size": size_text(message.size_bytes),
     }

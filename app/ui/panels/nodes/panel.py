@@ -9,16 +9,16 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
-from app.core.networks.networks import network_words
+from app.core.networks.networks import network_label
 from app.core.networks.parameters import NodeParameters
 from app.ui.panels.base import Density, Panel, PanelContext
-from app.ui.panels.network_table import NetworkTable, own_everywhere
-from app.ui.panels.nodes.parameters import ParametersPart
-from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, lack_of_parameters, limits_of, rows_of
-from app.ui.panels.row_actions import RowAction, copies, node_actions, show_messages, topic_actions
-from app.ui.panels.table_panel import TableWords
-from app.ui.text.numbers import rate_words
-from app.ui.widgets import Scrolled
+from app.ui.panels.network_table import NetworkTable, are_own_nodes
+from app.ui.panels.nodes.parameters import ParametersView
+from app.ui.panels.nodes.rows import NodeRow, columns, facts_of, limits_of, no_parameters_reason, rows_of
+from app.ui.panels.row_actions import RowAction, copy_action, node_actions, show_messages, topic_actions
+from app.ui.panels.table_panel import TableTexts
+from app.ui.text.numbers import rate_text
+from app.ui.widgets import ContentScrollArea
 from app.ui.widgets.paint import show_when
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     from app.core.network.nodes import NodeEntry
     from app.core.network.watches import Suspendable
 
-WORDS = TableWords(
+TABLE_TEXTS = TableTexts(
     title=lazy("Nodes"),
     filter=lazy("Filter nodes"),
-    nothing_fits=lazy("No matching nodes"),
-    clear_the_filter=lazy("Clear the filter to see all nodes."),
+    no_matches=lazy("No matching nodes"),
+    clear_filter_hint=lazy("Clear the filter to see all nodes."),
     not_recorded=lazy("Recordings don't contain programs"),
 )
 SORT_TICKS = 30  # refreshes at 30 Hz: changing columns are re-sorted once a second
@@ -45,14 +45,14 @@ class NodesPanel(NetworkTable[NodeRow]):
     """Panel with the table of nodes; below it, details and parameters of the selected node."""
 
     def __init__(self, context: PanelContext) -> None:
-        super().__init__(context, WORDS, "network")
-        self.table.selectionModel().currentChanged.connect(self._chosen)
-        self._about = Scrolled(self.foot)
+        super().__init__(context, TABLE_TEXTS, "network")
+        self.table.selectionModel().currentChanged.connect(self._selection_changed)
+        self._about = ContentScrollArea(self.foot)
         session = self.session
         self._parameters = NodeParameters(
             session.watch, session.topic, session.parameters, lambda: session.master.kind == "connected"
         )
-        self.parameters = ParametersPart(self.theme, self._parameters)
+        self.parameters = ParametersView(self.theme, self._parameters)
         self.parameters.hide()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -74,31 +74,31 @@ class NodesPanel(NetworkTable[NodeRow]):
         self._gone = False
 
     def make_model(self) -> TableModel[NodeRow]:
-        return TableModel(columns(self._own), lambda row: row.key)
+        return TableModel(columns(self._is_own), lambda row: row.key)
 
     def make_table(self, model: TableModel[NodeRow]) -> TableView[NodeRow]:
         table = _NodeTable(self.theme, model, "node")
-        table.fold_wanted.connect(self._fold)
+        table.expand_requested.connect(self._set_expanded)
         return table
 
-    def _own(self, node: NodeEntry) -> bool:
+    def _is_own(self, node: NodeEntry) -> bool:
         if node.network:
-            return own_everywhere([node.name])
+            return are_own_nodes([node.name])
         return node.name in {NODE_NAME, *self.session.launcher.virtual_robots}
 
     def refresh(self) -> None:
         self._ticks += 1
         order = self.table.order.column
         due = order is not None and order.name in CHANGING_COLUMNS and self._ticks % SORT_TICKS == 0
-        if due or self._facts() != self._seen:
+        if due or self._snapshot() != self._seen:
             self.rebuild()
         values = self.session.nodes.values_revision + self.session.networks.values_revision
         if values != self._values or (self._gone and self._ticks % SORT_TICKS == 0):
             self._values = values
-            self.table.tell_visible_changed()
+            self.table.refresh_visible()
         self.parameters.refresh()
 
-    def _facts(self) -> tuple[object, ...]:
+    def _snapshot(self) -> tuple[object, ...]:
         session = self.session
         return session.nodes.revision, session.networks.revision, session.master.kind
 
@@ -107,36 +107,36 @@ class NodesPanel(NetworkTable[NodeRow]):
 
     def rebuild(self) -> None:
         nodes = [*self.session.nodes, *self.session.networks.nodes]
-        self._seen = self._facts()
+        self._seen = self._snapshot()
         self._gone = any(node.gone_s is not None for node in nodes)
         words = self.filter_words()
         found = [node for node in nodes if all(word in _haystack(node) for word in words)]
-        self.model.set_rows(rows_of(found, self._opened, self.table.order, self._rate))
+        self.model.set_rows(rows_of(found, self._opened, self.table.order, self._rate_text))
         self.filter.setVisible(len(nodes) > 0)
-        self.table.tell_visible_changed()
+        self.table.refresh_visible()
         self.show_table(bool(found), bool(words))
         self.show_networks()
-        self._say_chosen()
+        self._show_details()
 
-    def _rate(self, name: str) -> str:
+    def _rate_text(self, name: str) -> str:
         topic = self.session.topic(name)
-        return rate_words(topic.rate_hz) if topic is not None else ""
+        return rate_text(topic.rate_hz) if topic is not None else ""
 
-    def say_empty(self) -> None:
+    def update_empty_state(self) -> None:
         said = _("Programs appear here as soon as they join the master.")
         self.empty.set_texts(_("No nodes yet"), said, "network")
         self.empty.set_actions([])
 
-    def _chosen(self, _now: QModelIndex, _before: QModelIndex) -> None:
-        self._say_chosen()
+    def _selection_changed(self, _now: QModelIndex, _before: QModelIndex) -> None:
+        self._show_details()
 
-    def _say_chosen(self) -> None:
+    def _show_details(self) -> None:
         row = self.model.row_at(self.table.currentIndex())
         shown = self.pages.currentIndex() == 0
         words = _("Expand a node to see its topics") if row is None else facts_of(row.node)
         limits = limits_of(row.node) if row is not None else ""
         if row is not None:
-            limits = "\n".join(filter(None, (limits, lack_of_parameters(row.node))))
+            limits = "\n".join(filter(None, (limits, no_parameters_reason(row.node))))
         self._parameters.show(row.node if row is not None and shown else None)
         show_when(self.parameters, self._parameters.node is not None)
         self.foot.setText(f"{words}.\n{limits}" if limits else words)
@@ -155,26 +155,26 @@ class NodesPanel(NetworkTable[NodeRow]):
         else:
             network = self.session.networks.get(row.node.network)
             (network.nodes if network is not None else self.session.nodes).mark_seen(row.node.id)
-            self._fold(key, row.node.key not in self._opened)
+            self._set_expanded(key, row.node.key not in self._opened)
 
     def row_actions(self, key: str) -> Sequence[RowAction]:
         row = self.model.row_at(self.model.index_of(key))
         if row is None:
             return ()
         if row.is_pattern and self.session.topic(row.topic_key) is None:
-            return (copies(self.context, row.topic),)  # a pattern stands for many topics
+            return (copy_action(self.context, row.topic),)  # a pattern stands for many topics
         if row.topic:
             return topic_actions(self.context, row.topic_key)
         shows = RowAction(_("Show topics"), "list-tree", lambda: self.open_row(key))
         return (shows, *node_actions(self.context, row.node.network, row.node.name))
 
-    def _fold(self, key: str, opened: bool) -> None:
+    def _set_expanded(self, key: str, opened: bool) -> None:
         row = self.model.row_at(self.model.index_of(key))
         if row is None or (opened and row.topic):
             return
         (self._opened.add if opened else self._opened.discard)(row.node.key)
         self.rebuild()
-        self.table.choose(NodeRow(row.node).key)
+        self.table.select_key(NodeRow(row.node).key)
 
     def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._parameters.watching,)
@@ -194,22 +194,22 @@ class NodesPanel(NetworkTable[NodeRow]):
 class _NodeTable(TableView[NodeRow]):
     """Table of nodes; Right expands the selected node, Left collapses it."""
 
-    fold_wanted = Signal(str, bool)
+    expand_requested = Signal(str, bool)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key = self.chosen_key()
+        key = self.selected_key()
         if key is not None and event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right}:
             self.keyboard = True
-            self.fold_wanted.emit(key, event.key() == Qt.Key.Key_Right)
+            self.expand_requested.emit(key, event.key() == Qt.Key.Key_Right)
         else:
             super().keyPressEvent(event)
 
 
 def _haystack(node: NodeEntry) -> str:
     topics = " ".join((*node.publishes, *node.subscribes))
-    network = network_words(node.network)
+    network = network_label(node.network)
     facts = f"{node.name} {node.host} {node.pid} {node.language} {node.generation} {network}"
     return f"{facts} {topics}".casefold()
 
 
-PANEL = Panel("nodes", WORDS.title, "network", (), NodesPanel)
+PANEL = Panel("nodes", TABLE_TEXTS.title, "network", (), NodesPanel)

@@ -10,10 +10,10 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.networks.parameters import (
-    EDITED_LETTERS,
+    MAX_TEXT_LENGTH,
     NodeParameters,
     ShownParameter,
-    refusal_of,
+    read_only_reason,
     text_of,
 )
 from app.ui.text import plain
@@ -22,16 +22,16 @@ from app.ui.widgets import Button, ComboBox, ElidedLabel, Separator, label, pain
 from app.ui.widgets.menus import EditMenu
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.view import TableView
-from nep.i18n import _, lazy, listed
+from nep.i18n import _, format_list, lazy
 from nep.text import shortened
 
-CHANGE_MARK_S = 0.8
+CHANGE_HIGHLIGHT_S = 0.8
 MAX_SHOWN_CHARS = 200
 MAX_SHOWN_CHOICES = 6
 LINE, CHOICE = range(2)
 
 
-def allowed_words(parameter: ShownParameter) -> str:
+def allowed_values_text(parameter: ShownParameter) -> str:
     """Describe the allowed values of a parameter, such as "0 to 2", "walk, run or crawl" or "read only".
 
     Return "" if every value is allowed.
@@ -40,7 +40,9 @@ def allowed_words(parameter: ShownParameter) -> str:
         return _("read only")
     if parameter.choices:
         some = [shortened(text_of(each), 40) for each in parameter.choices[:MAX_SHOWN_CHOICES]]
-        return ", ".join(some) + " …" if len(parameter.choices) > MAX_SHOWN_CHOICES else listed(some, "or")
+        return (
+            ", ".join(some) + " …" if len(parameter.choices) > MAX_SHOWN_CHOICES else format_list(some, "or")
+        )
     least, most = parameter.minimum, parameter.maximum
     if least is not None and most is not None:
         return _("{least} to {most}").format(least=text_of(least), most=text_of(most))
@@ -49,7 +51,7 @@ def allowed_words(parameter: ShownParameter) -> str:
     return _("{most} or less").format(most=text_of(most)) if most is not None else ""
 
 
-class ParametersPart(QWidget):
+class ParametersView(QWidget):
     """Table of parameters with an editor for the selected one below it."""
 
     def __init__(self, theme: Theme, parameters: NodeParameters) -> None:
@@ -65,20 +67,20 @@ class ParametersPart(QWidget):
         self.table = TableView(theme, self.model)
         self.table.setAccessibleName(_("Parameters"))
         self.table.setMinimumHeight(3 * self.table.row_height)
-        self.table.opened.connect(lambda _name: self._edit())
-        self.table.selectionModel().currentChanged.connect(self._chosen)
+        self.table.opened.connect(lambda _name: self._focus_editor())
+        self.table.selectionModel().currentChanged.connect(self._selection_changed)
         self.name = label("", "code")
         self.name.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.field = ValueField(theme, self._set, self._leave)
-        self.field.textEdited.connect(self._note_edit)
+        self.field = ValueField(theme, self._submit, self._cancel_edit)
+        self.field.textEdited.connect(self._mark_edited)
         self.choice = ComboBox(theme)
-        self.choice.activated.connect(lambda _index: self._set())
+        self.choice.activated.connect(lambda _index: self._submit())
         self.editors = QStackedWidget()
         self.editors.addWidget(self.field)
         self.editors.addWidget(self.choice)
         self.editors.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.button = Button(theme, _("Set"), size="small")
-        self.button.clicked.connect(self._set)
+        self.button.clicked.connect(self._submit)
         self.sentence = label("", "small", role="textTertiary", wrap=True)
         self.sentence.setMinimumWidth(0)
         self._strip = QWidget()
@@ -106,25 +108,25 @@ class ParametersPart(QWidget):
 
     def _columns(self) -> tuple[Column[ShownParameter], ...]:
         return (
-            Column("parameter", lazy("Parameter"), 96, self._name_cell, stretch=True, tip=_tip),
+            Column("parameter", lazy("Parameter"), 96, self._name_cell, stretch=True, tip=_tooltip),
             Column("value", lazy("Value"), 130, self._value_cell, tip=lambda p: p.text[:2000]),
-            Column("allowed", lazy("Allowed"), 124, _allowed_cell, tip=allowed_words, yields=1),
+            Column("allowed", lazy("Allowed"), 124, _allowed_cell, tip=allowed_values_text, hide_order=1),
         )
 
-    def _ink(self, role: str) -> str:
+    def _text_role(self, role: str) -> str:
         node = self.parameters.node
-        is_here = node is not None and node.gone_s is None and not node.stale
+        is_here = node is not None and node.gone_s is None and not node.is_stale
         return role if is_here else "textDisabled"
 
     def _name_cell(self, parameter: ShownParameter) -> Cell:
-        return Cell(parameter.name, role=self._ink("text"), mono=True, middle=True)
+        return Cell(parameter.name, role=self._text_role("text"), mono=True, elide_middle=True)
 
     def _value_cell(self, parameter: ShownParameter) -> Cell:
         words = shortened(parameter.text, MAX_SHOWN_CHARS)
         changed = self.parameters.changed.get(parameter.name)
-        if changed is not None and self.clock() - changed < CHANGE_MARK_S:
+        if changed is not None and self.clock() - changed < CHANGE_HIGHLIGHT_S:
             return Cell(words, role="changed", mono=True, tint="changedTint")
-        return Cell(words, role=self._ink("text"), mono=True)
+        return Cell(words, role=self._text_role("text"), mono=True)
 
     # -- display ------------------------------------------------------------------------------------------
 
@@ -135,20 +137,20 @@ class ParametersPart(QWidget):
         node = parameters.node
         if node is None:
             return
-        facts = (parameters.revision, node.key, node.gone_s is None, node.may_set, node.stale)
+        facts = (parameters.revision, node.key, node.gone_s is None, node.can_set_parameters, node.is_stale)
         if facts != self._seen:
             another = not self._seen or facts[1] != self._seen[1]
             self._seen = facts
             if another:
                 self._edited = False
-            self.title.setText(self._title())
+            self.title.setText(self._title_text())
             self.model.set_rows(parameters.all)
-            self._show_chosen()
-            self._fades_until = self.clock() + 2 * CHANGE_MARK_S
+            self._show_selected()
+            self._fades_until = self.clock() + 2 * CHANGE_HIGHLIGHT_S
         if self.clock() < self._fades_until:  # repaint while highlights of changes fade
-            self.table.tell_visible_changed()
+            self.table.refresh_visible()
 
-    def _title(self) -> str:
+    def _title_text(self) -> str:
         parameters = self.parameters
         name = parameters.node.name if parameters.node is not None else ""
         if parameters.problem:
@@ -158,18 +160,18 @@ class ParametersPart(QWidget):
         return said.format(node=name)
 
     @property
-    def chosen(self) -> ShownParameter | None:
+    def selected(self) -> ShownParameter | None:
         """Selected parameter, or None."""
         row = self.model.row_at(self.table.currentIndex())
         return self.parameters.find(row.name) if row is not None else None
 
-    def _chosen(self, _now: QModelIndex, _before: QModelIndex) -> None:
+    def _selection_changed(self, _now: QModelIndex, _before: QModelIndex) -> None:
         self._edited = False
         self.parameters.refusal = ""
-        self._show_chosen()
+        self._show_selected()
 
-    def _show_chosen(self) -> None:
-        parameter, node = self.chosen, self.parameters.node
+    def _show_selected(self) -> None:
+        parameter, node = self.selected, self.parameters.node
         shown = parameter is not None and node is not None
         for widget in (self.name, self.editors, self.button):
             paint.show_when(widget, shown)
@@ -177,8 +179,8 @@ class ParametersPart(QWidget):
             self._set_status(_("Choose a parameter to change its value."))
             return
         self.name.setText(parameter.name)
-        self.name.setToolTip(plain.tip(_tip(parameter)))
-        why_not = refusal_of(node, parameter)
+        self.name.setToolTip(plain.tip(_tooltip(parameter)))
+        why_not = read_only_reason(node, parameter)
         options = [text_of(each) for each in parameter.choices]
         if parameter.kind == "bool" and not options:
             options = ["false", "true"]
@@ -191,7 +193,7 @@ class ParametersPart(QWidget):
         self.choice.setEnabled(not why_not)
         self.button.setEnabled(not why_not and not waits)
         paint.show_when(self.button, not options)
-        self._say_about(parameter, why_not, waits=waits)
+        self._update_status(parameter, why_not, waits=waits)
 
     def _show_editor(self, parameter: ShownParameter, options: list[str]) -> None:
         now = parameter.text
@@ -205,19 +207,19 @@ class ParametersPart(QWidget):
                     self.choice.addItem(shortened(each, MAX_SHOWN_CHARS), each)
             self.choice.set_value(now)
         elif not self._edited and self.field.text() != now:
-            self.field.setText(now[:EDITED_LETTERS])
+            self.field.setText(now[:MAX_TEXT_LENGTH])
 
-    def _say_about(self, parameter: ShownParameter, why_not: str, *, waits: bool) -> None:
+    def _update_status(self, parameter: ShownParameter, why_not: str, *, waits: bool) -> None:
         refusal = self.parameters.refusal
         self.field.mark(wrong=bool(refusal))
         if refusal:
-            self._set_status(_sentence(refusal), "error")
+            self._set_status(_as_sentence(refusal), "error")
         elif waits:
             self._set_status(_("Waiting for the node's reply"))
         elif why_not:
-            self._set_status(_sentence(why_not))
+            self._set_status(_as_sentence(why_not))
         else:
-            words = (shortened(parameter.description, 300), allowed_words(parameter))
+            words = (shortened(parameter.description, 300), allowed_values_text(parameter))
             self._set_status("; ".join(filter(None, words)))
 
     def _set_status(self, words: str, role: str = "textTertiary") -> None:
@@ -229,29 +231,29 @@ class ParametersPart(QWidget):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def _note_edit(self, _text: str) -> None:
+    def _mark_edited(self, _text: str) -> None:
         self._edited = True
 
-    def _edit(self) -> None:
+    def _focus_editor(self) -> None:
         editor = self.choice if self.editors.currentIndex() == CHOICE else self.field
         if editor.isEnabled():
             editor.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _leave(self) -> None:
+    def _cancel_edit(self) -> None:
         self._edited = False
         self.parameters.refusal = ""
-        self._show_chosen()
+        self._show_selected()
         self.table.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _set(self) -> None:
-        parameter = self.chosen
+    def _submit(self) -> None:
+        parameter = self.selected
         if parameter is None:
             return
         by_choice = self.editors.currentIndex() == CHOICE
         self.parameters.set(parameter.name, self.choice.value if by_choice else self.field.text())
         self._edited = True  # keep the typed text until the node has confirmed it
         self._waits = bool(self.parameters.setting)
-        self._show_chosen()
+        self._show_selected()
 
 
 class ValueField(QLineEdit):
@@ -280,13 +282,13 @@ class ValueField(QLineEdit):
             super().keyPressEvent(event)
 
 
-def _tip(parameter: ShownParameter) -> str:
+def _tooltip(parameter: ShownParameter) -> str:
     return "\n".join(filter(None, (parameter.name, shortened(parameter.description, 1000))))
 
 
 def _allowed_cell(parameter: ShownParameter) -> Cell:
-    return Cell(allowed_words(parameter), role="textTertiary")
+    return Cell(allowed_values_text(parameter), role="textTertiary")
 
 
-def _sentence(words: str) -> str:
+def _as_sentence(words: str) -> str:
     return f"{words[:1].upper()}{words[1:]}."

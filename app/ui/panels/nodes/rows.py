@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 from app.core.network.nodes import NodeEntry
 from app.core.network.topics import key_of
-from app.core.networks.kinds import kind_named
-from app.ui.text.nodes import cpu_words, generation_words
-from app.ui.text.numbers import age_words
+from app.core.networks.kinds import find_kind
+from app.ui.text.nodes import cpu_text, generation_text
+from app.ui.text.numbers import age_text
 from app.ui.widgets.table.model import Cell, Column, Order
 from nep.i18n import _, lazy, pgettext, plazy
 from nep.protocol.graph_view import BRIDGES_TOPIC
@@ -19,15 +19,15 @@ from nep.protocol.topic_pattern import is_pattern
 
 PUBLISHES, SUBSCRIBES = lazy("publishes"), lazy("subscribes")
 INDENT = 19
-UNSERVED = frozenset({"0.5.4.6", "0.5.4.7"})
-NOT_SERVED = lazy(
+UNSUPPORTED_VERSIONS = frozenset({"0.5.4.6", "0.5.4.7"})
+UNSUPPORTED_TEXT = lazy(
     "NEP {version} is not supported: other versions can't decode its messages. Install 0.5.4.8 or 0.5.4.5."
 )
-LIMITS = lazy(
+ORIGINAL_LIMITS = lazy(
     "A program that uses {nep}. It sends no sequence numbers or time stamps, so losses and "
     "message ages are unknown."
 )
-LIMITS_OF_NETWORK = lazy(
+NETWORK_LIMITS = lazy(
     "A node of {network}. This network doesn't report its process, start time or processor load."
 )
 ORIGINAL = lazy("original NEP")
@@ -43,20 +43,20 @@ class NodeRow:
     """Row of a node, or of one of its topics. `rate` returns a topic's rate as text."""
 
     node: NodeEntry
-    opened: bool = False
-    way: str = ""
+    is_expanded: bool = False
+    direction: str = ""
     topic: str = ""
     rate: Callable[[str], str] | None = None
 
     @property
     def key(self) -> str:
         """Stable key of the row."""
-        return f"{self.node.key} {self.way} {self.topic}"
+        return f"{self.node.key} {self.direction} {self.topic}"
 
     @property
     def is_pattern(self) -> bool:
         """True if the row's node subscribes to a pattern instead of a single topic."""
-        return self.way == SUBSCRIBES and is_pattern(self.topic)
+        return self.direction == SUBSCRIBES and is_pattern(self.topic)
 
     @property
     def topic_key(self) -> str:
@@ -74,10 +74,10 @@ def rows_of(
     rows: list[NodeRow] = []
     for head in order.sort([NodeRow(node, node.key in opened) for node in nodes]):
         rows.append(head)
-        if head.opened:
+        if head.is_expanded:
             node = head.node
-            rows += [NodeRow(node, way=PUBLISHES, topic=topic, rate=rate) for topic in node.publishes]
-            rows += [NodeRow(node, way=SUBSCRIBES, topic=topic, rate=rate) for topic in node.subscribes]
+            rows += [NodeRow(node, direction=PUBLISHES, topic=topic, rate=rate) for topic in node.publishes]
+            rows += [NodeRow(node, direction=SUBSCRIBES, topic=topic, rate=rate) for topic in node.subscribes]
     return rows
 
 
@@ -86,25 +86,25 @@ def limits_of(node: NodeEntry) -> str:
 
     Return "" for native nodes.
     """
-    kind = kind_named(node.network)
+    kind = find_kind(node.network)
     if kind is not None:
-        return "" if kind.tells_figures else _(LIMITS_OF_NETWORK).format(network=kind.words)
+        return "" if kind.reports_stats else _(NETWORK_LIMITS).format(network=kind.product_name)
     if node.is_bridge:
         return _(BRIDGE).format(topic=BRIDGES_TOPIC)
-    if node.generation in UNSERVED:
-        return _(NOT_SERVED).format(version=node.generation)
+    if node.generation in UNSUPPORTED_VERSIONS:
+        return _(UNSUPPORTED_TEXT).format(version=node.generation)
     if not node.is_original:
         return ""
-    return _(LIMITS).format(nep=_(VERSIONS.get(node.generation, ORIGINAL)))
+    return _(ORIGINAL_LIMITS).format(nep=_(VERSIONS.get(node.generation, ORIGINAL)))
 
 
-def lack_of_parameters(node: NodeEntry) -> str:
+def no_parameters_reason(node: NodeEntry) -> str:
     """Return the reason why a node has no parameters; "" if it has some."""
     if node.has_parameters or node.is_original or node.gone_s is not None:
         return ""
-    kind = kind_named(node.network)
-    if kind is not None and not kind.tells_figures:
-        return _("Parameters of nodes on {network} can't be read.").format(network=kind.words)
+    kind = find_kind(node.network)
+    if kind is not None and not kind.reports_stats:
+        return _("Parameters of nodes on {network} can't be read.").format(network=kind.product_name)
     return _("This node has no parameters. Programs declare them with {call}.").format(
         call="node.parameters.declare"
     )
@@ -126,53 +126,55 @@ def facts_of(node: NodeEntry) -> str:
     return ", ".join(parts)
 
 
-def _ink(row: NodeRow, role: str) -> str:
-    return role if row.node.gone_s is None and not row.node.stale else "textDisabled"
+def _text_role(row: NodeRow, role: str) -> str:
+    return role if row.node.gone_s is None and not row.node.is_stale else "textDisabled"
 
 
 def name_cell(row: NodeRow) -> Cell:
     """Return the cell with a node's name and arrow, bold while the node is new; topics are indented."""
     gone = row.node.gone_s is not None
     if row.topic:
-        return Cell(row.topic, role=_ink(row, "text"), mono=True, struck=gone, indent=INDENT, middle=True)
-    chip = pgettext("node", "new") if row.node.new and not gone else None
-    icon = "chevron-down" if row.opened else "chevron-right"
-    return Cell(row.node.name, icon, _ink(row, "text"), bold=bool(chip), struck=gone, chip=chip)
+        return Cell(
+            row.topic, role=_text_role(row, "text"), mono=True, struck=gone, indent=INDENT, elide_middle=True
+        )
+    chip = pgettext("node", "new") if row.node.is_new and not gone else None
+    icon = "chevron-down" if row.is_expanded else "chevron-right"
+    return Cell(row.node.name, icon, _text_role(row, "text"), bold=bool(chip), struck=gone, chip=chip)
 
 
 def generation_cell(row: NodeRow) -> Cell:
     """Return the cell with a node's kind (native, original, bridge), or a topic's direction and rate."""
     if row.topic:
-        rate = row.rate(row.topic_key) if row.rate is not None and row.way == PUBLISHES else ""
-        said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.way)
+        rate = row.rate(row.topic_key) if row.rate is not None and row.direction == PUBLISHES else ""
+        said = _("publishes {rate}/s").format(rate=rate) if rate else _(row.direction)
         if row.is_pattern:
             said = _("all matching topics")
-        return Cell(said, role=_ink(row, "textTertiary"))
+        return Cell(said, role=_text_role(row, "textTertiary"))
     if row.node.is_bridge:
-        return Cell(pgettext("node", "bridge"), "arrow-left-right", _ink(row, "textSecondary"))
-    if row.node.generation in UNSERVED:
-        return Cell(generation_words(row.node), "triangle-alert", _ink(row, "warn"))
+        return Cell(pgettext("node", "bridge"), "arrow-left-right", _text_role(row, "textSecondary"))
+    if row.node.generation in UNSUPPORTED_VERSIONS:
+        return Cell(generation_text(row.node), "triangle-alert", _text_role(row, "warn"))
     icon = "plug" if row.node.is_original else "waypoints" if row.node.network else None
-    return Cell(generation_words(row.node), icon, _ink(row, "textSecondary"))
+    return Cell(generation_text(row.node), icon, _text_role(row, "textSecondary"))
 
 
 def cpu_cell(row: NodeRow) -> Cell:
     """Return the cell with the CPU share, the time since the node left, or "not reported"."""
-    kind = kind_named(row.node.network)
-    if row.topic or row.node.gone_s is not None or kind is None or kind.tells_figures:
-        return _of_node(_cpu)(row)
+    kind = find_kind(row.node.network)
+    if row.topic or row.node.gone_s is not None or kind is None or kind.reports_stats:
+        return _node_cell(_cpu)(row)
     if row.node.cpu_ratio is not None:
-        return _of_node(_cpu)(row)
-    return Cell(pgettext("figure", "not reported"), role=_ink(row, "textTertiary"))
+        return _node_cell(_cpu)(row)
+    return Cell(pgettext("figure", "not reported"), role=_text_role(row, "textTertiary"))
 
 
-def _of_node(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable[[NodeRow], Cell]:
-    return lambda row: Cell() if row.topic else Cell(cell(row.node), role=_ink(row, role))
+def _node_cell(cell: Callable[[NodeEntry], str], role: str = "text") -> Callable[[NodeRow], Cell]:
+    return lambda row: Cell() if row.topic else Cell(cell(row.node), role=_text_role(row, role))
 
 
 def _cpu(node: NodeEntry) -> str:
     return (
-        cpu_words(node.cpu_ratio)
+        cpu_text(node.cpu_ratio)
         if node.gone_s is None
         else _("gone for {seconds} s").format(seconds=int(node.gone_s))
     )
@@ -181,7 +183,7 @@ def _cpu(node: NodeEntry) -> str:
 def _since(node: NodeEntry) -> str:
     if not node.since_ns or node.gone_s is not None:
         return ""
-    return age_words(max(0.0, time.time() - node.since_ns / 1e9))
+    return age_text(max(0.0, time.time() - node.since_ns / 1e9))
 
 
 def _name_tip(row: NodeRow) -> str:
@@ -190,7 +192,7 @@ def _name_tip(row: NodeRow) -> str:
     if row.is_pattern:
         said = _("{node} subscribes to all topics that match {pattern}")
         return said.format(node=row.node.name, pattern=row.topic)
-    said = _("{node} publishes {topic}") if row.way == PUBLISHES else _("{node} subscribes to {topic}")
+    said = _("{node} publishes {topic}") if row.direction == PUBLISHES else _("{node} subscribes to {topic}")
     return said.format(node=row.node.name, topic=row.topic)
 
 
@@ -198,13 +200,13 @@ def _generation_tip(row: NodeRow) -> str:
     if row.topic:
         return _name_tip(row)
     if row.node.network:
-        return limits_of(row.node) or _("On {network}").format(network=generation_words(row.node))
+        return limits_of(row.node) or _("On {network}").format(network=generation_text(row.node))
     said = _("Uses nep: messages have sequence numbers and time stamps, and losses are counted")
     return limits_of(row.node) or said
 
 
 def _cpu_tip(row: NodeRow) -> str:
-    kind = kind_named(row.node.network)
+    kind = find_kind(row.node.network)
     if kind is not None and row.node.cpu_ratio is None:
         return limits_of(row.node)
     return _("Share of one processor core used by the process in the last second")
@@ -221,29 +223,29 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
         tip=_generation_tip,
     ),
     Column(
-        "language", plazy("of a program", "Language"), 78, _of_node(lambda n: n.language, "textSecondary"),
-        lambda r: r.node.language, yields=4,
+        "language", plazy("of a program", "Language"), 78, _node_cell(lambda n: n.language, "textSecondary"),
+        lambda r: r.node.language, hide_order=4,
     ),
     Column(
-        "host", lazy("Host"), 110, _of_node(lambda n: n.host, "textSecondary"),
-        lambda r: r.node.host, yields=3,
+        "host", lazy("Host"), 110, _node_cell(lambda n: n.host, "textSecondary"),
+        lambda r: r.node.host, hide_order=3,
     ),
     Column(
-        "pid", lazy("PID"), 66, _of_node(lambda n: str(n.pid) if n.pid is not None else ""),
-        lambda r: r.node.pid, figures=True, yields=5,
+        "pid", lazy("PID"), 66, _node_cell(lambda n: str(n.pid) if n.pid is not None else ""),
+        lambda r: r.node.pid, is_numeric=True, hide_order=5,
     ),
-    Column("cpu", lazy("CPU"), 66, cpu_cell, lambda r: r.node.cpu_ratio, figures=True, tip=_cpu_tip),
+    Column("cpu", lazy("CPU"), 66, cpu_cell, lambda r: r.node.cpu_ratio, is_numeric=True, tip=_cpu_tip),
     Column(
-        "publishes", lazy("Publishes"), 80, _of_node(lambda n: str(len(n.publishes))),
-        lambda r: len(r.node.publishes), figures=True, yields=1,
-    ),
-    Column(
-        "subscribes", lazy("Subscribes"), 86, _of_node(lambda n: str(len(n.subscribes))),
-        lambda r: len(r.node.subscribes), figures=True, yields=2,
+        "publishes", lazy("Publishes"), 80, _node_cell(lambda n: str(len(n.publishes))),
+        lambda r: len(r.node.publishes), is_numeric=True, hide_order=1,
     ),
     Column(
-        "since", lazy("Uptime"), 62, _of_node(_since),
-        lambda r: r.node.since_ns, figures=True, yields=6,
+        "subscribes", lazy("Subscribes"), 86, _node_cell(lambda n: str(len(n.subscribes))),
+        lambda r: len(r.node.subscribes), is_numeric=True, hide_order=2,
+    ),
+    Column(
+        "since", lazy("Uptime"), 62, _node_cell(_since),
+        lambda r: r.node.since_ns, is_numeric=True, hide_order=6,
     ),
 )  # fmt: skip
 
@@ -251,8 +253,8 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
 def columns(own: Callable[[NodeEntry], bool]) -> tuple[Column[NodeRow], ...]:
     """Return the columns. Nodes for which `own` returns True are never shown as new."""
 
-    def named(row: NodeRow) -> Cell:
+    def node_name_cell(row: NodeRow) -> Cell:
         cell = name_cell(row)
         return replace(cell, bold=False, chip=None) if cell.chip and own(row.node) else cell
 
-    return (replace(COLUMNS[0], cell=named), *COLUMNS[1:])
+    return (replace(COLUMNS[0], cell=node_name_cell), *COLUMNS[1:])

@@ -16,4 +16,4 @@ def _make(context: PanelContext) -> PanelWidget:
     return PlotPanel(context)
 
 
-PANEL = Panel("plot", lazy("Plot"), "chart-line", (), _make, several=True)
+PANEL = Panel("plot", lazy("Plot"), "chart-line", (), _make, allows_multiple=True)

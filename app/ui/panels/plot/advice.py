@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.series.curves import Curves, topics_of
-from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.panels.plot.shown_curve import PlotCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label
 from app.ui.widgets.buttons import LinkButton
@@ -38,9 +38,9 @@ class PlotAdvice(QWidget):
         """Return the text of the hint, or ""."""
         return self._words.text()
 
-    def show_for(self, curves: Curves, shown: Sequence[ShownCurve]) -> None:
+    def show_for(self, curves: Curves, shown: Sequence[PlotCurve]) -> None:
         """Show the hint that applies to these curves, or hide the line."""
-        said = next(filter(None, (curves.advice(each.curve) for each in shown)), "")
+        said = next(filter(None, (curves.no_values_reason(each.curve) for each in shown)), "")
         empty = [each for each in shown if not said and not _has_any(each)]
         topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []
         self.topic = topics[0] if topics else ""
@@ -51,6 +51,6 @@ class PlotAdvice(QWidget):
         show_when(self, bool(said))
 
 
-def _has_any(shown: ShownCurve) -> bool:
+def _has_any(shown: PlotCurve) -> bool:
     curve = shown.curve
     return bool(len(curve.samples) or (curve.states is not None and len(curve.states)))

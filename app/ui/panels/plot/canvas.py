@@ -32,15 +32,15 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QGraphicsView
 
 from app.core.series.samples import Line
-from app.ui.panels.plot.shown_curve import MINUS, ShownCurve
-from app.ui.text.numbers import seconds_words
+from app.ui.panels.plot.shown_curve import MINUS, PlotCurve
+from app.ui.text.numbers import seconds_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.field_drag import dropped_field
 from nep.i18n import _, number
 
 AXIS_WIDTH, AXIS_HEIGHT = 54, 24
-FLAG = QSize(22, 19)
+FLAG_SIZE = QSize(22, 19)
 FLAG_SPACE = 24  # px, reserved for the flags of the cursors
 ZOOM_STEP = 1.2
 MIN_WINDOW_S, MAX_WINDOW_S = 1e-4, 1e9
@@ -49,10 +49,10 @@ MAX_ANTIALIASED_POINTS = 3000
 DENSE_LINE_MARKS, DENSE_TRAVEL_RATIO = 5, 5.0
 TICK_SPACING_X, TICK_SPACING_Y = 84, 34  # minimum distance of ticks in px
 LABEL_OVERHANG = 60
-FARTHEST = 1e300
+MAX_ABS_VALUE = 1e300
 """Absolute value above which values are clipped, because they would overflow in the axis calculations."""
 HIT_WIDTH_PX = 10  # px
-BETWEEN_ALPHA = 0.045
+CURSOR_RANGE_ALPHA = 0.045
 
 
 @dataclass(slots=True)
@@ -64,7 +64,7 @@ class ValueRange:
 
     low: float = 0.0
     high: float = 1.0
-    held: bool = False
+    is_manual: bool = False
     is_new: bool = True
 
     def fit(self, low: float, high: float) -> bool:
@@ -72,14 +72,14 @@ class ValueRange:
 
         Return True if it changed.
         """
-        if self.held or not (math.isfinite(low) and math.isfinite(high)):
+        if self.is_manual or not (math.isfinite(low) and math.isfinite(high)):
             return False
         span = high - low
         inside = self.low <= low and high <= self.high and not self.is_new
         if inside and span >= 0.5 * (self.high - self.low):
             return False
         room = span * 0.08 or abs(high) * 0.1 or 1.0
-        self.low, self.high = max(-FARTHEST, low - room), min(FARTHEST, high + room)
+        self.low, self.high = max(-MAX_ABS_VALUE, low - room), min(MAX_ABS_VALUE, high + room)
         self.is_new = False
         return True
 
@@ -96,10 +96,10 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
         return QRectF(super().boundingRect()).adjusted(-LABEL_OVERHANG, 0, LABEL_OVERHANG, 0)
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
-        return readable(super().tickSpacing(least, most, size), most - least, size, TICK_SPACING_X)
+        return readable_levels(super().tickSpacing(least, most, size), most - least, size, TICK_SPACING_X)
 
     def tickStrings(self, values: Sequence[float], _scale: float, spacing: float) -> list[str]:
-        return [self.clock if abs(value) < spacing / 100 else time_words(value, spacing) for value in values]
+        return [self.clock if abs(value) < spacing / 100 else time_label(value, spacing) for value in values]
 
 
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]
@@ -107,13 +107,13 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
         apart = TICK_SPACING_Y if self.orientation in {"left", "right"} else TICK_SPACING_X
-        return readable(super().tickSpacing(least, most, size), most - least, size, apart)
+        return readable_levels(super().tickSpacing(least, most, size), most - least, size, apart)
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
-        return [axis_words(value * scale, spacing * scale) for value in values]
+        return [value_label(value * scale, spacing * scale) for value in values]
 
 
-def readable(
+def readable_levels(
     levels: list[tuple[float, float]], span: float, size: float, apart: float
 ) -> list[tuple[float, float]]:
     """Return the finest of pyqtgraph's tick levels whose labels are at least `apart` px apart."""
@@ -121,7 +121,7 @@ def readable(
     return fitting[-1:] or levels[:1]
 
 
-def time_words(value_s: float, spacing_s: float) -> str:
+def time_label(value_s: float, spacing_s: float) -> str:
     """Format the label of a time tick, in s or min relative to the right end."""
     if spacing_s >= 60:
         words = _("{minutes} min").format(minutes=number(round(abs(value_s) / 60, 3)))
@@ -131,7 +131,7 @@ def time_words(value_s: float, spacing_s: float) -> str:
     return f"{MINUS if value_s < 0 else '+'}{words}"
 
 
-def axis_words(value: float, spacing: float) -> str:
+def value_label(value: float, spacing: float) -> str:
     """Format the label of a value tick."""
     if value and not 1e-4 <= abs(spacing) < 1e6:
         return number(value, ".3g").replace("-", MINUS)
@@ -149,7 +149,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
     zoomed = Signal(float, float)  # factor, time at the mouse in s
     moved = Signal(float)  # shift in s
     values_changed = Signal()
-    all_wanted = Signal()
+    show_all_requested = Signal()
     cursor_moved = Signal(str, float)
     field_dropped = Signal(str, str)
 
@@ -159,11 +159,11 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.begin_s, self.end_s, self.anchor_s = -60.0, 0.0, 0.0
         self.cursors: dict[str, float] = {}
         # (curve, time, value) of the marks that identify dense lines
-        self.marks: list[tuple[ShownCurve, float, float]] = []
+        self.marks: list[tuple[PlotCurve, float, float]] = []
         self.mouse_s: float | None = None
         self.painted_s = 0.0  # accumulated processor time of painting
         # like `marks`, at fixed times on dense lines, which have no dashes
-        self.signs: list[tuple[ShownCurve, float, float]] = []
+        self.signs: list[tuple[PlotCurve, float, float]] = []
         self._lines: dict[str, pg.PlotCurveItem] = {}
         self._held: tuple[str, QPointF] | None = None
         self.ranges = {"left": ValueRange(), "right": ValueRange()}
@@ -194,12 +194,12 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             view.setMouseEnabled(x=False, y=False)
             view.disableAutoRange()
         self.right_view.setXLink(self.view)
-        self.view.sigResized.connect(self._fit_right)
+        self.view.sigResized.connect(self._sync_right_view)
         for axis in axes.values():
             axis.enableAutoSIPrefix(False)
             axis.setStyle(tickLength=0, autoExpandTextSpace=False, autoReduceTextSpace=False)
 
-    def _fit_right(self) -> None:
+    def _sync_right_view(self) -> None:
         self.right_view.setGeometry(self.view.sceneBoundingRect())
         self.right_view.linkedViewChanged(self.view, pg.ViewBox.XAxis)
 
@@ -253,7 +253,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         area, shown = area or self.area, self.ranges["right" if right else "left"]
         return area.bottom() - (value - shown.low) / (shown.high - shown.low) * area.height()
 
-    def show_lines(self, lines: Sequence[tuple[ShownCurve, Line]], clock_s: float) -> None:
+    def show_lines(self, lines: Sequence[tuple[PlotCurve, Line]], clock_s: float) -> None:
         """Draw these curves; `clock_s` is the time of day at the anchor, in s since 1970."""
         shown = {curve.name for curve, _line in lines}
         for name in [name for name in self._lines if name not in shown]:
@@ -265,12 +265,12 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         for place, (curve, line) in enumerate(lines):
             self._show_line(curve, line)
             if len(lines) > 1 and self._is_dense(line, right=curve.right):
-                self._add_signs(curve, place / len(lines))
+                self._add_marks(curve, place / len(lines))
         self._show_clock(clock_s)
         self.view.setXRange(self.begin_s - self.anchor_s, self.end_s - self.anchor_s, padding=0)
         self.viewport().update()
 
-    def _show_line(self, curve: ShownCurve, line: Line) -> None:
+    def _show_line(self, curve: PlotCurve, line: Line) -> None:
         item = self._lines.get(curve.name)
         view = self.right_view if curve.right else self.view
         if item is None:
@@ -283,21 +283,21 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         dense = self._is_dense(line, right=curve.right)
         item.setData(
             line.times - self.anchor_s,
-            np.clip(line.values, -FARTHEST, FARTHEST),
+            np.clip(line.values, -MAX_ABS_VALUE, MAX_ABS_VALUE),
             pen=curve.look.pen(self.theme, is_dense=dense),
             antialias=not dense,
         )
 
     def _is_dense(self, line: Line, *, right: bool) -> bool:
         # True for many points, and for steep oscillations.
-        if len(line.times) > MAX_ANTIALIASED_POINTS or not line.is_whole:
+        if len(line.times) > MAX_ANTIALIASED_POINTS or not line.is_complete:
             return True
         shown = self.ranges["right" if right else "left"]
         with np.errstate(over="ignore", invalid="ignore"):
             travelled = float(np.nansum(np.abs(np.diff(line.values)))) / (shown.high - shown.low)
         return not travelled * self.area.height() < DENSE_TRAVEL_RATIO * self.area.width()
 
-    def _add_signs(self, curve: ShownCurve, shift: float) -> None:
+    def _add_marks(self, curve: PlotCurve, shift: float) -> None:
         # Dense lines have no dashes; marks at fixed times identify them instead.
         step_s = (self.end_s - self.begin_s) / DENSE_LINE_MARKS
         first = math.floor(self.begin_s / step_s) + shift
@@ -307,7 +307,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             if found is not None and self.begin_s <= time_s <= self.end_s:
                 self.signs.append((curve, *found))
 
-    def _show_axes(self, curves: Sequence[ShownCurve]) -> None:
+    def _show_axes(self, curves: Sequence[PlotCurve]) -> None:
         for name, right in (("left", False), ("right", True)):
             there = [curve for curve in curves if curve.right is right]
             axis = self.plot.getAxis(name)
@@ -315,7 +315,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             axis.setTextPen(ink)
             axis.setStyle(showValues=bool(there))
 
-    def _fit_values(self, lines: Sequence[tuple[ShownCurve, Line]]) -> None:
+    def _fit_values(self, lines: Sequence[tuple[PlotCurve, Line]]) -> None:
         for name, right, view in (("left", False, self.view), ("right", True, self.right_view)):
             shown = self.ranges[name]
             found = [line.values for curve, line in lines if curve.right is right and len(line.values)]
@@ -335,7 +335,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             self.time_axis.picture = None
             self.time_axis.update()
 
-    def hold_values(self, factor: float = 1.0, shift: float = 0.0) -> None:
+    def scale_values(self, factor: float = 1.0, shift: float = 0.0) -> None:
         """Zoom the value axes by `factor`, or shift them by a share of their range.
 
         Holds them until `release_values`.
@@ -343,14 +343,14 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         for shown in self.ranges.values():
             middle, half = (shown.low + shown.high) / 2, (shown.high - shown.low) / 2 * factor
             middle += shift * 2 * half
-            if 1e-300 < half < FARTHEST and abs(middle) < FARTHEST:
-                shown.low, shown.high, shown.held = middle - half, middle + half, True
+            if 1e-300 < half < MAX_ABS_VALUE and abs(middle) < MAX_ABS_VALUE:
+                shown.low, shown.high, shown.is_manual = middle - half, middle + half, True
         self.values_changed.emit()
 
-    def release_values(self) -> None:
+    def reset_value_ranges(self) -> None:
         """Return to automatic ranges of the value axes."""
         for shown in self.ranges.values():
-            shown.held, shown.is_new = False, True
+            shown.is_manual, shown.is_new = False, True
         self.values_changed.emit()
 
     # -- cursors ------------------------------------------------------------------------------------------
@@ -372,7 +372,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         if len(places) == 2:
             left, right = sorted(min(max(x, area.left()), area.right()) for x in places.values())
             tint = theme.colour("text")
-            tint.setAlphaF(BETWEEN_ALPHA)
+            tint.setAlphaF(CURSOR_RANGE_ALPHA)
             painter.fillRect(QRectF(left, area.top(), right - left, area.height()), tint)
         pen = QPen(theme.colour("text"), 1.25)
         pen.setDashPattern([1.5, 2.5])
@@ -389,10 +389,13 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             paint.box(painter, flag, theme.radius("key"), theme.colour("tooltip"))
             font = theme.font("small")
             font.setWeight(QFont.Weight.DemiBold)
-            paint.words(painter, flag, name, font, theme.colour("tooltipText"), paint.CENTRE)
+            paint.text_line(painter, flag, name, font, theme.colour("tooltipText"), paint.CENTRE)
 
     def _flag(self, x: float) -> QRectF:
-        wide, high = self.theme.scaled(FLAG.width()), min(FLAG_SPACE - 2.0, self.theme.scaled(FLAG.height()))
+        wide, high = (
+            self.theme.scaled(FLAG_SIZE.width()),
+            min(FLAG_SPACE - 2.0, self.theme.scaled(FLAG_SIZE.height())),
+        )
         return QRectF(x - wide / 2, self.area.top() - high - 3, wide, high)
 
     def _paint_distance(self, painter: QPainter, places: dict[str, float]) -> None:
@@ -400,14 +403,14 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             return
         left, right = sorted(places.values())
         distance_s = abs(self.cursors["A"] - self.cursors["B"])
-        words = distance_words(distance_s)
+        words = distance_text(distance_s)
         font = self.theme.font("small")
         font.setWeight(QFont.Weight.DemiBold)
-        wide, edge = paint.width_of(font, words), self.theme.scaled(FLAG.width()) / 2
+        wide, edge = paint.width_of(font, words), self.theme.scaled(FLAG_SIZE.width()) / 2
         if right - left > wide + 2 * edge + 12:
             place = self._flag((left + right) / 2)
             box = QRectF(place.center().x() - wide / 2 - 1, place.top(), wide + 3, place.height())
-            paint.words(painter, box, words, font, self.theme.colour("text"), paint.CENTRE)
+            paint.text_line(painter, box, words, font, self.theme.colour("text"), paint.CENTRE)
 
     def _cursor_at(self, place: QPointF) -> str | None:
         # Hit test of the cursors' flags and lines.
@@ -443,7 +446,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         else:
             self.moved.emit(self.time_at(before.x()) - self.time_at(place.x()))
             if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
-                self.hold_values(shift=(place.y() - before.y()) / max(1.0, self.area.height()))
+                self.scale_values(shift=(place.y() - before.y()) / max(1.0, self.area.height()))
         self._held = (name, place)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -452,8 +455,8 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
-            self.release_values()
-            self.all_wanted.emit()
+            self.reset_value_ranges()
+            self.show_all_requested.emit()
 
     def leaveEvent(self, _event: object) -> None:
         self.mouse_s = None
@@ -462,7 +465,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         steps = (event.angleDelta().y() or event.angleDelta().x()) / 120
         factor = ZOOM_STEP ** -max(-5.0, min(5.0, steps))
         if event.modifiers() & Qt.KeyboardModifier.ControlModifier:
-            self.hold_values(factor)
+            self.scale_values(factor)
         else:
             self.zoomed.emit(factor, self.time_at(event.position().x()))
         event.accept()
@@ -488,12 +491,12 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             self.field_dropped.emit(*found)
 
 
-def distance_words(distance_s: float) -> str:
+def distance_text(distance_s: float) -> str:
     """Format the time between cursors A and B, such as "12 ms", "7.5 s" or "3 min"."""
     if distance_s < 1:
         return f"{number(distance_s * 1000, '.3g')} ms"
     return (
         f"{number(distance_s, '.2f' if distance_s < 10 else '.1f')} s"
         if distance_s < 120
-        else seconds_words(distance_s)
+        else seconds_text(distance_s)
     )

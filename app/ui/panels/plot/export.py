@@ -17,7 +17,7 @@ from app.core.series.csv_export import CsvColumn, columns_of, csv_lines
 from app.core.storage.atomic_file import write_atomically
 from app.ui.panels.base import PanelContext
 from app.ui.panels.plot.look import Stroke
-from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.panels.plot.shown_curve import PlotCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.file_dialogs import FileKind
@@ -83,12 +83,12 @@ class PlotPicture:
         self,
         theme: Theme,
         parts: Iterable[Part],
-        curves: Sequence[ShownCurve],
+        curves: Sequence[PlotCurve],
     ) -> None:
         self._theme, self._parts, self._curves = (
             theme,
             list(parts),
-            [each for each in curves if not each.hidden],
+            [each for each in curves if not each.is_hidden],
         )
 
     @property
@@ -111,9 +111,9 @@ class PlotPicture:
         row = self._theme.scaled(LEGEND_ROW_HEIGHT)
         for curve in self._curves:
             box = QRectF(12, top + 4, self.size.width() - 24, row)
-            Stroke(curve.look, curve.curve.is_state, hidden=False).paint(painter, box, self._theme)
+            Stroke(curve.look, curve.curve.is_state, is_hidden=False).paint(painter, box, self._theme)
             font = self._theme.font("code")
-            paint.words(painter, box.adjusted(46, 0, 0, 0), curve.name, font, self._theme.colour("text"))
+            paint.text_line(painter, box.adjusted(46, 0, 0, 0), curve.name, font, self._theme.colour("text"))
             top += row
 
     def png(self) -> bytes:
@@ -159,7 +159,7 @@ class PlotExport:
         self,
         context: PanelContext,
         parts: Callable[[], Iterable[Part]],
-        curves: Callable[[], Sequence[ShownCurve]],
+        curves: Callable[[], Sequence[PlotCurve]],
         shown: Callable[[], tuple[float, float]],
     ) -> None:
         self._context, self._parts, self._curves, self._shown = context, parts, curves, shown
@@ -170,13 +170,13 @@ class PlotExport:
         menu = Menu(self._context.theme, parent)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         for kind in (CSV, PNG, SVG):
-            action = menu.addAction(_(kind.words))
-            action.triggered.connect(lambda _on=False, kind=kind: self.ask_where(kind))
+            action = menu.addAction(_(kind.label))
+            action.triggered.connect(lambda _on=False, kind=kind: self.prompt_file(kind))
         return menu
 
-    def ask_where(self, kind: FileKind) -> None:
+    def prompt_file(self, kind: FileKind) -> None:
         """Ask for a file and export the plot in the format `kind`."""
-        suggestion = Path.home() / f"{_('Plot')}{kind.ending}"
+        suggestion = Path.home() / f"{_('Plot')}{kind.suffix}"
         kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
         self._context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
 
@@ -194,11 +194,11 @@ class PlotExport:
         if self._writer is not None and self._writer.pop_result() is None:
             self._context.toast(_("The previous export is still running"))
             return
-        curves = [each.curve for each in self._curves() if not each.hidden]
+        curves = [each.curve for each in self._curves() if not each.is_hidden]
         origin_ns = self._context.session.series.origin_ns
         self._writer = CsvWriter(path, columns_of(curves, *self._shown()), origin_ns)
 
-    def follow(self) -> None:
+    def poll(self) -> None:
         """Report a finished export; call on every tick."""
         if self._writer is not None and (failed := self._writer.pop_result()) is not None:
             self._report(self._writer.path, failed)

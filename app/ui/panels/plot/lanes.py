@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QSizePolicy, QToolTip, QWidget
 from app.core.series.states import StateRun
 from app.ui.panels.plot.canvas import PlotCanvas
 from app.ui.panels.plot.look import paint_state
-from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.panels.plot.shown_curve import PlotCurve
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -28,12 +28,12 @@ class StateLanes(QWidget):
     def __init__(self, theme: Theme, canvas: PlotCanvas) -> None:
         super().__init__()
         self._theme, self._canvas = theme, canvas
-        self.curves: Sequence[ShownCurve] = ()
+        self.curves: Sequence[PlotCurve] = ()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName(_("States"))
         theme.changed.connect(self.updateGeometry)
 
-    def show_curves(self, curves: Sequence[ShownCurve]) -> None:
+    def show_curves(self, curves: Sequence[PlotCurve]) -> None:
         """Show the states of these curves, at most eight; the legend lists all."""
         count = len(self.curves)
         self.curves = curves[:MAX_LANES]
@@ -51,7 +51,7 @@ class StateLanes(QWidget):
     def minimumSizeHint(self) -> QSize:
         return QSize(60, self.sizeHint().height())
 
-    def boxes(self) -> Iterator[tuple[ShownCurve, StateRun, QRectF]]:
+    def boxes(self) -> Iterator[tuple[PlotCurve, StateRun, QRectF]]:
         """Yield curve, run of equal values and rectangle of each visible run.
 
         For booleans, only the runs of true are included.
@@ -59,10 +59,10 @@ class StateLanes(QWidget):
         canvas, area = self._canvas, self._canvas.area
         for row, curve in enumerate(self.curves):
             states = curve.curve.states
-            if states is None or curve.hidden:
+            if states is None or curve.is_hidden:
                 continue
             top = row * self._lane()
-            is_yes_or_no = states.words(canvas.begin_s, canvas.end_s) <= {"true", "false"}
+            is_yes_or_no = states.values_in(canvas.begin_s, canvas.end_s) <= {"true", "false"}
             without = ("false",) if is_yes_or_no else ()
             pixel_s = (canvas.end_s - canvas.begin_s) / canvas.columns
             painted = -1.0  # right edge of the last box: one box per pixel is enough
@@ -91,13 +91,13 @@ class StateLanes(QWidget):
             ground = QRectF(area.left(), row * self._lane() + 1, area.width(), self._lane() - 1)
             painter.fillRect(ground, theme.colour("sunken"))
             name = QRectF(4, ground.top(), area.left() - 10, ground.height())
-            role = "textDisabled" if curve.hidden else "textSecondary"
-            paint.words(painter, name, short_name(curve.name), font, theme.colour(role), paint.RIGHT)
+            role = "textDisabled" if curve.is_hidden else "textSecondary"
+            paint.text_line(painter, name, short_name(curve.name), font, theme.colour(role), paint.RIGHT)
         for curve, run, box in self.boxes():
             paint_state(painter, theme, box, curve.look)
             if box.width() >= MIN_WORD_WIDTH:
                 inside = box.adjusted(6, 0, -4, 0)
-                paint.words(painter, inside, run.word or "", theme.font("small"), theme.colour("text"))
+                paint.text_line(painter, inside, run.value or "", theme.font("small"), theme.colour("text"))
         self._paint_cursors(painter)
 
     def _paint_cursors(self, painter: QPainter) -> None:
@@ -114,7 +114,7 @@ class StateLanes(QWidget):
     def event(self, event: QEvent) -> bool:
         if isinstance(event, QHelpEvent) and event.type() == QEvent.Type.ToolTip:
             place = QPointF(event.pos())
-            found = (run.word for _curve, run, box in self.boxes() if box.contains(place))
+            found = (run.value for _curve, run, box in self.boxes() if box.contains(place))
             word = next(found, None)
             row = int(place.y() // self._lane())
             name = self.curves[row].name if row < len(self.curves) else ""

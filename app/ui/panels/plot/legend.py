@@ -9,10 +9,10 @@ from PySide6.QtGui import QKeyEvent
 
 from app.core.series.curves import Curves
 from app.core.series.formula import FieldSource
-from app.core.series.samples import Figures
+from app.core.series.samples import RangeStats
 from app.ui.panels.plot.look import COLOURS, CurveLook, Stroke
-from app.ui.panels.plot.shown_curve import MINUS, ShownCurve, number_words, value_words
-from app.ui.text.numbers import grouped, seconds_words
+from app.ui.panels.plot.shown_curve import MINUS, PlotCurve, number_text, value_text
+from app.ui.text.numbers import group_digits, seconds_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Cell, Column, TableModel
@@ -20,27 +20,27 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy, ngettext, pgettext
 
 
-class LegendFigures:
+class LegendStats:
     """Statistics of curves within a time range, computed on request."""
 
     def __init__(self) -> None:
         self.begin_s = self.end_s = 0.0
         self.cursors: tuple[float, float] | None = None
-        self._kept: dict[str, Figures] = {}
+        self._kept: dict[str, RangeStats] = {}
 
-    def look_at(self, begin_s: float, end_s: float, cursors: tuple[float, float] | None) -> None:
+    def set_range(self, begin_s: float, end_s: float, cursors: tuple[float, float] | None) -> None:
         """Set the time range, and the times of cursors A and B."""
         self.begin_s, self.end_s, self.cursors = begin_s, end_s, cursors
         self._kept.clear()
 
-    def of(self, shown: ShownCurve) -> Figures:
+    def stats_for(self, shown: PlotCurve) -> RangeStats:
         """Return minimum, maximum and mean of a curve."""
         found = self._kept.get(shown.name)
         if found is None:
-            found = self._kept[shown.name] = shown.curve.samples.figures(self.begin_s, self.end_s)
+            found = self._kept[shown.name] = shown.curve.samples.stats(self.begin_s, self.end_s)
         return found
 
-    def at_cursor(self, shown: ShownCurve, which: int) -> float | str | None:
+    def at_cursor(self, shown: PlotCurve, which: int) -> float | str | None:
         """Return a curve's value at cursor A (0) or B (1)."""
         if self.cursors is None:
             return None
@@ -54,103 +54,106 @@ class LegendFigures:
 class _Cells:
     """Factory of the cells of each column."""
 
-    def __init__(self, figures: LegendFigures, is_gone: Callable[[ShownCurve], bool]) -> None:
+    def __init__(self, figures: LegendStats, is_gone: Callable[[PlotCurve], bool]) -> None:
         self.figures, self._is_gone = figures, is_gone
 
     @staticmethod
-    def _role(shown: ShownCurve) -> str:
-        return "textDisabled" if shown.hidden else "text"
+    def _role(shown: PlotCurve) -> str:
+        return "textDisabled" if shown.is_hidden else "text"
 
     @staticmethod
-    def eye(shown: ShownCurve) -> Cell:
-        name = "eye-off" if shown.hidden else "eye"
-        words = pgettext("curve", "hidden") if shown.hidden else pgettext("curve", "shown")
-        return Cell(icon=name, role="textTertiary" if shown.hidden else "textSecondary", said=words)
-
-    @staticmethod
-    def stroke(shown: ShownCurve) -> Cell:
-        look = shown.look
+    def eye(shown: PlotCurve) -> Cell:
+        name = "eye-off" if shown.is_hidden else "eye"
+        words = pgettext("curve", "hidden") if shown.is_hidden else pgettext("curve", "shown")
         return Cell(
-            mark=Stroke(look, shown.curve.is_state, shown.hidden), said=_(COLOURS[look.colour % len(COLOURS)])
+            icon=name, role="textTertiary" if shown.is_hidden else "textSecondary", accessible_text=words
         )
 
-    def name(self, shown: ShownCurve) -> Cell:
+    @staticmethod
+    def stroke(shown: PlotCurve) -> Cell:
+        look = shown.look
+        return Cell(
+            mark=Stroke(look, shown.curve.is_state, shown.is_hidden),
+            accessible_text=_(COLOURS[look.colour % len(COLOURS)]),
+        )
+
+    def name(self, shown: PlotCurve) -> Cell:
         is_field = isinstance(shown.curve.source, FieldSource)
         icon = None if is_field else "square-function"
         gone = self._is_gone(shown)
-        return Cell(shown.name, icon, self._role(shown), mono=True, middle=True, struck=gone)
+        return Cell(shown.name, icon, self._role(shown), mono=True, elide_middle=True, struck=gone)
 
-    def axis(self, shown: ShownCurve) -> Cell:
+    def axis(self, shown: PlotCurve) -> Cell:
         if shown.curve.is_state:
             words = _("yes or no") if isinstance(shown.curve.last, bool) else _("text")
         else:
             words = pgettext("axis", "right") if shown.right else pgettext("axis", "left")
-        return Cell(words, role="textSecondary" if not shown.hidden else "textDisabled")
+        return Cell(words, role="textSecondary" if not shown.is_hidden else "textDisabled")
 
-    def last(self, shown: ShownCurve) -> Cell:
-        return Cell(value_words(shown.curve.last), role=self._role(shown))
+    def last(self, shown: PlotCurve) -> Cell:
+        return Cell(value_text(shown.curve.last), role=self._role(shown))
 
-    def at_a(self, shown: ShownCurve) -> Cell:
-        return Cell(value_words(self.figures.at_cursor(shown, 0)), role=self._role(shown))
+    def at_a(self, shown: PlotCurve) -> Cell:
+        return Cell(value_text(self.figures.at_cursor(shown, 0)), role=self._role(shown))
 
-    def at_b(self, shown: ShownCurve) -> Cell:
-        return Cell(value_words(self.figures.at_cursor(shown, 1)), role=self._role(shown))
+    def at_b(self, shown: PlotCurve) -> Cell:
+        return Cell(value_text(self.figures.at_cursor(shown, 1)), role=self._role(shown))
 
-    def difference(self, shown: ShownCurve) -> Cell:
+    def difference(self, shown: PlotCurve) -> Cell:
         figures = self.figures
         if figures.cursors is None:
             return Cell()
         if shown.curve.is_state and shown.curve.states is not None:
             begin_s, end_s = sorted(figures.cursors)
             if isinstance(shown.curve.last, bool):
-                lasted = seconds_words(shown.curve.states.lasted_s("true", begin_s, end_s))
+                lasted = seconds_text(shown.curve.states.duration_s("true", begin_s, end_s))
                 words = _("true for {seconds}").format(seconds=lasted)
             else:
-                count = shown.curve.states.changes(begin_s, end_s)
+                count = shown.curve.states.change_count(begin_s, end_s)
                 words = ngettext("{count} change", "{count} changes", count).format(count=count)
             return Cell(words, role=self._role(shown), bold=True)
         first, second = figures.at_cursor(shown, 0), figures.at_cursor(shown, 1)
         if not (isinstance(first, float) and isinstance(second, float)):
             return Cell()
-        return Cell(number_words(second - first), role=self._role(shown), bold=True)
+        return Cell(number_text(second - first), role=self._role(shown), bold=True)
 
-    def figure(self, which: str) -> Callable[[ShownCurve], Cell]:
-        def cell(shown: ShownCurve) -> Cell:
-            found = None if shown.curve.is_state else getattr(self.figures.of(shown), which)
-            return Cell("" if found is None else number_words(found), role=self._role(shown))
+    def stat(self, which: str) -> Callable[[PlotCurve], Cell]:
+        def cell(shown: PlotCurve) -> Cell:
+            found = None if shown.curve.is_state else getattr(self.figures.stats_for(shown), which)
+            return Cell("" if found is None else number_text(found), role=self._role(shown))
 
         return cell
 
 
 def columns(
-    figures: LegendFigures, has_cursors: Callable[[], bool], is_gone: Callable[[ShownCurve], bool]
-) -> tuple[Column[ShownCurve], ...]:
+    figures: LegendStats, has_cursors: Callable[[], bool], is_gone: Callable[[PlotCurve], bool]
+) -> tuple[Column[PlotCurve], ...]:
     """Return the columns of the legend. Those for cursors A and B are hidden without cursors."""
     cells = _Cells(figures, is_gone)
     between = {"figures": True, "when": has_cursors}
     return (
-        Column("eye", "", 34, cells.eye, words=lazy("Shown")),
-        Column("stroke", "", 48, cells.stroke, words=lazy("Colour and axis")),
+        Column("eye", "", 34, cells.eye, label=lazy("Shown")),
+        Column("stroke", "", 48, cells.stroke, label=lazy("Colour and axis")),
         Column("name", lazy("Curve"), 150, cells.name, stretch=True, tip=lambda shown: shown.name),
-        Column("axis", lazy("Axis"), 84, cells.axis, yields=5),
-        Column("last", lazy("Last"), 74, cells.last, figures=True),
-        Column("a", "A", 70, cells.at_a, yields=2, **between),  # type: ignore[arg-type]
-        Column("b", "B", 70, cells.at_b, yields=2, **between),  # type: ignore[arg-type]
-        Column("difference", f"B {MINUS} A", 86, cells.difference, yields=1, **between),  # type: ignore[arg-type]
-        Column("min", lazy("Min"), 70, cells.figure("least"), figures=True, yields=4),
-        Column("max", lazy("Max"), 70, cells.figure("most"), figures=True, yields=4),
-        Column("mean", lazy("Mean"), 70, cells.figure("mean"), figures=True, yields=3),
+        Column("axis", lazy("Axis"), 84, cells.axis, hide_order=5),
+        Column("last", lazy("Last"), 74, cells.last, is_numeric=True),
+        Column("a", "A", 70, cells.at_a, hide_order=2, **between),  # type: ignore[arg-type]
+        Column("b", "B", 70, cells.at_b, hide_order=2, **between),  # type: ignore[arg-type]
+        Column("difference", f"B {MINUS} A", 86, cells.difference, hide_order=1, **between),  # type: ignore[arg-type]
+        Column("min", lazy("Min"), 70, cells.stat("least"), is_numeric=True, hide_order=4),
+        Column("max", lazy("Max"), 70, cells.stat("most"), is_numeric=True, hide_order=4),
+        Column("mean", lazy("Mean"), 70, cells.stat("mean"), is_numeric=True, hide_order=3),
     )
 
 
-class LegendTable(TableView[ShownCurve]):
+class LegendTable(TableView[PlotCurve]):
     """Table of a plot's curves; `changed` is emitted when visibility, axis or style of a curve change."""
 
     changed = Signal()
     removed = Signal(str)
-    chosen_copy = Signal(str)
+    copy_requested = Signal(str)
 
-    def __init__(self, theme: Theme, model: TableModel[ShownCurve]) -> None:
+    def __init__(self, theme: Theme, model: TableModel[PlotCurve]) -> None:
         super().__init__(theme, model)
         self.setAccessibleName(_("Curves and their values"))
         self.clicked.connect(self._press)
@@ -164,7 +167,7 @@ class LegendTable(TableView[ShownCurve]):
         if shown is None:
             return
         if column == "eye":
-            self.hide_or_show(shown)
+            self.toggle_visibility(shown)
         elif column == "stroke":
             self._popup(shown, self.visualRect(index).bottomLeft())
 
@@ -176,9 +179,9 @@ class LegendTable(TableView[ShownCurve]):
             if shown is not None:
                 self._popup(shown, self.visualRect(index).bottomLeft())
 
-    def hide_or_show(self, shown: ShownCurve) -> None:
+    def toggle_visibility(self, shown: PlotCurve) -> None:
         """Toggle the visibility of a curve."""
-        shown.hidden = not shown.hidden
+        shown.is_hidden = not shown.is_hidden
         self.changed.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -186,7 +189,7 @@ class LegendTable(TableView[ShownCurve]):
         if shown is not None and event.key() in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace}:
             self.removed.emit(shown.name)
         elif shown is not None and event.key() == Qt.Key.Key_H and not event.modifiers():
-            self.hide_or_show(shown)
+            self.toggle_visibility(shown)
         elif event.text().isprintable() and event.text().strip() != "/" and event.text():
             event.ignore()  # handled by the plot panel
         else:
@@ -198,12 +201,12 @@ class LegendTable(TableView[ShownCurve]):
         if shown is not None:
             self._popup(shown, at)
 
-    def _popup(self, shown: ShownCurve, at: QPoint) -> None:
+    def _popup(self, shown: PlotCurve, at: QPoint) -> None:
         menu = self.menu_of(shown)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(self.viewport().mapToGlobal(at))
 
-    def menu_of(self, shown: ShownCurve) -> Menu:
+    def menu_of(self, shown: PlotCurve) -> Menu:
         """Return the context menu of a curve."""
         menu = Menu(self.theme, self)
         if not shown.curve.is_state:
@@ -211,34 +214,35 @@ class LegendTable(TableView[ShownCurve]):
                 action = menu.addAction(words)
                 action.setCheckable(True)
                 action.setChecked(shown.right is right)
-                action.triggered.connect(lambda _on=False, right=right: self._put(shown, right=right))
+                action.triggered.connect(lambda _on=False, right=right: self._set_axis(shown, right=right))
             menu.addSeparator()
         for number, words in enumerate(COLOURS):
             action = menu.addAction(_(words))
             action.setCheckable(True)
             action.setChecked(shown.look.colour % len(COLOURS) == number)
-            action.triggered.connect(lambda _on=False, number=number: self._colour(shown, number))
+            action.triggered.connect(lambda _on=False, number=number: self._set_colour(shown, number))
         menu.addSeparator()
         hide = menu.addAction(
-            self.theme.icon("eye" if shown.hidden else "eye-off"), _("Show") if shown.hidden else _("Hide")
+            self.theme.icon("eye" if shown.is_hidden else "eye-off"),
+            _("Show") if shown.is_hidden else _("Hide"),
         )
-        hide.triggered.connect(lambda: self.hide_or_show(shown))
+        hide.triggered.connect(lambda: self.toggle_visibility(shown))
         copy = menu.addAction(self.theme.icon("copy"), _("Copy name"))
-        copy.triggered.connect(lambda: self.chosen_copy.emit(shown.name))
+        copy.triggered.connect(lambda: self.copy_requested.emit(shown.name))
         remove = menu.addAction(self.theme.icon("trash-2"), _("Remove"))
         remove.triggered.connect(lambda: self.removed.emit(shown.name))
         return menu
 
-    def _put(self, shown: ShownCurve, *, right: bool) -> None:
+    def _set_axis(self, shown: PlotCurve, *, right: bool) -> None:
         shown.right = right
         self.changed.emit()
 
-    def _colour(self, shown: ShownCurve, number: int) -> None:
+    def _set_colour(self, shown: PlotCurve, number: int) -> None:
         shown.look = CurveLook(number, shown.look.pattern)
         self.changed.emit()
 
 
-def next_look(there: Sequence[ShownCurve]) -> CurveLook:
+def next_look(there: Sequence[PlotCurve]) -> CurveLook:
     """Return a style that no other curve has, or a repeated one if all are in use."""
     colours = [shown.look.colour % len(COLOURS) for shown in there]
     patterns = [shown.look.pattern % 4 for shown in there]
@@ -247,31 +251,33 @@ def next_look(there: Sequence[ShownCurve]) -> CurveLook:
     return CurveLook(colour, pattern)
 
 
-def foot_words(curves: Curves, *, has_cursors: bool, distance: float | None) -> str:
+def caption_text(curves: Curves, *, has_cursors: bool, distance: float | None) -> str:
     """Return the caption of the legend: range of the statistics, distance of A and B, missing data."""
     about = _("Min, max and mean between A and B")
     parts = [about if has_cursors else _("Min, max and mean of the visible range")]
     if distance is not None:
-        parts.append(_("A to B: {distance}").format(distance=number_words(distance)))
+        parts.append(_("A to B: {distance}").format(distance=number_text(distance)))
     for count, words in (
         (curves.lost, ngettext("{count} message lost: a gap", "{count} messages lost: gaps", curves.lost)),
         (
-            curves.unread,
-            ngettext("{count} message can't be decoded", "{count} messages can't be decoded", curves.unread),
-        ),
-        (
-            curves.undone,
+            curves.unread_count,
             ngettext(
-                "{count} point discarded: the clock was set back",
-                "{count} points discarded: the clock was set back",
-                curves.undone,
+                "{count} message can't be decoded", "{count} messages can't be decoded", curves.unread_count
             ),
         ),
         (
-            curves.forgotten,
-            ngettext("{count} old point discarded", "{count} old points discarded", curves.forgotten),
+            curves.discarded_count,
+            ngettext(
+                "{count} point discarded: the clock was set back",
+                "{count} points discarded: the clock was set back",
+                curves.discarded_count,
+            ),
+        ),
+        (
+            curves.evicted_count,
+            ngettext("{count} old point discarded", "{count} old points discarded", curves.evicted_count),
         ),
     ):
         if count:
-            parts.append(words.format(count=grouped(count)))
+            parts.append(words.format(count=group_digits(count)))
     return " · ".join(parts)

@@ -66,12 +66,12 @@ class Stroke:
 
     look: CurveLook
     is_state: bool
-    hidden: bool
+    is_hidden: bool
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
         """Paint the sample, vertically centred in the cell."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setOpacity(0.35 if self.hidden else 1.0)
+        painter.setOpacity(0.35 if self.is_hidden else 1.0)
         middle = box.center().y()
         wide = min(box.width(), 34.0)
         if self.is_state:

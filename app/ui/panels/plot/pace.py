@@ -7,21 +7,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-DRAW_EVERY = (2, 8)
+DRAW_INTERVAL_TICKS = (2, 8)
 """Minimum and maximum interval between drawings, in refreshes at 30 Hz."""
-DRAWING_SHARE = 0.08
+MAX_CPU_SHARE = 0.08
 """Maximum share of a processor core for drawing."""
 AVERAGE_WEIGHT = 0.1
 """Weight of a new measurement in the moving average. Thread clocks can have a resolution of only 16 ms."""
 
 
-class Painted(Protocol):
+class TimedWidget(Protocol):
     """Widget that is painted after drawing; `painted_s` accumulates its processor time in s."""
 
     painted_s: float
 
 
-class DrawingPace:
+class DrawThrottle:
     """Measures the cost of drawing and computes the interval until the next drawing."""
 
     def __init__(self) -> None:
@@ -29,18 +29,18 @@ class DrawingPace:
         self._painted_s = 0.0
 
     @contextmanager
-    def drawing(self, painted: Painted) -> Iterator[None]:
+    def measure(self, painted: TimedWidget) -> Iterator[None]:
         """Measure one drawing, including the painting since the last one."""
         began = time.thread_time()
         yield
-        self.took(time.thread_time() - began + painted.painted_s - self._painted_s)
+        self.add_sample(time.thread_time() - began + painted.painted_s - self._painted_s)
         self._painted_s = painted.painted_s
 
-    def took(self, seconds: float) -> None:
+    def add_sample(self, seconds: float) -> None:
         """Add a measurement of drawing and painting (processor time in s)."""
         self.drawing_s += AVERAGE_WEIGHT * (seconds - self.drawing_s)
 
-    def every(self, pixel_s: float) -> int:
+    def interval_ticks(self, pixel_s: float) -> int:
         """Return the interval in refreshes: at least the time in which data moves by a pixel (`pixel_s`)."""
-        least, most = DRAW_EVERY
-        return round(min(most, max(least, pixel_s * 30, self.drawing_s / DRAWING_SHARE * 30)))
+        least, most = DRAW_INTERVAL_TICKS
+        return round(min(most, max(least, pixel_s * 30, self.drawing_s / MAX_CPU_SHARE * 30)))

@@ -19,18 +19,18 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLay
 from app.core.series.curves import MAX_CURVES, Curve, Curves, topics_of
 from app.core.series.field_path import FieldPath
 from app.errors import CurveError
-from app.ui.panels.base import Hindrance, PanelContext, PanelWidget, paused_hindrance
+from app.ui.panels.base import Blocker, PanelContext, PanelWidget, paused_blocker
 from app.ui.panels.plot.advice import PlotAdvice
 from app.ui.panels.plot.canvas import PlotCanvas
 from app.ui.panels.plot.export import CSV, PNG, SVG, PlotExport
 from app.ui.panels.plot.lanes import StateLanes
-from app.ui.panels.plot.legend import LegendFigures, LegendTable, columns, foot_words, next_look
-from app.ui.panels.plot.pace import DrawingPace
-from app.ui.panels.plot.shown_curve import ShownCurve, look_of
+from app.ui.panels.plot.legend import LegendStats, LegendTable, caption_text, columns, next_look
+from app.ui.panels.plot.pace import DrawThrottle
+from app.ui.panels.plot.shown_curve import PlotCurve, look_of
 from app.ui.panels.plot.time_view import SPANS, TimeView
 from app.ui.panels.plot.tools import PlotTools
 from app.ui.panels.plot.xy_canvas import XYCanvas
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.widgets import (
     Button,
     Chip,
@@ -41,7 +41,7 @@ from app.ui.widgets import (
     label,
 )
 from app.ui.widgets.field_drag import dropped_field
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from app.ui.widgets.paint import show_when
 from app.ui.widgets.table.model import TableModel
 from nep.i18n import _, ngettext
@@ -50,8 +50,8 @@ if TYPE_CHECKING:
     from PySide6.QtGui import QDragEnterEvent, QDropEvent
 
 
-FIGURES_TICKS = 10  # refreshes at 30 Hz; faster changes would be illegible
-SOON = 2 * FIGURES_TICKS
+STATS_UPDATE_TICKS = 10  # refreshes at 30 Hz; faster changes would be illegible
+IDLE_STATS_UPDATE_TICKS = 2 * STATS_UPDATE_TICKS
 MAX_ROWS, MAX_TABLE_RATIO = 6, 0.32
 
 
@@ -61,13 +61,13 @@ class PlotPanel(PanelWidget):
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Plot"))
         self.curves = Curves(self.session.series, self._topic_names)
-        self.shown: list[ShownCurve] = []
+        self.shown: list[PlotCurve] = []
         self.view = TimeView()
-        self.figures = LegendFigures()
+        self.figures = LegendStats()
         self._ticks = 0
         self._due = True
-        self._since_figures = SOON
-        self._pace = DrawingPace()
+        self._since_figures = IDLE_STATS_UPDATE_TICKS
+        self._pace = DrawThrottle()
         self._points = (0, True)
         self._last_cursor = "A"
         self.exporter = PlotExport(
@@ -77,7 +77,7 @@ class PlotPanel(PanelWidget):
         self._make_tools()
         self._make_body()
         self.setAcceptDrops(True)
-        self._changed()
+        self._curves_changed()
 
     # -- construction -------------------------------------------------------------------------------------
 
@@ -92,26 +92,26 @@ class PlotPanel(PanelWidget):
         self.tools = PlotTools(self.theme, self.session, lambda: [each.name for each in self.shown])
         self.add, self.span, self.cursors = self.tools.add, self.tools.span, self.tools.cursors
         self.states, self.across, self.export = self.tools.states, self.tools.across, self.tools.export
-        self.add.wanted.connect(self._add_typed)
-        self.add.left.connect(lambda: self.canvas.setFocus(Qt.FocusReason.OtherFocusReason))
-        self.span.changed.connect(self._choose_span)
+        self.add.add_requested.connect(self._add_typed)
+        self.add.exited.connect(lambda: self.canvas.setFocus(Qt.FocusReason.OtherFocusReason))
+        self.span.changed.connect(self._set_span)
         self.cursors.toggled.connect(self._show_cursors)
-        self.states.toggled.connect(lambda _on: self._changed())
-        self.across.toggled.connect(lambda _on: self._changed())
-        self.export.clicked.connect(lambda: drop_below(self.exporter.menu(self), self.export))
+        self.states.toggled.connect(lambda _on: self._curves_changed())
+        self.across.toggled.connect(lambda _on: self._curves_changed())
+        self.export.clicked.connect(lambda: open_below(self.exporter.menu(self), self.export))
 
     def _make_body(self) -> None:
         theme = self.theme
         self.canvas = PlotCanvas(theme)
         self.xy = XYCanvas(theme)
         self.lanes = StateLanes(theme, self.canvas)
-        self.model: TableModel[ShownCurve] = TableModel(
+        self.model: TableModel[PlotCurve] = TableModel(
             columns(self.figures, self.cursors.isChecked, self._is_gone), lambda shown: shown.name
         )
         self.table = LegendTable(theme, self.model)
-        self.table.changed.connect(self._changed)
+        self.table.changed.connect(self._curves_changed)
         self.table.removed.connect(self.remove)
-        self.table.chosen_copy.connect(self._copy)
+        self.table.copy_requested.connect(self._copy)
         self._connect_canvas()
         body = self._make_lower()
         self.empty = EmptyState(
@@ -119,7 +119,7 @@ class PlotPanel(PanelWidget):
             "chart-line",
             _("No curves yet"),
             _("Drag a number here from the Inspector, or type its path."),
-            [EmptyAction(_("Add a curve"), self.focus_filter, "plus", primary=True)],
+            [EmptyAction(_("Add a curve"), self.focus_filter, "plus", is_primary=True)],
         )
         self.pages = QStackedWidget()
         self.pages.addWidget(self.empty)
@@ -146,7 +146,7 @@ class PlotPanel(PanelWidget):
         foot.setContentsMargins(12, 4, 12, 5)
         foot.addWidget(self.about, 1)
         foot.addWidget(self.points)
-        self.advice = PlotAdvice(self.theme, lambda topic: self.context.why(self, topic))
+        self.advice = PlotAdvice(self.theme, lambda topic: self.context.open_doctor(self, topic))
         body = QWidget()
         column = QVBoxLayout(body)
         column.setContentsMargins(0, 0, 0, 0)
@@ -162,9 +162,9 @@ class PlotPanel(PanelWidget):
     def _connect_canvas(self) -> None:
         self.canvas.zoomed.connect(self._zoom)
         self.canvas.moved.connect(self._move)
-        self.canvas.values_changed.connect(self._soon)
-        self.canvas.all_wanted.connect(lambda: self._choose_span("all"))
-        self.canvas.cursor_moved.connect(self._put_cursor)
+        self.canvas.values_changed.connect(self._schedule_redraw)
+        self.canvas.show_all_requested.connect(lambda: self._set_span("all"))
+        self.canvas.cursor_moved.connect(self._set_cursor)
         self.canvas.field_dropped.connect(self.plot_field)
 
     def source_changed(self) -> None:
@@ -187,12 +187,12 @@ class PlotPanel(PanelWidget):
     def plot_field(self, topic: str, path: str) -> None:
         """Add a curve for a field of a topic; with an empty path, ask for the field."""
         if not path:
-            self.add.ask(f"{topic}.")
+            self.add.prompt(f"{topic}.")
             return
         try:
-            self._show_new(self.curves.add_field(topic, FieldPath.parse(path)), right=False)
+            self._add_curves(self.curves.add_field(topic, FieldPath.parse(path)), right=False)
         except CurveError as error:
-            self.context.toast(_sentence(error))
+            self.context.toast(_as_sentence(error))
 
     def show_topic(self, name: str) -> None:
         """Ask for a field of a topic."""
@@ -202,20 +202,20 @@ class PlotPanel(PanelWidget):
         try:
             made = self.curves.add(text)
         except CurveError as error:
-            self.add.complain(_sentence(error))
+            self.add.show_error(_as_sentence(error))
             return
         if not made:
-            self.add.complain(_("{field} is already shown.").format(field=text))
+            self.add.show_error(_("{field} is already shown.").format(field=text))
             return
         self.add.clear()
         self.add.dispose()
-        self._show_new(made, right=right)
+        self._add_curves(made, right=right)
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _show_new(self, made: Sequence[Curve], *, right: bool) -> None:
+    def _add_curves(self, made: Sequence[Curve], *, right: bool) -> None:
         for curve in made:
-            self.shown.append(ShownCurve(curve, next_look(self.shown), right))
-        self._changed()
+            self.shown.append(PlotCurve(curve, next_look(self.shown), right))
+        self._curves_changed()
 
     def remove(self, name: str) -> None:
         """Remove a curve; the toast offers to undo the removal."""
@@ -225,21 +225,21 @@ class PlotPanel(PanelWidget):
         place = self.shown.index(found)
         self.shown.remove(found)
         self.curves.remove(found.curve)
-        self._changed()
+        self._curves_changed()
         said = _("Removed {field}").format(field=name)
-        self.context.toast(said, _("Undo"), lambda: self._bring_back(found, place))
+        self.context.toast(said, _("Undo"), lambda: self._restore_removed(found, place))
 
-    def _bring_back(self, before: ShownCurve, place: int) -> None:
-        self._restore_curve(before.saved())
+    def _restore_removed(self, before: PlotCurve, place: int) -> None:
+        self._restore_curve(before.to_json())
         if self.shown and self.shown[-1].name == before.name:
             self.shown.insert(place, self.shown.pop())
-        self._changed()
+        self._curves_changed()
 
     def _copy(self, name: str) -> None:
         QGuiApplication.clipboard().setText(name)
         self.context.toast(_("Copied {path}").format(path=name))
 
-    def _is_gone(self, shown: ShownCurve) -> bool:
+    def _is_gone(self, shown: PlotCurve) -> bool:
         for name in topics_of(shown.curve.source):
             topic = self.session.topic(name)
             if topic is None or topic.gone_s is not None:
@@ -251,20 +251,24 @@ class PlotPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         self.curves.advance()
-        self.exporter.follow()
+        self.exporter.poll()
         if not self.shown:
             return
         pixel_s = (self.canvas.end_s - self.canvas.begin_s) / self.canvas.columns
-        drawn = self._due or (self.view.follows and self._ticks % self._pace.every(pixel_s) == 0)
+        drawn = self._due or (
+            self.view.is_following and self._ticks % self._pace.interval_ticks(pixel_s) == 0
+        )
         if drawn:
             self._due = False
-            with self._pace.drawing(self.canvas):
+            with self._pace.measure(self.canvas):
                 self._draw()
         self._since_figures += 1
-        if self._since_figures >= (FIGURES_TICKS if drawn else SOON):  # in the same repaint as the curves
-            self._show_figures()
+        if self._since_figures >= (
+            STATS_UPDATE_TICKS if drawn else IDLE_STATS_UPDATE_TICKS
+        ):  # in the same repaint as the curves
+            self._update_stats()
 
-    def _soon(self) -> None:
+    def _schedule_redraw(self) -> None:
         # Called to redraw while paused, too.
         self._due = True
 
@@ -283,10 +287,10 @@ class PlotPanel(PanelWidget):
         lines = [
             (each, each.curve.samples.line(begin_s, end_s, canvas.columns))
             for each in self.shown
-            if not each.hidden and not each.curve.is_state
+            if not each.is_hidden and not each.curve.is_state
         ]
-        self._points = (sum(line.points for _c, line in lines), all(line.is_whole for _c, line in lines))
-        if self.is_across:
+        self._points = (sum(line.points for _c, line in lines), all(line.is_complete for _c, line in lines))
+        if self.is_xy:
             self.xy.cursors = canvas.cursors
             self.xy.show_pairs(self._pairs(), begin_s, end_s)
         else:
@@ -294,21 +298,21 @@ class PlotPanel(PanelWidget):
             clock_s = (self.session.series.origin_ns + end_s * 1e9) / 1e9
             canvas.show_lines(lines, clock_s)
         states = [each for each in self.shown if each.curve.is_state]
-        self.lanes.show_curves(states if self.states.isChecked() and not self.is_across else [])
+        self.lanes.show_curves(states if self.states.isChecked() and not self.is_xy else [])
 
-    def _numbers(self) -> int:
+    def _numeric_count(self) -> int:
         return sum(not each.curve.is_state for each in self.shown)
 
     @property
-    def is_across(self) -> bool:
+    def is_xy(self) -> bool:
         """True if curves are drawn against each other instead of over time."""
-        return self.across.isChecked() and self._numbers() > 1
+        return self.across.isChecked() and self._numeric_count() > 1
 
-    def _pairs(self) -> list[tuple[ShownCurve, ShownCurve]]:
-        there = [each for each in self.shown if not each.hidden and not each.curve.is_state]
+    def _pairs(self) -> list[tuple[PlotCurve, PlotCurve]]:
+        there = [each for each in self.shown if not each.is_hidden and not each.curve.is_state]
         return list(zip(there[0::2], there[1::2], strict=False))
 
-    def _mark_cursors(self, lines: Sequence[tuple[ShownCurve, object]]) -> None:
+    def _mark_cursors(self, lines: Sequence[tuple[PlotCurve, object]]) -> None:
         marks = []
         for curve, _line in lines:
             for time_s in self.canvas.cursors.values():
@@ -317,34 +321,34 @@ class PlotPanel(PanelWidget):
                     marks.append((curve, time_s, found[1]))
         self.canvas.marks = marks
 
-    def _show_figures(self) -> None:
+    def _update_stats(self) -> None:
         self._since_figures = 0
         cursors = self.canvas.cursors
         both = (cursors["A"], cursors["B"]) if len(cursors) == 2 else None
         begin_s, end_s = (min(both), max(both)) if both else (self.canvas.begin_s, self.canvas.end_s)
-        self.figures.look_at(begin_s, end_s, both)
-        self.table.tell_visible_changed()
-        distance = self.xy.distance() if self.is_across else None
-        self.about.setText(foot_words(self.curves, has_cursors=both is not None, distance=distance))
+        self.figures.set_range(begin_s, end_s, both)
+        self.table.refresh_visible()
+        distance = self.xy.distance() if self.is_xy else None
+        self.about.setText(caption_text(self.curves, has_cursors=both is not None, distance=distance))
         count, whole = self._points
-        points = ngettext("{count} point", "{count} points", count).format(count=grouped(count))
+        points = ngettext("{count} point", "{count} points", count).format(count=group_digits(count))
         words = _("{points}, all shown") if whole else _("{points}, downsampled to 2 per pixel")
         self.points.setText(words.format(points=points))
         self.advice.show_for(self.curves, self.shown)
 
-    def _changed(self) -> None:
+    def _curves_changed(self) -> None:
         there = bool(self.shown)
         self.pages.setCurrentIndex(1 if there else 0)
         show_when(self.freeze, there)
-        self.tools.fit(len(self.shown), self._numbers())
-        self.drawings.setCurrentIndex(1 if self.is_across else 0)
+        self.tools.update_tools(len(self.shown), self._numeric_count())
+        self.drawings.setCurrentIndex(1 if self.is_xy else 0)
         self.model.set_rows(self.shown)
         self._fit_table()
         topics = {topic for each in self.shown for topic in topics_of(each.curve.source)}
         self.set_title(_("Plot"), next(iter(topics)) if len(topics) == 1 else "")
         self.table.viewport().update()
-        self._since_figures = SOON
-        self._soon()
+        self._since_figures = IDLE_STATS_UPDATE_TICKS
+        self._schedule_redraw()
 
     def _fit_table(self) -> None:
         room = round(self.height() * MAX_TABLE_RATIO / max(1, self.table.row_height)) - 1
@@ -356,40 +360,40 @@ class PlotPanel(PanelWidget):
 
     def _pause(self, paused: bool) -> None:
         if paused:
-            self.view.hold((self.canvas.begin_s, self.canvas.end_s))
+            self.view.pause((self.canvas.begin_s, self.canvas.end_s))
         else:
-            self.view.go_on()
-        self.freeze.set_word(_("Resume") if paused else _("Pause"), "play" if paused else "pause")
+            self.view.resume()
+        self.freeze.set_label(_("Resume") if paused else _("Pause"), "play" if paused else "pause")
         self.paused.set(_("paused; data is still recorded") if paused else "", "off", "pause")
-        self._say_span()
-        self._soon()
+        self._update_span()
+        self._schedule_redraw()
 
-    def hindrances(self) -> list[Hindrance]:
+    def blockers(self) -> list[Blocker]:
         go_on = lambda: self.freeze.setChecked(False)  # noqa: E731
-        return [paused_hindrance(self.title(), go_on)] if self.freeze.isChecked() else []
+        return [paused_blocker(self.title(), go_on)] if self.freeze.isChecked() else []
 
     def _zoom(self, factor: float, at_s: float) -> None:
         self.view.zoom(factor, at_s, (self.canvas.begin_s, self.canvas.end_s))
-        self._say_span()
-        self._soon()
+        self._update_span()
+        self._schedule_redraw()
 
     def _move(self, by_s: float) -> None:
         self.view.move(by_s, (self.canvas.begin_s, self.canvas.end_s))
         self.canvas.begin_s, self.canvas.end_s = self.canvas.begin_s + by_s, self.canvas.end_s + by_s
         self.freeze.setChecked(True)
-        self._soon()
+        self._schedule_redraw()
 
-    def _choose_span(self, value: str) -> None:
-        self.view.choose(dict(SPANS)[value])
-        self._say_span()
-        self._soon()
+    def _set_span(self, value: str) -> None:
+        self.view.set_span(dict(SPANS)[value])
+        self._update_span()
+        self._schedule_redraw()
 
-    def _say_span(self) -> None:
-        chosen = self.view.chosen()
+    def _update_span(self) -> None:
+        chosen = self.view.selected_span()
         if chosen:
             self.span.set_value(chosen)
         else:
-            self.span.choose_none()
+            self.span.clear_selection()
 
     # -- cursors ------------------------------------------------------------------------------------------
 
@@ -400,38 +404,38 @@ class PlotPanel(PanelWidget):
         else:
             self._place_cursors()
         self.table.fit_columns()
-        self._soon()
-        self._show_figures()
+        self._schedule_redraw()
+        self._update_stats()
 
     def _place_cursors(self) -> None:
         span = self.canvas.end_s - self.canvas.begin_s
         self.canvas.cursors.update(A=self.canvas.begin_s + span / 3, B=self.canvas.begin_s + span * 2 / 3)
 
-    def _put_cursor(self, name: str, time_s: float) -> None:
+    def _set_cursor(self, name: str, time_s: float) -> None:
         self.cursors.setChecked(True)
         self.canvas.cursors[name] = time_s
         self._last_cursor = name
-        self._soon()
-        self._show_figures()
+        self._schedule_redraw()
+        self._update_stats()
 
     def _step_cursor(self, steps: int) -> bool:
         # Moves the cursor by samples of the first visible curve.
         time_s = self.canvas.cursors.get(self._last_cursor)
-        first = next((each for each in self.shown if not each.hidden and len(each.curve.samples)), None)
+        first = next((each for each in self.shown if not each.is_hidden and len(each.curve.samples)), None)
         if time_s is None or first is None:
             return False
-        beside = first.curve.samples.beside(time_s, steps)
+        beside = first.curve.samples.time_at_step(time_s, steps)
         if beside is not None:
-            self._put_cursor(self._last_cursor, beside)
+            self._set_cursor(self._last_cursor, beside)
         return True
 
     # -- keys and drops -----------------------------------------------------------------------------------
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not self._key(event):
+        if not self._handle_key(event):
             super().keyPressEvent(event)
 
-    def _key(self, event: QKeyEvent) -> bool:
+    def _handle_key(self, event: QKeyEvent) -> bool:
         if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
             return False
         far = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
@@ -439,11 +443,11 @@ class PlotPanel(PanelWidget):
         does: dict[int, Callable[[], object]] = {
             Qt.Key.Key_C: self.focus_filter,
             Qt.Key.Key_M: self.cursors.toggle,
-            Qt.Key.Key_A: lambda: self._put_here("A"),
-            Qt.Key.Key_B: lambda: self._put_here("B"),
+            Qt.Key.Key_A: lambda: self._set_cursor_at_mouse("A"),
+            Qt.Key.Key_B: lambda: self._set_cursor_at_mouse("B"),
             Qt.Key.Key_Space: self.freeze.toggle if replay is None else replay.toggle,
-            Qt.Key.Key_Left: lambda: self._arrow(-far),
-            Qt.Key.Key_Right: lambda: self._arrow(far),
+            Qt.Key.Key_Left: lambda: self._handle_arrow(-far),
+            Qt.Key.Key_Right: lambda: self._handle_arrow(far),
             Qt.Key.Key_Plus: lambda: self._zoom(1 / 1.5, self._middle_s()),
             Qt.Key.Key_Minus: lambda: self._zoom(1.5, self._middle_s()),
             Qt.Key.Key_0: self._show_all,
@@ -457,22 +461,22 @@ class PlotPanel(PanelWidget):
     def _middle_s(self) -> float:
         return (self.canvas.begin_s + self.canvas.end_s) / 2
 
-    def _arrow(self, steps: int) -> None:
+    def _handle_arrow(self, steps: int) -> None:
         # Moves the cursor or, if there is none, the time range.
         if not self._step_cursor(steps):
             self._move(steps * (self.canvas.end_s - self.canvas.begin_s) / 20)
 
     def _show_all(self) -> None:
-        self.canvas.release_values()
-        self._choose_span("all")
+        self.canvas.reset_value_ranges()
+        self._set_span("all")
 
-    def _put_here(self, name: str) -> None:
+    def _set_cursor_at_mouse(self, name: str) -> None:
         # Places the cursor under the mouse, or in the middle if the mouse is elsewhere.
         here = self.canvas.mouse_s
-        self._put_cursor(name, self._middle_s() if here is None else here)
+        self._set_cursor(name, self._middle_s() if here is None else here)
 
     def focus_filter(self) -> bool:
-        self.add.ask(self.add.text())
+        self.add.prompt(self.add.text())
         return True
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
@@ -501,36 +505,38 @@ class PlotPanel(PanelWidget):
         rows: tuple[tuple[str, str, Callable[[], object]], ...] = (
             (_("Add a curve"), "plus", self.focus_filter),
             (_("Show everything"), "maximize", self._show_all),
-            (_("Export numbers (CSV)"), "download", lambda: self.exporter.ask_where(CSV)),
-            (_("Export a picture (PNG)"), "image", lambda: self.exporter.ask_where(PNG)),
-            (_("Export a drawing (SVG)"), "spline", lambda: self.exporter.ask_where(SVG)),
+            (_("Export numbers (CSV)"), "download", lambda: self.exporter.prompt_file(CSV)),
+            (_("Export a picture (PNG)"), "image", lambda: self.exporter.prompt_file(PNG)),
+            (_("Export a drawing (SVG)"), "spline", lambda: self.exporter.prompt_file(SVG)),
         )
         for words, icon, does in rows:
             action = QAction(self.theme.icon(icon), words, self)
             action.triggered.connect(lambda _on=False, does=does: does())
             action.setEnabled(bool(self.shown) or does == self.focus_filter)
             made.append(action)
-        for old in self._listed:
+        for old in self._menu_actions:
             old.deleteLater()
-        self._listed = made
+        self._menu_actions = made
         return made
 
-    _listed: Sequence[QAction] = ()
+    _menu_actions: Sequence[QAction] = ()
 
     def _picture_parts(self) -> list[tuple[QSize, Callable[[QPainter, QRectF], object]]]:
         # Parts of the image, from the top.
         self._draw()
         canvas, xy, lanes = self.canvas, self.xy, self.lanes
 
-        def curves(painter: QPainter, box: QRectF) -> None:
-            shown = xy if self.is_across else canvas
+        def paint_curves(painter: QPainter, box: QRectF) -> None:
+            shown = xy if self.is_xy else canvas
             shown.render(painter, box, shown.viewport().rect())
             if shown is xy:
                 xy.paint_marks(painter)
             else:
                 canvas.paint_cursors(painter)
 
-        parts: list[tuple[QSize, Callable[[QPainter, QRectF], object]]] = [(self.drawings.size(), curves)]
+        parts: list[tuple[QSize, Callable[[QPainter, QRectF], object]]] = [
+            (self.drawings.size(), paint_curves)
+        ]
         if not lanes.isHidden():
             parts.append((lanes.size(), lambda painter, _box: lanes.paint_lanes(painter)))
         return parts
@@ -540,7 +546,7 @@ class PlotPanel(PanelWidget):
     def save_state(self) -> dict[str, object]:
         return {
             "curves": [
-                {**each.saved(), "topics": sorted(topics_of(each.curve.source))} for each in self.shown
+                {**each.to_json(), "topics": sorted(topics_of(each.curve.source))} for each in self.shown
             ],
             "span": 0.0 if self.view.is_all else self.view.span_s,
             "states": self.states.isChecked(),
@@ -554,11 +560,11 @@ class PlotPanel(PanelWidget):
                 self._restore_curve(each)
         span = state.get("span")
         if isinstance(span, (int, float)) and 0 <= span <= 1e8:
-            self.view.choose(float(span))
-            self._say_span()
+            self.view.set_span(float(span))
+            self._update_span()
         self.states.setChecked(state.get("states") is not False)
         self.across.setChecked(state.get("across") is True)
-        self._changed()
+        self._curves_changed()
 
     def _restore_curve(self, saved: Mapping[str, object]) -> None:
         topic, path, text, topics = (saved.get(name) for name in ("topic", "path", "text", "topics"))
@@ -571,8 +577,8 @@ class PlotPanel(PanelWidget):
         except CurveError:
             return
         for curve in made:
-            shown = ShownCurve(curve, look_of(saved, next_look(self.shown)))
-            shown.right, shown.hidden = saved.get("right") is True, saved.get("hidden") is True
+            shown = PlotCurve(curve, look_of(saved, next_look(self.shown)))
+            shown.right, shown.is_hidden = saved.get("right") is True, saved.get("hidden") is True
             self.shown.append(shown)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -582,7 +588,7 @@ class PlotPanel(PanelWidget):
     def theme_changed(self) -> None:
         self.table.set_row_height(self.row_height(), large=self.density == "comfortable")
         self._fit_table()
-        self._soon()
+        self._schedule_redraw()
 
     def dispose(self) -> None:
         self.add.dispose()
@@ -590,6 +596,6 @@ class PlotPanel(PanelWidget):
         self.exporter.close()
 
 
-def _sentence(error: CurveError) -> str:
+def _as_sentence(error: CurveError) -> str:
     words = str(error)
     return f"{words[:1].upper()}{words[1:]}" if words.endswith("?") else f"{words[:1].upper()}{words[1:]}."

@@ -10,33 +10,33 @@ from app.core.series.curves import Curve
 from app.core.series.field_path import MISSING
 from app.core.series.formula import FieldSource
 from app.ui.panels.plot.look import CurveLook
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from nep.i18n import number
 
 MINUS = "\u2212"
 
 
 @dataclass(slots=True, eq=False)
-class ShownCurve:
+class PlotCurve:
     """Curve with its display settings; `right` selects the right axis."""
 
     curve: Curve
     look: CurveLook
     right: bool = False
-    hidden: bool = False
+    is_hidden: bool = False
 
     @property
     def name(self) -> str:
         """Expression as typed by the user; also the key of the curve."""
         return self.curve.text
 
-    def saved(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """Return the state for the layout."""
         source = self.curve.source
         kept: dict[str, object] = {
             "text": self.name,
             "right": self.right,
-            "hidden": self.hidden,
+            "hidden": self.is_hidden,
             "colour": self.look.colour,
             "pattern": self.look.pattern,
         }
@@ -54,7 +54,7 @@ def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
     )
 
 
-def value_words(value: object) -> str:
+def value_text(value: object) -> str:
     """Format a value for the legend; "" for None."""
     if value is MISSING or value is None:
         return ""
@@ -62,14 +62,14 @@ def value_words(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, int):
         if abs(value) < 10**15:
-            return grouped(value).replace("-", MINUS)
-        return str(value).replace("-", MINUS) if abs(value) < 10**21 else number_words(_float(value))
+            return group_digits(value).replace("-", MINUS)
+        return str(value).replace("-", MINUS) if abs(value) < 10**21 else number_text(_float(value))
     if isinstance(value, float):
-        return number_words(value)
+        return number_text(value)
     return value[:60] if isinstance(value, str) else ""
 
 
-def number_words(value: float) -> str:
+def number_text(value: float) -> str:
     """Format a number, such as 0.0042, 1.284, 128.4, 12840 or 2.1e+09."""
     if not isfinite(value):
         return {"inf": "∞", "-inf": f"{MINUS}∞"}.get(str(value), "NaN")

@@ -18,29 +18,29 @@ class TimeView:
 
     span_s: float = 60.0
     is_all: bool = False
-    held_s: float | None = None
+    paused_end_s: float | None = None
 
     @property
-    def follows(self) -> bool:
+    def is_following(self) -> bool:
         """True if the range follows new data."""
-        return self.held_s is None
+        return self.paused_end_s is None
 
     def visible_range(self, oldest_s: float, newest_s: float) -> tuple[float, float]:
         """Return the visible range, given the range of available data."""
-        end_s = newest_s if self.held_s is None else self.held_s
+        end_s = newest_s if self.paused_end_s is None else self.paused_end_s
         if self.is_all:
             return min(oldest_s, end_s - MIN_SPAN_S), end_s
         return end_s - self.span_s, end_s
 
-    def hold(self, shown: tuple[float, float]) -> None:
+    def pause(self, shown: tuple[float, float]) -> None:
         """Fix the range at `shown` while data continues to arrive."""
-        self.span_s, self.is_all, self.held_s = _bounded(shown[1] - shown[0]), False, shown[1]
+        self.span_s, self.is_all, self.paused_end_s = _bounded(shown[1] - shown[0]), False, shown[1]
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         """Follow new data with the current length of the range."""
-        self.held_s = None
+        self.paused_end_s = None
 
-    def choose(self, span_s: float) -> None:
+    def set_span(self, span_s: float) -> None:
         """Set the length in s, 0 for everything. A fixed range keeps its end."""
         self.is_all = span_s <= 0
         if span_s > 0:
@@ -51,14 +51,14 @@ class TimeView:
         span_s = _bounded((shown[1] - shown[0]) * factor)
         share = (shown[1] - at_s) / max(MIN_SPAN_S, shown[1] - shown[0])
         self.span_s, self.is_all = span_s, False
-        if self.held_s is not None:
-            self.held_s = at_s + share * span_s
+        if self.paused_end_s is not None:
+            self.paused_end_s = at_s + share * span_s
 
     def move(self, by_s: float, shown: tuple[float, float]) -> None:
         """Shift the range by seconds and fix it there."""
-        self.hold((shown[0] + by_s, shown[1] + by_s))
+        self.pause((shown[0] + by_s, shown[1] + by_s))
 
-    def chosen(self) -> str:
+    def selected_span(self) -> str:
         """Return the key of the choice in `SPANS` that equals the current range, or ""."""
         if self.is_all:
             return "all"

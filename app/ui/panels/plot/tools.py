@@ -14,9 +14,9 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.messages.reader import LARGE_BYTES, read
-from app.core.series.field_path import FieldFound, completed, fields_of
-from app.core.series.formula import FUNCTIONS, WINDOWED, FieldSource
-from app.ui.panels.plot.shown_curve import value_words
+from app.core.series.field_path import PlottableField, complete, fields_of
+from app.core.series.formula import FUNCTIONS, WINDOW_FUNCTIONS, FieldSource
+from app.ui.panels.plot.shown_curve import value_text
 from app.ui.panels.plot.time_view import SPANS
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
@@ -40,7 +40,7 @@ ICONS = {"number": "hash", "state": "toggle-left", "list": "brackets"}
 EXAMPLES = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
 
 
-class FieldOffers:
+class FieldCatalog:
     """Fields that can be plotted, read from topics that are subscribed to while the user adds a curve."""
 
     def __init__(self, session: Session) -> None:
@@ -49,9 +49,9 @@ class FieldOffers:
 
     def open(self) -> None:
         """Subscribe to the topics that can be plotted."""
-        for topic in self._some():
+        for topic in self._candidate_topics():
             if topic.key not in self._watches:
-                self._watches[topic.key] = self._session.watch_shown(topic.key)
+                self._watches[topic.key] = self._session.watch_displayed(topic.key)
 
     def close(self) -> None:
         """Unsubscribe from all topics."""
@@ -59,8 +59,8 @@ class FieldOffers:
             watch.close()
         self._watches.clear()
 
-    def _some(self) -> list[Topic]:
-        topics = [*self._session.topics.live(), *self._session.networks.topics]
+    def _candidate_topics(self) -> list[Topic]:
+        topics = [*self._session.topics.existing_topics(), *self._session.networks.topics]
         fitting = [
             topic
             for topic in topics
@@ -70,9 +70,11 @@ class FieldOffers:
 
     def names(self) -> list[str]:
         """Return the keys of all topics."""
-        return [topic.key for topic in (*self._session.topics.live(), *self._session.networks.topics)]
+        return [
+            topic.key for topic in (*self._session.topics.existing_topics(), *self._session.networks.topics)
+        ]
 
-    def fields(self) -> Iterable[tuple[str, FieldFound]]:
+    def fields(self) -> Iterable[tuple[str, PlottableField]]:
         """Yield the fields that can be plotted, each with the expression to type."""
         told = 0
         for key in self._watches:
@@ -119,20 +121,20 @@ class AddCurve(SearchField):
     """
 
     icon_name = "plus"
-    wanted = Signal(str, bool)
-    left = Signal()
+    add_requested = Signal(str, bool)
+    exited = Signal()
 
     def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
         super().__init__(theme, _("Add a curve"), "C")
         self.setMinimumWidth(round(theme.scaled(150)))
         self._plotted = plotted
-        self.offers = FieldOffers(session)
+        self.offers = FieldCatalog(session)
         self.sentence = ""
         self._matches: _Matches | None = None
-        self._known: dict[str, FieldFound] = {}
+        self._known: dict[str, PlottableField] = {}
         self._timer = QTimer(self)
         self._timer.setInterval(REFRESH_MS)
-        self._timer.timeout.connect(self._renew)
+        self._timer.timeout.connect(self._refresh_fields)
         self.textEdited.connect(self._search)
 
     # -- opening and closing ------------------------------------------------------------------------------
@@ -142,12 +144,12 @@ class AddCurve(SearchField):
         """Popup list, created on first use."""
         window = self.window()
         if self._matches is None or self._matches.parentWidget() is not window:
-            self._drop_matches()
+            self._close_matches()
             self._matches = _Matches(self._theme, window)
-            self._matches.list.pressed_row.connect(lambda: self._commit(right=False))
+            self._matches.list.row_activated.connect(lambda: self._commit(right=False))
         return self._matches
 
-    def _drop_matches(self) -> None:
+    def _close_matches(self) -> None:
         if self._matches is not None:
             self._matches.deleteLater()
             self._matches = None
@@ -175,7 +177,7 @@ class AddCurve(SearchField):
         if self._matches is not None:
             self._matches.hide()
 
-    def ask(self, text: str) -> None:
+    def prompt(self, text: str) -> None:
         """Focus the field with a text that the user can continue."""
         self.setText(text)
         self.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -183,31 +185,31 @@ class AddCurve(SearchField):
             self.end(False)  # the focus selected everything; typing would replace it
         self._search()
 
-    def complain(self, sentence: str) -> None:
+    def show_error(self, sentence: str) -> None:
         """Show the reason why the text is not a valid curve; the text is kept."""
         self.sentence = sentence
         self.setProperty("wrong", "true" if sentence else "false")
         self.style().unpolish(self)
         self.style().polish(self)
-        self._show_foot(0)
+        self._update_footer(0)
 
     # -- matches ------------------------------------------------------------------------------------------
 
-    def _renew(self) -> None:
+    def _refresh_fields(self) -> None:
         # Refreshes fields and values.
         self.offers.open()
         before = len(self._known)
-        self._read()
+        self._read_fields()
         if len(self._known) != before:
             self._search(keep=True)
             return
         shown = self.matches.list
         for line in list(shown.lines.lines):
-            found = None if isinstance(line, Heading) else self._known.get(line.entry.words)
+            found = None if isinstance(line, Heading) else self._known.get(line.entry.text)
             if found is not None and not isinstance(line, Heading):
-                shown.update_entry(line.entry.id, _note(found))
+                shown.update_entry(line.entry.id, _value_note(found))
 
-    def _read(self) -> None:
+    def _read_fields(self) -> None:
         self._known = dict(self.offers.fields())
 
     def _search(self, *_text: object, keep: bool = False) -> None:
@@ -215,19 +217,19 @@ class AddCurve(SearchField):
             return
         if not keep:
             if self.sentence:
-                self.complain("")
-            self._read()
+                self.show_error("")
+            self._read_fields()
         typed = self.text().strip()
         lines, count = self._lines(typed)
         matches = self.matches
         chosen = matches.list.entry if keep else None
         matches.list.show_lines(lines, chosen.id if chosen is not None else "")
-        self._show_foot(count)
-        self._place(bool(lines))
+        self._update_footer(count)
+        self._position_matches(bool(lines))
 
     def _lines(self, typed: str) -> tuple[list[Line], int]:
         fields = [
-            Entry(f"topic:{text}", text, ICONS[found.kind], _note(found))
+            Entry(f"topic:{text}", text, ICONS[found.kind], _value_note(found))
             for text, found in self._known.items()
         ]
         if typed:
@@ -236,7 +238,7 @@ class AddCurve(SearchField):
             found, count = [Match(entry) for entry in fields[:MAX_SHOWN]], len(fields)
         lines: list[Line] = [Heading(_("Fields")), *found] if found else []
         names = [example.split("(")[0] for example in EXAMPLES]
-        of = next(iter(self._plotted()), None) or (found[0].entry.words if found else "/odom.speed")
+        of = next(iter(self._plotted()), None) or (found[0].entry.text if found else "/odom.speed")
         calculated = [
             Entry(f"topic:{example.format(of)}", example.format(of), "square-function")
             for name, example in zip(names, EXAMPLES, strict=True)
@@ -246,7 +248,7 @@ class AddCurve(SearchField):
             lines += [Heading(_("Calculated")), *(Match(entry) for entry in calculated)]
         return lines, count
 
-    def _show_foot(self, count: int) -> None:
+    def _update_footer(self, count: int) -> None:
         if self._matches is None:
             return
         words = _("Tab completes; Enter adds to the left axis, Shift+Enter to the right one")
@@ -256,7 +258,7 @@ class AddCurve(SearchField):
         self._matches.foot.style().unpolish(self._matches.foot)
         self._matches.foot.style().polish(self._matches.foot)
 
-    def _place(self, shown: bool) -> None:
+    def _position_matches(self, shown: bool) -> None:
         matches = self.matches
         if not shown and not self.sentence:
             matches.hide()
@@ -266,7 +268,7 @@ class AddCurve(SearchField):
         foot = matches.foot.sizeHint()
         wide = min(max(round(self._theme.scaled(MATCHES_WIDTH)), foot.width() + 4), window.width() - 8)
         high = min(
-            matches.list.height_of_all() + foot.height() + 12, round(self._theme.scaled(MATCHES_HEIGHT))
+            matches.list.content_height() + foot.height() + 12, round(self._theme.scaled(MATCHES_HEIGHT))
         )
         high = min(high, window.height() - at.y() - 4)
         matches.setGeometry(min(at.x(), window.width() - wide - 4), at.y(), wide, max(60, high))
@@ -282,25 +284,29 @@ class AddCurve(SearchField):
             and event.type() == QEvent.Type.KeyPress
             and event.key() == Qt.Key.Key_Tab
         ):
-            longer = self._completed()
+            longer = self._completed_text()
             if longer != self.text():
                 self.setText(longer)
                 self._search()
                 return True
         return super().event(event)
 
-    def _completed(self) -> str:
+    def _completed_text(self) -> str:
         typed = self.text()
         if not typed:
             return typed
         head = max(typed.rfind(sign) for sign in "( ,+*") + 1
         before, last = typed[:head], typed[head:]
-        known = [*self._known, *self.offers.names(), *(f"{name}(" for name in (*FUNCTIONS, *WINDOWED))]
-        longer = completed(last, known) if last else last
+        known = [
+            *self._known,
+            *self.offers.names(),
+            *(f"{name}(" for name in (*FUNCTIONS, *WINDOW_FUNCTIONS)),
+        ]
+        longer = complete(last, known) if last else last
         if longer == last and self._matches is not None and not head:
             entry = self._matches.list.entry
-            if entry is not None and last and entry.words != last and match(last, entry.words) is not None:
-                return entry.words
+            if entry is not None and last and entry.text != last and match(last, entry.text) is not None:
+                return entry.text
         return before + longer
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -310,7 +316,7 @@ class AddCurve(SearchField):
         elif key == Qt.Key.Key_Escape:
             self.clear()
             self.dispose()
-            self.left.emit()
+            self.exited.emit()
         elif (
             key not in {Qt.Key.Key_Home, Qt.Key.Key_End}
             and self._matches is not None
@@ -325,18 +331,18 @@ class AddCurve(SearchField):
         typed = self.text().strip()
         entry = self._matches.list.entry if self._matches is not None and self._matches.isVisible() else None
         is_whole = typed in self._known or any(sign in typed for sign in "(+*") or " " in typed
-        text = typed if is_whole or entry is None else entry.words
+        text = typed if is_whole or entry is None else entry.text
         if text:
-            self.wanted.emit(text, right)
+            self.add_requested.emit(text, right)
 
 
-def _note(found: FieldFound) -> str:
+def _value_note(found: PlottableField) -> str:
     if found.kind == "list":
         return ngettext("{count} curve", "{count} curves", found.count).format(count=found.count)
-    return value_words(found.value)
+    return value_text(found.value)
 
 
-SPAN_WORDS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "all": lazy("All")}
+SPAN_LABELS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "all": lazy("All")}
 
 
 class PlotTools(QWidget):
@@ -347,7 +353,7 @@ class PlotTools(QWidget):
         self.add = AddCurve(theme, session, plotted)
         self.span = Segments(
             theme,
-            [(value, _(SPAN_WORDS[value]), None) for value, _s in SPANS],
+            [(value, _(SPAN_LABELS[value]), None) for value, _s in SPANS],
             "60",
             size="small",
             name=_("Time range shown"),
@@ -367,7 +373,7 @@ class PlotTools(QWidget):
         for widget in self._when_there:
             row.addWidget(widget)
 
-    def fit(self, curves: int, numbers: int) -> None:
+    def update_tools(self, curves: int, numbers: int) -> None:
         """Show the tools that apply to this number of curves, `numbers` of which are numeric."""
         for widget in self._when_there:
             paint.show_when(widget, curves > 0)

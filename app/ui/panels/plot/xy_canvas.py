@@ -13,8 +13,8 @@ from PySide6.QtWidgets import QGraphicsView
 
 from app.core.series.calculated import held_values
 from app.core.series.samples import Floats
-from app.ui.panels.plot.canvas import FARTHEST, FLAG, ValueAxis
-from app.ui.panels.plot.shown_curve import ShownCurve
+from app.ui.panels.plot.canvas import FLAG_SIZE, MAX_ABS_VALUE, ValueAxis
+from app.ui.panels.plot.shown_curve import PlotCurve
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _
@@ -23,20 +23,18 @@ SHADES = 8
 MIN_ALPHA = 0.25
 MAX_POINTS = 4000
 ARROW_SIZE = 7.0
-Path = tuple[ShownCurve, ShownCurve, Floats, Floats, Floats]
+Path = tuple[PlotCurve, PlotCurve, Floats, Floats, Floats]
 
 
-def path_of(
-    across: ShownCurve, up: ShownCurve, begin_s: float, end_s: float
-) -> tuple[Floats, Floats, Floats]:
+def path_of(across: PlotCurve, up: PlotCurve, begin_s: float, end_s: float) -> tuple[Floats, Floats, Floats]:
     """Return times, x and y of the path, at the times of the first curve and at most `MAX_POINTS` points."""
     samples = across.curve.samples
-    first, end = samples.places(begin_s, end_s)
+    first, end = samples.index_range(begin_s, end_s)
     step = max(1, math.ceil((end - first) / MAX_POINTS))
     part = slice(first, end, step)
-    times, xs = samples.times[part].copy(), np.clip(samples.values[part], -FARTHEST, FARTHEST)
+    times, xs = samples.times[part].copy(), np.clip(samples.values[part], -MAX_ABS_VALUE, MAX_ABS_VALUE)
     gaps = samples.gaps[part]
-    ys = np.clip(held_values(up.curve.samples, times), -FARTHEST, FARTHEST)
+    ys = np.clip(held_values(up.curve.samples, times), -MAX_ABS_VALUE, MAX_ABS_VALUE)
     if step == 1:
         xs[gaps] = np.nan
     return times, xs, ys
@@ -84,9 +82,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         self.plot.showGrid(x=True, y=True, alpha=1.0)
         self.viewport().update()
 
-    def show_pairs(
-        self, pairs: Sequence[tuple[ShownCurve, ShownCurve]], begin_s: float, end_s: float
-    ) -> None:
+    def show_pairs(self, pairs: Sequence[tuple[PlotCurve, PlotCurve]], begin_s: float, end_s: float) -> None:
         """Draw the pairs over a time range."""
         self._paths = [(across, up, *path_of(across, up, begin_s, end_s)) for across, up in pairs]
         used = 0
@@ -110,7 +106,9 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         return self._lines[number]
 
     def _fit(self) -> None:
-        found = [(xs[good], ys[good]) for _a, _u, _t, xs, ys in self._paths if (good := _whole(xs, ys)).any()]
+        found = [
+            (xs[good], ys[good]) for _a, _u, _t, xs, ys in self._paths if (good := _finite_mask(xs, ys)).any()
+        ]
         if not found:
             return
         edges = [
@@ -120,7 +118,7 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         (left, right), (low, high) = ((a, b) if b > a else (a - 1, b + 1) for a, b in edges)
         self.view.setRange(QRectF(left, low, right - left, high - low), padding=0.08)
 
-    def place_of(self, x: float, y: float) -> QPointF:
+    def position_of(self, x: float, y: float) -> QPointF:
         """Return the widget coordinates of a point."""
         return QPointF(self.view.mapViewToScene(QPointF(x, y)))
 
@@ -152,24 +150,24 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         for name, time_s in self.cursors.items():
             point = self._point_at(self._paths[0], time_s) if self._paths else None
             if point is not None:
-                centre = self.place_of(*point)
-                side = self.theme.scaled(FLAG.height())
+                centre = self.position_of(*point)
+                side = self.theme.scaled(FLAG_SIZE.height())
                 flag = QRectF(centre.x() - side / 2, centre.y() - side / 2, side, side)
                 paint.box(painter, flag, side / 2, self.theme.colour("tooltip"))
                 font = self.theme.font("small")
-                paint.words(painter, flag, name, font, self.theme.colour("tooltipText"), paint.CENTRE)
+                paint.text_line(painter, flag, name, font, self.theme.colour("tooltipText"), paint.CENTRE)
 
     def _paint_arrow(self, painter: QPainter, path: Path) -> None:
         _across, up, _times, xs, ys = path
-        (good,) = np.nonzero(_whole(xs, ys))
+        (good,) = np.nonzero(_finite_mask(xs, ys))
         if len(good) < 2:
             return
-        tip = self.place_of(float(xs[good[-1]]), float(ys[good[-1]]))
+        tip = self.position_of(float(xs[good[-1]]), float(ys[good[-1]]))
         before = next(
             (
                 place
                 for index in reversed(good[-60:-1].tolist())
-                if _far(place := self.place_of(float(xs[index]), float(ys[index])), tip) > 3
+                if _distance_between(place := self.position_of(float(xs[index]), float(ys[index])), tip) > 3
             ),
             None,
         )
@@ -190,9 +188,9 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         painter.drawPolygon(QPolygonF(corners))
 
 
-def _whole(xs: Floats, ys: Floats) -> np.ndarray:
+def _finite_mask(xs: Floats, ys: Floats) -> np.ndarray:
     return np.isfinite(xs) & np.isfinite(ys)
 
 
-def _far(one: QPointF, other: QPointF) -> float:
+def _distance_between(one: QPointF, other: QPointF) -> float:
     return math.hypot(one.x() - other.x(), one.y() - other.y())

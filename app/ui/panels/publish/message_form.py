@@ -18,9 +18,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.run.acting.json_text import MAX_LETTERS, pretty, read_json
+from app.core.run.acting.json_text import MAX_LENGTH, format_json, parse_json_text
 from app.core.run.acting.sending import MAX_HZ, MIN_HZ
-from app.core.run.acting.shelf import NAME_LETTERS, KeptMessage
+from app.core.run.acting.shelf import MAX_NAME_LENGTH, SavedMessage
 from app.core.run.acting.templates import is_plain
 from app.ui.panels.publish.value_fields import ValueFields
 from app.ui.text import plain
@@ -59,7 +59,7 @@ class TopicEdit(QLineEdit):
             popup.setItemDelegate(QStyledItemDelegate(popup))  # lets the style sheet set the padding of items
         self.setCompleter(completer)
 
-    def offer(self, names: Sequence[str]) -> None:
+    def set_completions(self, names: Sequence[str]) -> None:
         """Set the names offered as completions."""
         some = list(names[:MAX_COMPLETIONS])
         if some != self._offered.stringList():
@@ -76,15 +76,15 @@ class MessageForm(QWidget):
     """
 
     changed = Signal(object)  # KeptMessage
-    send_wanted = Signal()
-    repeat_wanted = Signal()
-    template_wanted = Signal()
+    send_requested = Signal()
+    repeat_requested = Signal()
+    template_requested = Signal()
 
     def __init__(self, theme: Theme, type_of: Callable[[str], str]) -> None:
         super().__init__()
         self._theme, self._type_of = theme, type_of
-        self.message: KeptMessage | None = None
-        self.read = read_json("{}")
+        self.message: SavedMessage | None = None
+        self.read = parse_json_text("{}")
         self._is_showing = False
         self._make_fields()
         self._make_text()
@@ -97,7 +97,7 @@ class MessageForm(QWidget):
         theme = self._theme
         self.name = QLineEdit()
         self.name.setAccessibleName(_("Message name"))
-        self.name.setMaxLength(NAME_LETTERS)
+        self.name.setMaxLength(MAX_NAME_LENGTH)
         EditMenu(theme, self.name)
         self.topic = TopicEdit(theme)
         self.kind = QLineEdit()
@@ -107,9 +107,9 @@ class MessageForm(QWidget):
         for field in (self.name, self.kind):
             field.setProperty("focusRadius", theme.radius("control"))
         self.values = ValueFields(theme)
-        self.name.textEdited.connect(lambda text: self._edit(name=text))
+        self.name.textEdited.connect(lambda text: self._update_message(name=text))
         self.topic.textChanged.connect(self._topic_typed)
-        self.kind.textEdited.connect(lambda text: self._edit(msg_type=text.strip() or "json"))
+        self.kind.textEdited.connect(lambda text: self._update_message(msg_type=text.strip() or "json"))
         self.values.typed.connect(self._value_typed)
 
     def _make_text(self) -> None:
@@ -119,17 +119,17 @@ class MessageForm(QWidget):
         self.tidy = Button(theme, _("Format"), "wand-sparkles", kind="ghost", size="small")
         self.tidy.setToolTip(plain.tip(_("One line per field")))
         for button in (self.template, self.tidy):
-            button.let_shrink()
+            button.allow_shrinking()
         self.edit = JsonEdit(theme, _("Message"))
         self.fault_icon = StatusIcon(theme, "error", height=20)
         self.sentence = label("", "small", role="error", wrap=True)
         self.sentence.setMinimumWidth(0)
         self.fix = Button(theme, _("Fix it"), "wrench", size="small")
-        self.template.clicked.connect(self.template_wanted)
-        self.tidy.clicked.connect(self.make_tidy)
-        self.fix.clicked.connect(self.put_right)
+        self.template.clicked.connect(self.template_requested)
+        self.tidy.clicked.connect(self.format_json)
+        self.fix.clicked.connect(self.apply_fix)
         self.edit.changed.connect(self._text_typed)
-        self.edit.sent.connect(self.send_wanted)
+        self.edit.submitted.connect(self.send_requested)
 
     def _make_buttons(self) -> None:
         theme = self._theme
@@ -140,16 +140,16 @@ class MessageForm(QWidget):
         self.rate = NumberEdit(theme, MIN_HZ, MAX_HZ, _("/s"), 1)
         self.rate.setAccessibleName(_("Messages per second"))
         self.rate.setFixedWidth(round(theme.scaled(RATE_WIDTH_PX)))
-        self.rate.number.connect(lambda value: self._edit(rate_hz=value))
+        self.rate.number.connect(lambda value: self._update_message(rate_hz=value))
         self.count = ElidedLabel("small", "textSecondary")
         self.rate_hint = label("", "small", role="textTertiary", wrap=True)
         self.rate_hint.setMinimumWidth(0)
-        self.rate.problem.connect(self._say_rate)
-        self._say_rate("")
-        self.send.clicked.connect(self.send_wanted)
-        self.repeat.clicked.connect(self.repeat_wanted)
+        self.rate.problem_changed.connect(self._update_rate_hint)
+        self._update_rate_hint("")
+        self.send.clicked.connect(self.send_requested)
+        self.repeat.clicked.connect(self.repeat_requested)
 
-    def _say_rate(self, problem: str) -> None:
+    def _update_rate_hint(self, problem: str) -> None:
         said = _("0.1 to 50 per second; stops when disarmed")
         self.rate_hint.setText(problem or said)
 
@@ -204,7 +204,7 @@ class MessageForm(QWidget):
 
     # -- display ------------------------------------------------------------------------------------------
 
-    def show_message(self, message: KeptMessage) -> None:
+    def show_message(self, message: SavedMessage) -> None:
         """Show a message. Fields with an equivalent value keep their text while the user types."""
         other = self.message is None or self.message.id != message.id
         if message == self.message:
@@ -222,24 +222,24 @@ class MessageForm(QWidget):
         if other or not self.rate.hasFocus():
             self.rate.show_number(message.rate_hz)
         self._is_showing = False
-        self._judge()
+        self._validate()
 
-    def _judge(self) -> None:
+    def _validate(self) -> None:
         # Validates the text and shows fields for its placeholders.
         message = self.message
         if message is None:
             return
         is_json = not is_plain(message.msg_type)
-        self.read = read_json(message.text) if is_json else read_json("{}")
+        self.read = parse_json_text(message.text) if is_json else parse_json_text("{}")
         self.edit.set_coloured(is_json)
         fault = self.read.fault
         self.edit.mark(fault.line if fault is not None else 0)
         self.tidy.setEnabled(is_json and fault is None and not self.read.places)
-        self.values.show_places(self.read.to_fill, dict(message.values))
+        self.values.show_fields(self.read.manual_placeholders, dict(message.values))
         for widget in (self._value_words, self.values):
-            widget.setVisible(bool(self.read.to_fill))
+            widget.setVisible(bool(self.read.manual_placeholders))
 
-    def say_problem(self, problem: str) -> None:
+    def show_problem(self, problem: str) -> None:
         """Show the reason why the message can't be sent; "" if it can."""
         fault = self.read.fault
         words = _("{problem} The message can't be sent yet.").format(problem=problem) if problem else ""
@@ -251,11 +251,11 @@ class MessageForm(QWidget):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def _edit(self, **changes: object) -> None:
+    def _update_message(self, **changes: object) -> None:
         if self.message is None or self._is_showing:
             return
         self.message = replace(self.message, **changes)  # type: ignore[arg-type]
-        self._judge()
+        self._validate()
         self.changed.emit(self.message)
 
     def _topic_typed(self, text: str) -> None:
@@ -265,38 +265,38 @@ class MessageForm(QWidget):
         known = self._type_of(topic)
         if known and known != self.kind.text():
             self.kind.setText(known)
-            self._edit(topic=topic, msg_type=known)
+            self._update_message(topic=topic, msg_type=known)
         else:
-            self._edit(topic=topic)
+            self._update_message(topic=topic)
 
     def _value_typed(self, name: str, text: str) -> None:
         if self.message is not None:
             self.message = self.message.with_value(name, text)
-            self._judge()
+            self._validate()
             self.changed.emit(self.message)
 
     def _text_typed(self) -> None:
         text = self.edit.text()
         if self.message is not None and text != self.message.text:
-            self._edit(text=text[: MAX_LETTERS + 1])
+            self._update_message(text=text[: MAX_LENGTH + 1])
 
     def set_type(self, msg_type: str) -> None:
         """Set the message type."""
         self.kind.setText(msg_type)
-        self._edit(msg_type=msg_type)
+        self._update_message(msg_type=msg_type)
 
-    def put_text(self, text: str) -> None:
+    def replace_text(self, text: str) -> None:
         """Replace the whole text as one undoable edit."""
         self.edit.replace(0, len(self.edit.text()), text)
 
-    def make_tidy(self) -> None:
+    def format_json(self) -> None:
         """Format the JSON text. Has no effect while it contains placeholders."""
         try:
-            self.put_text(pretty(self.read.filled({})))
+            self.replace_text(format_json(self.read.fill({})))
         except NepError as error:
-            self.say_problem(str(error))
+            self.show_problem(str(error))
 
-    def put_right(self) -> None:
+    def apply_fix(self) -> None:
         """Apply the suggested fix of the first error."""
         fault: JsonFault | None = self.read.fault
         if fault is not None and fault.fix is not None:

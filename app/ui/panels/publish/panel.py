@@ -11,19 +11,19 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout
 
 from app.core.network.topics import split_key
 from app.core.network.watches import Suspendable, Watch
-from app.core.run.acting.acting import result_words
+from app.core.run.acting.acting import result_text
 from app.core.run.acting.arming import Target
-from app.core.run.acting.shelf import MAX_MESSAGES, KeptMessage
+from app.core.run.acting.shelf import MAX_MESSAGES, SavedMessage
 from app.core.run.acting.templates import text_of_message, text_of_type
 from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
 from app.ui.panels.publish.message_form import MessageForm
 from app.ui.panels.publish.shelf_list import ShelfList, state_cell
-from app.ui.panels.row_actions import RowAction, filled
-from app.ui.text.numbers import grouped, rate_words
+from app.ui.panels.row_actions import RowAction, fill_menu
+from app.ui.text.numbers import group_digits, rate_text
 from app.ui.widgets import Button, EmptyAction, EmptyState, label
 from app.ui.widgets.inputs.fields import FilterField
-from app.ui.widgets.lists.list_beside import ListBeside
+from app.ui.widgets.lists.list_beside import ListDetailView
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.paint import show_when
@@ -49,7 +49,7 @@ class PublishPanel(PanelWidget):
         self.chips = [self.count]
         self.new = Button(self.theme, _("New"), "plus", size="small")
         self.new.setAccessibleName(_("New message"))
-        self.new.clicked.connect(lambda: self.begin(""))
+        self.new.clicked.connect(lambda: self.open_for(""))
         self.header = [self.new]
         self.strip = ArmedStrip(context)
         self._minutes = ArmedMinutes(self.theme, self, self.acting)
@@ -62,7 +62,7 @@ class PublishPanel(PanelWidget):
             "send",
             _("No saved messages"),
             _("Right-click a topic or a message, or create one."),
-            [EmptyAction(_("New"), lambda: self.begin(""), "plus", primary=True)],
+            [EmptyAction(_("New"), lambda: self.open_for(""), "plus", is_primary=True)],
         )
         self._connect()
         self._arrange()
@@ -70,18 +70,18 @@ class PublishPanel(PanelWidget):
 
     def _connect(self) -> None:
         self.filter.textChanged.connect(lambda _text: self._rebuild())
-        self.filter.leave.connect(lambda: self.list.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.filter.exited.connect(lambda: self.list.setFocus(Qt.FocusReason.ShortcutFocusReason))
         shelf, form = self.list, self.form
-        shelf.filter_wanted.connect(self.focus_filter)
-        shelf.chosen.connect(lambda _id: self._show_chosen())
-        shelf.send_wanted.connect(lambda _id: self.send())
-        shelf.copy_wanted.connect(self.copy)
-        shelf.delete_wanted.connect(self.delete)
-        shelf.menu_wanted.connect(self._show_menu)
-        form.changed.connect(self._changed)
-        form.send_wanted.connect(self.send)
-        form.repeat_wanted.connect(self.repeat)
-        form.template_wanted.connect(self.take_template)
+        shelf.filter_requested.connect(self.focus_filter)
+        shelf.selected.connect(lambda _id: self._show_selected())
+        shelf.send_requested.connect(lambda _id: self.send())
+        shelf.copy_requested.connect(self.copy)
+        shelf.delete_requested.connect(self.delete)
+        shelf.menu_requested.connect(self._show_menu)
+        form.changed.connect(self._message_edited)
+        form.send_requested.connect(self.send)
+        form.repeat_requested.connect(self.repeat)
+        form.template_requested.connect(self.insert_template)
 
     def _arrange(self) -> None:
         scroll = ScrollColumn(_("Selected message"))
@@ -89,7 +89,7 @@ class PublishPanel(PanelWidget):
         scroll.column.insertWidget(0, self.form)
         scroll.column.setStretchFactor(self.form, 1)
         scroll.column.setStretch(scroll.column.count() - 1, 0)  # the form takes the remaining height
-        self._sides = ListBeside(
+        self._sides = ListDetailView(
             self.theme,
             (self.filter, self.list, scroll),
             list_px=LIST_WIDTH_PX,
@@ -110,16 +110,16 @@ class PublishPanel(PanelWidget):
     def refresh(self) -> None:
         self._ticks += 1
         self.strip.refresh()
-        self._follow_peek()
+        self._poll_peek()
         acting, topics = self.acting, self.session.live.topics
         facts = (acting.shelf.revision, acting.revision, acting.arming.revision, topics.revision)
         if facts != self._seen:
             self._seen = facts
             self._rebuild()
-            self.form.topic.offer(sorted(topic.name for topic in topics.live()))
+            self.form.topic.set_completions(sorted(topic.name for topic in topics.existing_topics()))
         elif self._ticks % STATE_UPDATE_TICKS == 0:
-            self._say_sending()
-            self.list.tell_visible_changed()
+            self._update_sending()
+            self.list.refresh_visible()
 
     def source_changed(self) -> None:
         self._seen = ()
@@ -134,68 +134,68 @@ class PublishPanel(PanelWidget):
             if each.id == self._wanted
             or all(word in f"{each.name} {each.topic}".casefold() for word in words)
         ]
-        chosen = self._wanted or self.list.chosen_key() or ""
+        chosen = self._wanted or self.list.selected_key() or ""
         model = self.list.model()
         model.set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         if rows:
             known = {each.id for each in rows}
             wanted = chosen if chosen in known else rows[0].id
-            if self.list.chosen_key() != wanted:
-                self.list.choose(wanted)
+            if self.list.selected_key() != wanted:
+                self.list.select_key(wanted)
         self._wanted = ""
-        self.list.tell_visible_changed()
+        self.list.refresh_visible()
         self.pages.setCurrentIndex(1 if messages else 0)
         said = ngettext("{count} saved message", "{count} saved messages", len(messages))
         self.count.setText(said.format(count=len(messages)) if messages else "")
-        self._show_chosen()
+        self._show_selected()
 
     @property
-    def message(self) -> KeptMessage | None:
+    def message(self) -> SavedMessage | None:
         """Selected message, or None."""
-        return self.acting.shelf.get(self.list.chosen_key() or "")
+        return self.acting.shelf.get(self.list.selected_key() or "")
 
-    def _show_chosen(self) -> None:
+    def _show_selected(self) -> None:
         message = self.message
         self.form.setVisible(message is not None)
         if message is not None:
             if self.form.message is not None and self.form.message.id != message.id:
                 self._end_peek()
             self.form.show_message(message)
-            self._say_sending()
+            self._update_sending()
 
-    def _say_sending(self) -> None:
+    def _update_sending(self) -> None:
         # Updates the texts of the buttons and the result of sending.
         message, form, acting = self.message, self.form, self.acting
         if message is None:
             return
         problem = acting.problem_of(message)
-        form.say_problem(problem)
+        form.show_problem(problem)
         is_armed = acting.arming.allows(Target("topic", message.topic))
-        is_going = acting.outbox.is_going(message.id)
+        is_going = acting.outbox.is_sending(message.id)
         can_send = not problem and not self.session.is_replaying
         form.send.setEnabled(can_send)
-        form.send.set_word(_("Send") if is_armed else _("Arm and send"), "send" if is_armed else "lock")
+        form.send.set_label(_("Send") if is_armed else _("Arm and send"), "send" if is_armed else "lock")
         form.repeat.setEnabled(can_send or is_going)
-        form.repeat.set_word(
+        form.repeat.set_label(
             _("Stop sending") if is_going else _("Start sending"), "square" if is_going else "repeat"
         )
         form.rate.setEnabled(not is_going)
-        form.last.setText(self._last_words(message))
-        form.count.setText(self._count_words(message))
+        form.last.setText(self._last_result_text(message))
+        form.count.setText(self._count_text(message))
 
-    def _last_words(self, message: KeptMessage) -> str:
+    def _last_result_text(self, message: SavedMessage) -> str:
         result, at_s = self.acting.last.get(message.id), self.acting.sent_at_s.get(message.id)
         if result is None or at_s is None:
             return ""
         clock = dt.datetime.fromtimestamp(at_s, tz=dt.timezone.utc).astimezone().strftime("%H:%M:%S")
-        return _("last at {time}: {what}").format(time=clock.lstrip("0"), what=result_words(result))
+        return _("last at {time}: {what}").format(time=clock.lstrip("0"), what=result_text(result))
 
-    def _count_words(self, message: KeptMessage) -> str:
+    def _count_text(self, message: SavedMessage) -> str:
         going = self.acting.outbox.repeated(message.id)
         if going is None:
             return ""
         said = ngettext("{count} sent, {rate}/s", "{count} sent, {rate}/s", going.count)
-        return said.format(count=grouped(going.count), rate=rate_words(going.rate_now_hz))
+        return said.format(count=group_digits(going.count), rate=rate_text(going.measured_hz))
 
     def _type_of(self, topic: str) -> str:
         known = self.session.live.topics.get(topic)
@@ -207,7 +207,7 @@ class PublishPanel(PanelWidget):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def begin(self, key: str) -> None:
+    def open_for(self, key: str) -> None:
         """Select a saved message for the topic, or create one from the topic's last message."""
         _network, topic = split_key(key)
         kept = [each for each in self.acting.shelf.messages if topic and each.topic == topic]
@@ -221,11 +221,11 @@ class PublishPanel(PanelWidget):
         self.filter.clear()
         self._rebuild()
         if not kept and topic:
-            self.take_template()
+            self.insert_template()
         field = self.form.edit if topic else self.form.topic
         field.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def take_template(self) -> None:
+    def insert_template(self) -> None:
         """Insert the topic's next message or, without a publisher, a template with the fields of its type."""
         message = self.message
         if message is None:
@@ -233,7 +233,7 @@ class PublishPanel(PanelWidget):
         topic = self.session.live.topics.get(message.topic)
         if self._peek is not None or topic is None or not topic.publishers:
             self._end_peek()
-            self.form.put_text(text_of_type(message.msg_type))
+            self.form.replace_text(text_of_type(message.msg_type))
             if topic is None or not topic.publishers:
                 self.context.toast(_("No publisher on this topic: using the fields of the message type"))
             return
@@ -241,10 +241,10 @@ class PublishPanel(PanelWidget):
             self.form.set_type(topic.msg_type)
         self._peeked = message.topic
         self._peek = self.session.watch(message.topic)
-        self.form.template.set_word(_("Waiting for a message"), "hourglass")
-        self._follow_peek()
+        self.form.template.set_label(_("Waiting for a message"), "hourglass")
+        self._poll_peek()
 
-    def _follow_peek(self) -> None:
+    def _poll_peek(self) -> None:
         if self._peek is None:
             return
         topic = self.session.live.topics.get(self._peeked)
@@ -253,7 +253,7 @@ class PublishPanel(PanelWidget):
             return
         self._end_peek()
         try:
-            self.form.put_text(text_of_message(newest))
+            self.form.replace_text(text_of_message(newest))
         except NepError as error:
             self.context.toast(str(error))
 
@@ -261,33 +261,35 @@ class PublishPanel(PanelWidget):
         if self._peek is not None:
             self._peek.close()
             self._peek = None
-            self.form.template.set_word(_("Use the last message"), "history")
+            self.form.template.set_label(_("Use the last message"), "history")
 
-    def _changed(self, message: object) -> None:
-        if isinstance(message, KeptMessage):
-            self.acting.shelf.put(message)
-            if self.acting.outbox.is_going(message.id):
-                self.acting.end(message.id)  # repeated sending must not continue with outdated values
-            self._say_sending()
+    def _message_edited(self, message: object) -> None:
+        if isinstance(message, SavedMessage):
+            self.acting.shelf.set_message(message)
+            if self.acting.outbox.is_sending(message.id):
+                self.acting.stop_sending(
+                    message.id
+                )  # repeated sending must not continue with outdated values
+            self._update_sending()
 
     def send(self) -> None:
         """Send the selected message once."""
         message = self.message
         if message is not None:
-            self._set_reason(self.acting.send(message))
+            self._show_reason(self.acting.send(message))
 
     def repeat(self) -> None:
         """Start or stop repeated sending of the selected message."""
         message = self.message
         if message is None:
             return
-        if self.acting.outbox.is_going(message.id):
-            self.acting.end(message.id)
+        if self.acting.outbox.is_sending(message.id):
+            self.acting.stop_sending(message.id)
             self.refresh()
         else:
-            self._set_reason(self.acting.send(message, rate_hz=message.rate_hz))
+            self._show_reason(self.acting.send(message, rate_hz=message.rate_hz))
 
-    def _set_reason(self, why_not: str) -> None:
+    def _show_reason(self, why_not: str) -> None:
         if why_not:
             self.context.toast(why_not)
         self.refresh()
@@ -301,22 +303,22 @@ class PublishPanel(PanelWidget):
 
     def delete(self, id: str) -> None:
         """Delete a message; the toast offers to undo it."""
-        self.acting.end(id)
+        self.acting.stop_sending(id)
         removed = self.acting.shelf.remove(id)
         if removed is not None:
             said = _("Deleted “{name}”").format(name=removed.name)
-            self.context.toast(said, _("Undo"), self._put_back)
+            self.context.toast(said, _("Undo"), self._undo_delete)
             self._rebuild()
 
-    def _put_back(self) -> None:
-        back = self.acting.shelf.put_back()
+    def _undo_delete(self) -> None:
+        back = self.acting.shelf.restore()
         if back is not None:
             self._wanted = back.id
             self._rebuild()
 
     def menu_of(self, id: str) -> Menu:
         """Return the context menu of a message."""
-        is_going = self.acting.outbox.is_going(id)
+        is_going = self.acting.outbox.is_sending(id)
         words = _("Stop sending") if is_going else _("Start sending")
         actions = [
             RowAction(_("Send"), "send", self.send),
@@ -324,7 +326,7 @@ class PublishPanel(PanelWidget):
             RowAction(_("Duplicate"), "copy", lambda: self.copy(id)),
             RowAction(_("Delete"), "trash-2", lambda: self.delete(id)),
         ]
-        return filled(Menu(self.theme, self), self.theme, actions)
+        return fill_menu(Menu(self.theme, self), self.theme, actions)
 
     def _show_menu(self, id: str, at: QPoint) -> None:
         menu = self.menu_of(id)
@@ -347,7 +349,7 @@ class PublishPanel(PanelWidget):
         self._sides.fit()
 
     def save_state(self) -> dict[str, object]:
-        return {"message": self.list.chosen_key() or ""}
+        return {"message": self.list.selected_key() or ""}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
         self._wanted = str(state.get("message", ""))

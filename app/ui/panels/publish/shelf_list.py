@@ -9,10 +9,10 @@ from PySide6.QtGui import QKeyEvent
 
 from app.core.run.acting.acting import SessionActing
 from app.core.run.acting.arming import Target
-from app.core.run.acting.json_text import read_json
-from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.json_text import parse_json_text
+from app.core.run.acting.shelf import SavedMessage
 from app.core.run.acting.templates import is_plain
-from app.ui.text.numbers import rate_words
+from app.ui.text.numbers import rate_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets.keyboard import is_plain as is_plain_key
 from app.ui.widgets.table.model import Cell, Column, TableModel
@@ -21,51 +21,51 @@ from app.ui.widgets.table.view import TableView
 from nep.i18n import _, lazy
 
 
-def state_cell(message: KeptMessage, acting: SessionActing) -> Cell:
+def state_cell(message: SavedMessage, acting: SessionActing) -> Cell:
     """Return the cell with the state of a message as text and icon."""
-    if acting.outbox.is_going(message.id):
-        return Cell(_("{rate}/s").format(rate=rate_words(message.rate_hz)), "dot", "warn")
-    fault = None if is_plain(message.msg_type) else read_json(message.text).fault
+    if acting.outbox.is_sending(message.id):
+        return Cell(_("{rate}/s").format(rate=rate_text(message.rate_hz)), "dot", "warn")
+    fault = None if is_plain(message.msg_type) else parse_json_text(message.text).fault
     if fault is not None:
         return Cell(_("line {line}").format(line=fault.line), "circle-x", "error")
     if acting.problem_of(message):
         return Cell(_("not ready"), "circle-x", "error")
     if not acting.arming.allows(Target("topic", message.topic)):
         return Cell(_("not armed"), "lock", "textTertiary")
-    return Cell("", "send", "textSecondary", said=_("can be sent"))
+    return Cell("", "send", "textSecondary", accessible_text=_("can be sent"))
 
 
-class ShelfList(TableView[KeptMessage]):
+class ShelfList(TableView[SavedMessage]):
     """List of saved messages; a click selects one.
 
     `chosen` carries the id of the selected message, also for selection by keyboard. Keys send, copy and
     delete.
     """
 
-    chosen = Signal(str)
-    send_wanted = Signal(str)
-    copy_wanted = Signal(str)
-    delete_wanted = Signal(str)
+    selected = Signal(str)
+    send_requested = Signal(str)
+    copy_requested = Signal(str)
+    delete_requested = Signal(str)
 
-    def __init__(self, theme: Theme, state: Callable[[KeptMessage], Cell]) -> None:
-        columns: tuple[Column[KeptMessage], ...] = (
+    def __init__(self, theme: Theme, state: Callable[[SavedMessage], Cell]) -> None:
+        columns: tuple[Column[SavedMessage], ...] = (
             Column(
                 "message",
                 lazy("Message"),
                 90,
                 lambda each: Cell(
                     mark=TwoLines(each.name, each.topic or _("no topic yet")),
-                    said=f"{each.name}, {each.topic}",
+                    accessible_text=f"{each.name}, {each.topic}",
                 ),
                 stretch=True,
                 tip=lambda each: f"{each.name}\n{each.topic}",
             ),
-            Column("state", lazy("State"), 112, state, figures=True),
+            Column("state", lazy("State"), 112, state, is_numeric=True),
         )
         super().__init__(theme, TableModel(columns, lambda each: each.id))
         self.horizontalHeader().hide()
         self.setAccessibleName(_("Saved messages"))
-        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
+        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._emit_selected())
         theme.changed.connect(self.fit_rows)
         self.fit_rows()
 
@@ -77,17 +77,17 @@ class ShelfList(TableView[KeptMessage]):
         # A click only selects.
         ...
 
-    def _tell_chosen(self) -> None:
-        self.chosen.emit(self.chosen_key() or "")
+    def _emit_selected(self) -> None:
+        self.selected.emit(self.selected_key() or "")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, pressed = self.chosen_key(), event.key()
+        key, pressed = self.selected_key(), event.key()
         held = event.modifiers() == Qt.KeyboardModifier.ControlModifier
         if key is not None and held and pressed in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self.send_wanted.emit(key)
+            self.send_requested.emit(key)
         elif key is not None and held and pressed == Qt.Key.Key_D:
-            self.copy_wanted.emit(key)
+            self.copy_requested.emit(key)
         elif key is not None and is_plain_key(event) and pressed == Qt.Key.Key_Delete:
-            self.delete_wanted.emit(key)
+            self.delete_requested.emit(key)
         else:
             super().keyPressEvent(event)

@@ -33,7 +33,7 @@ class ValueFields(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self._place)
 
-    def show_places(self, names: Sequence[str], values: Mapping[str, str]) -> None:
+    def show_fields(self, names: Sequence[str], values: Mapping[str, str]) -> None:
         """Show fields for these placeholders. Existing fields keep their text and focus."""
         if list(names) != list(self.fields):
             self._rebuild(names)

@@ -10,15 +10,15 @@ from PySide6.QtCore import QPointF, QRectF, QSize
 from PySide6.QtGui import QImage, QPainter, QPainterPath
 
 from app.core.recording.folder import RecordingFacts
-from app.ui.text.dates import when_words
-from app.ui.text.numbers import grouped, length_words, size_words
+from app.ui.text.dates import date_time_text
+from app.ui.text.numbers import group_digits, length_text, size_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.table.model import Cell, Column
 from nep.i18n import _, lazy
 
-PICTURE = QSize(64, 48)
+THUMBNAIL_SIZE = QSize(64, 48)
 GAP, CHIP_HEIGHT, CHIP_PADDING = 14, 18, 8
 BADGES = {
     "recording": (lazy("recording"), "error", "circle-dot"),
@@ -42,7 +42,7 @@ def badge_of(facts: RecordingFacts, being_written: bool) -> str:
         return "repaired"
     if not facts.is_complete:
         return "cut"
-    return "kept" if facts.is_kept else ""
+    return "kept" if facts.is_from_flight_recorder else ""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class RecordingMark:
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
         side = theme.scaled(1.0)
-        place = QRectF(box.left(), 0, PICTURE.width() * side, PICTURE.height() * side)
+        place = QRectF(box.left(), 0, THUMBNAIL_SIZE.width() * side, THUMBNAIL_SIZE.height() * side)
         place.moveCenter(QPointF(place.center().x(), box.center().y()))
         self._paint_picture(painter, place, theme)
         words = QRectF(box)
@@ -69,13 +69,13 @@ class RecordingMark:
         chip = self._chip_width(theme)
         room = max(0.0, words.width() - (chip + 8 if chip else 0))
         wide = min(paint.width_of(name, self.name) + 1, room)
-        paint.words(painter, QRectF(words.left(), top, wide, high), self.name, name, theme.colour("text"))
+        paint.text_line(painter, QRectF(words.left(), top, wide, high), self.name, name, theme.colour("text"))
         if chip:
             middle = QRectF(words.left() + wide + 8, top + high / 2 - CHIP_HEIGHT / 2, chip, CHIP_HEIGHT)
             self._paint_chip(painter, middle, theme)
         if self.note:
             line = QRectF(words.left(), top + high, words.width(), low)
-            paint.words(painter, line, self.note, small, theme.colour("textSecondary"))
+            paint.text_line(painter, line, self.note, small, theme.colour("textSecondary"))
 
     def _paint_picture(self, painter: QPainter, place: QRectF, theme: Theme) -> None:
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -106,24 +106,24 @@ class RecordingMark:
         paint.box(painter, box, box.height() / 2, theme.colour(status.tint or "sunken"))
         paint_icon(painter, QRectF(box.left() + CHIP_PADDING - 2, box.center().y() - 6, 12, 12), icon, ink)
         inside = box.adjusted(CHIP_PADDING + 13, 0, -2, 0)
-        paint.words(painter, inside, _(words), theme.font("caption"), ink)
+        paint.text_line(painter, inside, _(words), theme.font("caption"), ink)
 
 
-def cropped(image: QImage) -> QImage:
+def crop_to_thumbnail(image: QImage) -> QImage:
     """Crop an image to the aspect ratio of thumbnails, at twice their size for high-DPI screens."""
     wide, high = image.width(), image.height()
     if not wide or not high:
         return image
-    share = PICTURE.width() / PICTURE.height()
+    share = THUMBNAIL_SIZE.width() / THUMBNAIL_SIZE.height()
     across = min(wide, round(high * share))
     down = min(high, round(wide / share))
     middle = image.copy((wide - across) // 2, (high - down) // 2, max(1, across), max(1, down))
-    return middle.scaled(2 * PICTURE.width(), 2 * PICTURE.height())
+    return middle.scaled(2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height())
 
 
 def note_of(facts: RecordingFacts) -> str:
     """Return the second line of a row: the error, the note, or the names of the first topics."""
-    return facts.problem or facts.not_scanned or facts.note or ", ".join(facts.topics[:3])
+    return facts.problem or facts.scan_problem or facts.note or ", ".join(facts.topics[:3])
 
 
 def columns(
@@ -144,33 +144,35 @@ def columns(
         note = note_of(facts)
         mark = RecordingMark(facts.path.stem, note, badge, image.cacheKey() if image else 0, image)
         said = ", ".join(filter(None, (facts.path.stem, _(BADGES[badge][0]) if badge else "", note)))
-        return Cell(mark=mark, said=said)
+        return Cell(mark=mark, accessible_text=said)
 
-    def when(facts: RecordingFacts) -> Cell:
+    def date_cell(facts: RecordingFacts) -> Cell:
         seconds = facts.started_ns / 1e9 if facts.started_ns else facts.changed_s
         then = dt.datetime.fromtimestamp(min(max(seconds, 0.0), 4e10), tz=dt.timezone.utc).astimezone()
-        return Cell(when_words(then, now()))
+        return Cell(date_time_text(then, now()))
 
     def length(facts: RecordingFacts) -> Cell:
-        return Cell(length_words(facts.duration_s) if facts.message_count else "")
+        return Cell(length_text(facts.duration_s) if facts.message_count else "")
 
     def lost(facts: RecordingFacts) -> Cell:
         if facts.lost is None:
             return Cell()
         return Cell(
-            grouped(facts.lost), "triangle-alert" if facts.lost else None, "warn" if facts.lost else "text"
+            group_digits(facts.lost),
+            "triangle-alert" if facts.lost else None,
+            "warn" if facts.lost else "text",
         )
 
     return (
         Column("name", lazy("Recording"), 280, name, key=lambda facts: facts.path.stem.casefold(),
                stretch=True, tip=lambda facts: str(facts.path)),
-        Column("when", lazy("Recorded"), 132, when,
-               key=lambda facts: facts.started_ns or facts.changed_s * 1e9, yields=1),
-        Column("length", lazy("Length"), 68, length, key=lambda facts: facts.duration_s, figures=True),
-        Column("size", lazy("Size"), 72, lambda facts: Cell(size_words(facts.size_bytes)),
-               key=lambda facts: facts.size_bytes, figures=True, yields=2),
+        Column("when", lazy("Recorded"), 132, date_cell,
+               key=lambda facts: facts.started_ns or facts.changed_s * 1e9, hide_order=1),
+        Column("length", lazy("Length"), 68, length, key=lambda facts: facts.duration_s, is_numeric=True),
+        Column("size", lazy("Size"), 72, lambda facts: Cell(size_text(facts.size_bytes)),
+               key=lambda facts: facts.size_bytes, is_numeric=True, hide_order=2),
         Column("messages", lazy("Messages"), 84,
-               lambda facts: Cell(grouped(facts.message_count) if facts.message_count else ""),
-               key=lambda facts: facts.message_count, figures=True, yields=4),
-        Column("lost", lazy("Lost"), 92, lost, key=lambda facts: facts.lost, figures=True, yields=3),
+               lambda facts: Cell(group_digits(facts.message_count) if facts.message_count else ""),
+               key=lambda facts: facts.message_count, is_numeric=True, hide_order=4),
+        Column("lost", lazy("Lost"), 92, lost, key=lambda facts: facts.lost, is_numeric=True, hide_order=3),
     )  # fmt: skip

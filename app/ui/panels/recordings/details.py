@@ -11,13 +11,13 @@ from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from app.core.recording.choice import file_stem
 from app.core.recording.exporting import RecordingExport
-from app.core.recording.film_strip import FilmStripLook, part_of
+from app.core.recording.film_strip import FilmStripPreview, select_part
 from app.core.recording.folder import RecordingFacts
-from app.core.recording.replay.scale import span_words
+from app.core.recording.replay.scale import duration_text
 from app.ui.panels.recordings.film_strip import FilmStrip
 from app.ui.panels.recordings.topic_list import TopicList, shortest_choice
 from app.ui.text import plain
-from app.ui.text.numbers import grouped, size_words
+from app.ui.text.numbers import group_digits, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Button,
@@ -33,10 +33,10 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.pattern_field import PatternField
 from nep.errors import BadTopicError
 from nep.i18n import _, lazy, ngettext
-from nep.recordings.export import ALL_OF_IT, Part, takes
+from nep.recordings.export import FULL_RECORDING, Part, can_export
 
 BAR_WIDTH_PX = 120
-FORMAT_WORDS = {
+FORMAT_LABELS = {
     "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Images"), "mp4": lazy("MP4"),
     "mcap": lazy("MCAP"),
 }  # fmt: skip
@@ -46,7 +46,7 @@ FORMAT_WORDS = {
 class RecordingDetails(QWidget):
     """Details below the table; emits `wants_export` with the export format, and `cancelled`."""
 
-    wants_export = Signal(str)
+    export_requested = Signal(str)
     cancelled = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -59,9 +59,9 @@ class RecordingDetails(QWidget):
         self.rename = Button(theme, _("Rename"), "pencil", size="small")
         self.show_file = Button(theme, _("Show the file"), "folder-open", size="small")
         self.delete = Button(theme, _("Delete"), "trash-2", size="small")
-        formats = [(kind, _(words), None) for kind, words in FORMAT_WORDS.items()]
+        formats = [(kind, _(words), None) for kind, words in FORMAT_LABELS.items()]
         self.format = Segments(theme, formats, size="small", name=_("Export as"), wraps=True)
-        self._make_part()
+        self._make_export_fields()
         self.export = Button(theme, _("Export"), "download", size="small")
         self.export.clicked.connect(self._press)
         self.bar = ValueBar(theme)
@@ -72,27 +72,27 @@ class RecordingDetails(QWidget):
         self.show_export(None)
         self.show_strip(None)
 
-    def _make_part(self) -> None:
+    def _make_export_fields(self) -> None:
         # Time range, topics and folder of the export.
         theme = self._theme
         self.strip = FilmStrip(theme)
-        self.strip.changed.connect(self._show_part)
+        self.strip.changed.connect(self._update_part)
         self.topics = PatternField(theme, _("Topics to export"), _("all topics; or /odom *camera*"))
-        self.topics.changed.connect(self._typed)
+        self.topics.changed.connect(self._patterns_edited)
         self._is_none_chosen = False
         self.pick = ToggleButton(theme, _("From a list"), "list")
         self.list = TopicList(theme)
         self.list.hide()
-        self.pick.toggled.connect(self._show_list)
-        self.list.chosen.connect(self._choose_topics)
+        self.pick.toggled.connect(self._set_list_visible)
+        self.list.selection_changed.connect(self._topics_checked)
         times = [("start", _("From start"), None), ("clock", _("Clock"), None)]
         self.times = Segments(theme, times, size="small", name=_("Count"))
-        self.times.changed.connect(lambda value: self.strip.show_clock(value == "clock"))
+        self.times.changed.connect(lambda value: self.strip.set_clock_mode(value == "clock"))
         self.part_words = label("", "small", role="textSecondary", wrap=True)
         self.about = label("", "small", role="textSecondary", wrap=True)
         what = _("Size of the messages. The files can be smaller or larger.")
         self.about.setToolTip(plain.tip(what))
-        self.format.changed.connect(lambda _kind: self._show_part())
+        self.format.changed.connect(lambda _kind: self._update_part())
         self._recording: Path | None = None
         self.folder: Path | None = None
         """Folder for exports chosen by the user, or None for the folder of the recording."""
@@ -150,14 +150,16 @@ class RecordingDetails(QWidget):
         """Show the details of a recording and enable the actions that apply to it."""
         self.name.setText(facts.path.stem)
         self._recording = facts.path
-        self._say_place()
+        self._update_export_path()
         topics, count = len(facts.topics), facts.message_count
         self.counts.setText(
             facts.problem
-            or facts.not_scanned
+            or facts.scan_problem
             or _("{topics}, {messages}").format(
-                topics=ngettext("{count} topic", "{count} topics", topics).format(count=grouped(topics)),
-                messages=ngettext("{count} message", "{count} messages", count).format(count=grouped(count)),
+                topics=ngettext("{count} topic", "{count} topics", topics).format(count=group_digits(topics)),
+                messages=ngettext("{count} message", "{count} messages", count).format(
+                    count=group_digits(count)
+                ),
             )
         )
         can_read = not being_written and not facts.problem
@@ -166,77 +168,79 @@ class RecordingDetails(QWidget):
         self.rename.setEnabled(not being_written)
         self.delete.setEnabled(not being_written)
 
-    def show_strip(self, look: FilmStripLook | None, images: Sequence[QImage | None] = ()) -> None:
+    def show_strip(self, look: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
         """Show another recording on the film strip, completely selected; None while it is loading."""
-        self.strip.show_look(look, images)
+        self.strip.show_preview(look, images)
         self.topics.show_patterns((), ())
         self._is_none_chosen = False
         self.set_folder(None)
-        self._show_part()
+        self._update_part()
 
     def set_folder(self, folder: Path | None) -> None:
         """Set the folder for exports; None for the folder of the recording."""
         self.folder = folder
-        self._say_place()
+        self._update_export_path()
 
-    def place(self) -> Path | None:
+    def export_path(self) -> Path | None:
         """Return the path of the exported file, with a suffix if that exists; None without a recording."""
         if self._recording is None:
             return None
         strip, name = self.strip, self._recording.stem
-        if not strip.is_whole and strip.look is not None:
-            times = [span_words(at - strip.look.start_ns, digits=1) for at in (strip.begin_ns, strip.end_ns)]
+        if not strip.is_all_selected and strip.look is not None:
+            times = [
+                duration_text(at - strip.look.start_ns, digits=1) for at in (strip.begin_ns, strip.end_ns)
+            ]
             begin, end = (each.replace(":", ".") for each in times)
             name = _("{name}, {begin} to {end}").format(name=name, begin=begin, end=end)
-        kind = _(FORMAT_WORDS[self.format.value])
+        kind = _(FORMAT_LABELS[self.format.value])
         return (self.folder or self._recording.parent) / file_stem(f"{name}, {kind}")
 
-    def _say_place(self) -> None:
-        place = self.place()
+    def _update_export_path(self) -> None:
+        place = self.export_path()
         self.into.setText(f"{place.parent.name}/{place.name}" if place is not None else "")
         self.into.setToolTip(plain.tip(str(place or "")))
 
-    def _typed(self) -> None:
+    def _patterns_edited(self) -> None:
         self._is_none_chosen = False
-        self._show_part()
+        self._update_part()
 
     def part(self) -> Part | None:
         """Return the part to export; None if no topic matches or a pattern is invalid."""
         look = self.strip.look
         if look is None:
-            return ALL_OF_IT
+            return FULL_RECORDING
         if self._is_none_chosen:
             return None
         wanted, unwanted = self.topics.patterns()
         try:
-            made = part_of(look, self.strip.begin_ns, self.strip.end_ns, wanted, unwanted)
+            made = select_part(look, self.strip.begin_ns, self.strip.end_ns, wanted, unwanted)
         except BadTopicError:
             return None
         return made if made.topics is None or made.topics else None
 
-    def _show_list(self, shown: bool) -> None:
+    def _set_list_visible(self, shown: bool) -> None:
         self.list.setVisible(shown)
-        self._show_part()
+        self._update_part()
 
-    def _choose_topics(self, names: Sequence[str]) -> None:
+    def _topics_checked(self, names: Sequence[str]) -> None:
         # Called when topics are checked or unchecked in the list.
         look = self.strip.look
         self._is_none_chosen = not names
         if look is not None and names:
             self.topics.show_patterns(*shortest_choice(look.topics, names))
-        self._show_part()
+        self._update_part()
 
-    def _show_part(self) -> None:
+    def _update_part(self) -> None:
         # Time range, number of topics and size.
         look, part = self.strip.look, self.part()
         if look is not None and not self.list.isHidden():
             chosen = [each.name for each in look.topics] if part is not None and part.topics is None else ()
             names = chosen if part is None else part.topics or chosen
             self.list.show_topics(look.topics, names, look.size_of)
-        self.topics.set_wrong(part is None)
+        self.topics.set_invalid(part is None)
         set_role(self.part_words, "error" if part is None else "textSecondary")
-        self._say_size(look, part)
-        self._say_place()
+        self._update_size(look, part)
+        self._update_export_path()
         if look is None:
             self.part_words.setText("")
             return
@@ -245,50 +249,49 @@ class RecordingDetails(QWidget):
             return
         count = len(look.topics if part.topics is None else part.topics)
         said = ngettext("{count} of {all} topics", "{count} of {all} topics", len(look.topics))
-        words = said.format(count=grouped(count), all=grouped(len(look.topics)))
-        if not self.strip.is_whole:
+        words = said.format(count=group_digits(count), all=group_digits(len(look.topics)))
+        if not self.strip.is_all_selected:
             ends = (self.strip.begin_ns, self.strip.end_ns)
-            begin, end = (self.strip.time_words(at_ns, digits=1) for at_ns in ends)
+            begin, end = (self.strip.time_text(at_ns, digits=1) for at_ns in ends)
             words = _("{begin} to {end}, {topics}").format(begin=begin, end=end, topics=words)
         self.part_words.setText(words)
 
-    def _say_size(self, look: FilmStripLook | None, part: Part | None) -> None:
+    def _update_size(self, look: FilmStripPreview | None, part: Part | None) -> None:
         # Estimated from the topics that the format supports.
         words, count = "", 0
         if look is not None and part is not None:
             names = {
                 each.name
                 for each in look.topics
-                if (part.topics is None or each.name in part.topics) and takes(self.format.value, each.codec)
+                if (part.topics is None or each.name in part.topics)
+                and can_export(self.format.value, each.codec)
             }
-            words = (
-                self._size_words(look, names) if names else _("This value can't be converted to this type")
-            )
+            words = self._size_text(look, names) if names else _("This value can't be converted to this type")
             count = min(len(names), 1) if self.format.value == "mcap" else len(names)
         self.about.setText(words)
-        self.files.setText(ngettext("{count} file", "{count} files", count).format(count=grouped(count)))
+        self.files.setText(ngettext("{count} file", "{count} files", count).format(count=group_digits(count)))
         self.files.setVisible(count > 0)
 
-    def _size_words(self, look: FilmStripLook, names: Collection[str]) -> str:
+    def _size_text(self, look: FilmStripPreview, names: Collection[str]) -> str:
         exact, size = look.about(self.strip.begin_ns, self.strip.end_ns, names)
-        count = round(exact if self.strip.is_whole else float(f"{exact:.2g}"))
-        messages = ngettext("{count} message", "{count} messages", count).format(count=grouped(count))
+        count = round(exact if self.strip.is_all_selected else float(f"{exact:.2g}"))
+        messages = ngettext("{count} message", "{count} messages", count).format(count=group_digits(count))
         if size is None:
-            return messages if self.strip.is_whole else _("about {messages}").format(messages=messages)
-        words = _("{messages}, about {size}") if self.strip.is_whole else _("about {messages}, {size}")
-        return words.format(messages=messages, size=size_words(size))
+            return messages if self.strip.is_all_selected else _("about {messages}").format(messages=messages)
+        words = _("{messages}, about {size}") if self.strip.is_all_selected else _("about {messages}, {size}")
+        return words.format(messages=messages, size=size_text(size))
 
     def show_export(self, job: RecordingExport | None) -> None:
         """Show the progress of an export; None if none is running."""
         self._is_exporting = job is not None
-        self.export.set_word(_("Cancel") if job is not None else _("Export"), "x" if job else "download")
+        self.export.set_label(_("Cancel") if job is not None else _("Export"), "x" if job else "download")
         for field in (self.format, self.strip, self.topics, self.choose, self.times, self.pick, self.list):
             field.setEnabled(job is None)
         self.bar.setVisible(job is not None)
         self.progress.setVisible(job is not None)
         if job is not None:
             self.export.setEnabled(not job.was_cancelled)
-            share = job.share
+            share = job.progress
             self.bar.set_fraction(share)
             words = _("Exporting") if share is None else _("Exporting, {percent} %")
             self.progress.setText(words.format(percent=round(100 * (share or 0.0))))
@@ -297,4 +300,4 @@ class RecordingDetails(QWidget):
         if self._is_exporting:
             self.cancelled.emit()
         else:
-            self.wants_export.emit(self.format.value)
+            self.export_requested.emit(self.format.value)

@@ -8,8 +8,8 @@ from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QImage, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.core.recording.film_strip import FilmStripLook
-from app.core.recording.replay.scale import clock_words, span_words
+from app.core.recording.film_strip import FilmStripPreview
+from app.core.recording.replay.scale import clock_text, duration_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from nep.i18n import _
@@ -73,7 +73,7 @@ class FilmStrip(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self.look: FilmStripLook | None = None
+        self.look: FilmStripPreview | None = None
         self._images: Sequence[QImage | None] = ()
         self.begin_ns = self.end_ns = 0
         self.by_clock = False
@@ -82,22 +82,22 @@ class FilmStrip(QWidget):
         self.end = StripHandle(theme, self, _("End of the selected range"))
         self.begin.moved.connect(lambda by_ns: self.set_part(self.begin_ns + by_ns, self.end_ns))
         self.end.moved.connect(lambda by_ns: self.set_part(self.begin_ns, self.end_ns + by_ns))
-        self.begin.dragged.connect(lambda x: self.set_part(self._time(x), self.end_ns))
-        self.end.dragged.connect(lambda x: self.set_part(self.begin_ns, self._time(x)))
+        self.begin.dragged.connect(lambda x: self.set_part(self._time_at(x), self.end_ns))
+        self.end.dragged.connect(lambda x: self.set_part(self.begin_ns, self._time_at(x)))
         for handle in (self.begin, self.end):
-            handle.reset.connect(self.choose_all)
+            handle.reset.connect(self.select_all)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self._arrange)
 
     # -- display ------------------------------------------------------------------------------------------
 
-    def show_look(self, look: FilmStripLook | None, images: Sequence[QImage | None] = ()) -> None:
+    def show_preview(self, look: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
         """Show a recording, completely selected."""
         self.look, self._images = look, images
-        self.choose_all()
+        self.select_all()
         self.setVisible(look is not None)
 
-    def choose_all(self) -> None:
+    def select_all(self) -> None:
         """Select the whole recording."""
         if self.look is not None:
             self.set_part(self.look.start_ns, self.look.end_ns)
@@ -113,24 +113,24 @@ class FilmStrip(QWidget):
             begin_ns, end_ns = (end_ns, end_ns) if begin_ns != self.begin_ns else (begin_ns, begin_ns)
         self.begin_ns, self.end_ns = begin_ns, end_ns
         for handle, at_ns in ((self.begin, begin_ns), (self.end, end_ns)):
-            handle.setAccessibleDescription(self.time_words(at_ns, digits=1))
+            handle.setAccessibleDescription(self.time_text(at_ns, digits=1))
         self._arrange()
         self.changed.emit()
 
-    def time_words(self, at_ns: int, *, digits: int) -> str:
+    def time_text(self, at_ns: int, *, digits: int) -> str:
         """Format a time relative to the start ("6:40.0") or as time of day ("15:08:40.0")."""
         if self.by_clock:
-            return clock_words(at_ns, digits=digits)
-        return span_words(at_ns - (self.look.start_ns if self.look is not None else 0), digits=digits)
+            return clock_text(at_ns, digits=digits)
+        return duration_text(at_ns - (self.look.start_ns if self.look is not None else 0), digits=digits)
 
-    def show_clock(self, by_clock: bool) -> None:
+    def set_clock_mode(self, by_clock: bool) -> None:
         """Switch between times of day and times relative to the start."""
         self.by_clock = by_clock
         self.set_part(self.begin_ns, self.end_ns)
         self.update()
 
     @property
-    def is_whole(self) -> bool:
+    def is_all_selected(self) -> bool:
         """True if the whole recording is selected."""
         look = self.look
         return look is None or (self.begin_ns, self.end_ns) == (look.start_ns, look.end_ns)
@@ -148,13 +148,13 @@ class FilmStrip(QWidget):
         high = self._theme.scaled(FILM_HEIGHT)
         return QRectF(HANDLE_WIDTH, 0, max(1.0, self.width() - 2 * HANDLE_WIDTH), high)
 
-    def _x(self, at_ns: int) -> float:
+    def _x_of(self, at_ns: int) -> float:
         film, look = self._film(), self.look
         if look is None or look.end_ns <= look.start_ns:
             return film.left()
         return film.left() + (at_ns - look.start_ns) / (look.end_ns - look.start_ns) * film.width()
 
-    def _time(self, x: float) -> int:
+    def _time_at(self, x: float) -> int:
         film, look = self._film(), self.look
         if look is None:
             return 0
@@ -162,7 +162,7 @@ class FilmStrip(QWidget):
 
     def _arrange(self) -> None:
         high = round(self._film().height())
-        begin, end = self._x(self.begin_ns), self._x(self.end_ns)
+        begin, end = self._x_of(self.begin_ns), self._x_of(self.end_ns)
         if self.look is not None and self.look.end_ns <= self.look.start_ns:
             end = self._film().right()
         self.begin.setGeometry(round(begin) - HANDLE_WIDTH, 0, HANDLE_WIDTH, high)
@@ -179,7 +179,7 @@ class FilmStrip(QWidget):
         if self.look is None or event.button() != Qt.MouseButton.LeftButton:
             return
         x = event.position().x()
-        is_begin = abs(x - self._x(self.begin_ns)) <= abs(x - self._x(self.end_ns))
+        is_begin = abs(x - self._x_of(self.begin_ns)) <= abs(x - self._x_of(self.end_ns))
         handle = self.begin if is_begin else self.end
         handle.setFocus(Qt.FocusReason.MouseFocusReason)
         handle.dragged.emit(x)
@@ -206,7 +206,7 @@ class FilmStrip(QWidget):
         begin, end = float(self.begin.geometry().right() + 1), float(self.end.geometry().left())
         painter.fillRect(QRectF(film.left(), 0, max(0.0, begin - film.left()), film.height()), veil)
         painter.fillRect(QRectF(end, 0, max(0.0, film.right() - end), film.height()), veil)
-        if not self.is_whole:
+        if not self.is_all_selected:
             for y in (0.0, film.height() - 2):
                 painter.fillRect(QRectF(begin, y, max(0.0, end - begin), 2), theme.colour("accent"))
         self._paint_labels(painter, film, look)
@@ -237,7 +237,7 @@ class FilmStrip(QWidget):
                 QRectF(film.left() + place * wide, film.height() - 4 - high, max(1.0, wide - 1), high), colour
             )
 
-    def _paint_labels(self, painter: QPainter, film: QRectF, look: FilmStripLook) -> None:
+    def _paint_labels(self, painter: QPainter, film: QRectF, look: FilmStripPreview) -> None:
         # Labels of the ends and of the selection, as far as they don't overlap.
         theme, font = self._theme, self._theme.font("small")
         high = theme.scaled(LABEL_HEIGHT)
@@ -247,12 +247,12 @@ class FilmStrip(QWidget):
             (self.begin_ns, "accentText"), (self.end_ns, "accentText"),
             (look.start_ns, "textSecondary"), (look.end_ns, "textSecondary"),
         ):  # fmt: skip
-            words = self.time_words(at_ns, digits=digits)
+            words = self.time_text(at_ns, digits=digits)
             wide = paint.width_of(font, words) + 2
-            left = max(0.0, min(self.width() - wide, self._x(at_ns) - wide / 2))
+            left = max(0.0, min(self.width() - wide, self._x_of(at_ns) - wide / 2))
             if any(left < end + 6 and left + wide > begin - 6 for begin, end in taken):
                 continue
             taken.append((left, left + wide))
             is_end = at_ns in {look.start_ns, look.end_ns}
             ink = theme.colour("textSecondary" if is_end else role)
-            paint.words(painter, QRectF(left, film.height(), wide, high), words, font, ink)
+            paint.text_line(painter, QRectF(left, film.height(), wide, high), words, font, ink)

@@ -17,29 +17,29 @@ from app.core.messages.picture import Picture
 from app.core.recording.choice import file_stem
 from app.core.recording.choice import free_path as free
 from app.core.recording.exporting import RecordingExport
-from app.core.recording.film_strip import FilmStripLook, film_strip
+from app.core.recording.film_strip import FilmStripPreview, film_strip
 from app.core.recording.folder import FolderScan, RecordingFacts, RecordingFolder, picture_in
 from app.core.recording.opener import RecordingOpener
 from app.core.recording.recordings import FOLDER_KEY
-from app.ui.other_programs import open_outside
+from app.ui.other_programs import open_externally
 from app.ui.panels.base import Density, Panel, PanelContext
-from app.ui.panels.recordings.columns import PICTURE, columns, cropped
+from app.ui.panels.recordings.columns import THUMBNAIL_SIZE, columns, crop_to_thumbnail
 from app.ui.panels.recordings.details import RecordingDetails
 from app.ui.panels.recordings.table import RecordingTable
 from app.ui.panels.row_actions import RowAction
-from app.ui.panels.table_panel import TablePanel, TableWords
-from app.ui.text.numbers import grouped, size_words
-from app.ui.widgets import EmptyAction, Scrolled, label
+from app.ui.panels.table_panel import TablePanel, TableTexts
+from app.ui.text.numbers import group_digits, size_text
+from app.ui.widgets import ContentScrollArea, EmptyAction, label
 from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.table.model import TableModel
 from nep.i18n import _, lazy, ngettext
 from nep.system.replace_file import replace_file
 
-WORDS = TableWords(
+TABLE_TEXTS = TableTexts(
     title=lazy("Recordings"),
     filter=lazy("Filter names, notes and topics"),
-    nothing_fits=lazy("No matching recordings"),
-    clear_the_filter=lazy("Clear the filter to see all recordings."),
+    no_matches=lazy("No matching recordings"),
+    clear_filter_hint=lazy("Clear the filter to see all recordings."),
 )
 ROW_HEIGHT = 56
 SCAN_TICKS = 30  # refreshes at 30 Hz
@@ -56,23 +56,23 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self._recordings = context.session.recordings
         self._folder = RecordingFolder(self._recordings.folder, self._recordings.new_opener())
         self._opener = self._recordings.new_opener()
-        self._look = FolderScan(is_whole=False)
+        self._look = FolderScan(is_complete=False)
         self._has_looked = False
         self._pictures: OrderedDict[tuple[Path, float, int], QImage | None] = OrderedDict()
         self._asked: dict[str, tuple[Path, float, int]] = {}
         self._artist: BackgroundWorker[tuple[QImage | None]] = BackgroundWorker("recordings-pictures")
         self._job: RecordingExport | None = None
-        self._strips: BackgroundWorker[tuple[FilmStripLook | None, Sequence[QImage | None]]] = (
+        self._strips: BackgroundWorker[tuple[FilmStripPreview | None, Sequence[QImage | None]]] = (
             BackgroundWorker("recordings-strip")
         )
         self._strip_of: tuple[Path, float, int] | None = None
         self._loop: tuple[int, int] | None = None
         self._ticks, self._wanted, self._recorder_seen = 0, "", -1
-        super().__init__(context, WORDS, "film")
+        super().__init__(context, TABLE_TEXTS, "film")
         self.count = label("", "small", role="textSecondary")
         self.header.insert(0, self.count)
         self.details = RecordingDetails(self.theme)
-        self._below = Scrolled(self.details)
+        self._below = ContentScrollArea(self.details)
         self._connect()
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -88,16 +88,16 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.table.chosen.connect(lambda _key: self._show_details())  # type: ignore[attr-defined]
         self.table.rename_wanted.connect(self._rename)  # type: ignore[attr-defined]
         self.table.delete_wanted.connect(self._delete)  # type: ignore[attr-defined]
-        details.open.clicked.connect(lambda: self._of_chosen(self.open_row))
-        details.rename.clicked.connect(lambda: self._of_chosen(self._rename))
-        details.delete.clicked.connect(lambda: self._of_chosen(self._delete))
-        details.show_file.clicked.connect(lambda: self._of_chosen(self._show_file))
-        details.wants_export.connect(self._export)
+        details.open.clicked.connect(lambda: self._run_on_selected(self.open_row))
+        details.rename.clicked.connect(lambda: self._run_on_selected(self._rename))
+        details.delete.clicked.connect(lambda: self._run_on_selected(self._delete))
+        details.show_file.clicked.connect(lambda: self._run_on_selected(self._show_file))
+        details.export_requested.connect(self._export)
         details.cancelled.connect(self._cancel)
-        details.choose.clicked.connect(self._choose_folder)
+        details.choose.clicked.connect(self._select_folder)
 
     def make_model(self) -> TableModel[RecordingFacts]:
-        made = columns(self._picture, self._is_written, lambda: dt.datetime.now().astimezone())
+        made = columns(self._picture, self._is_being_written, lambda: dt.datetime.now().astimezone())
         return TableModel(made, lambda facts: str(facts.path))
 
     def make_table(self, model: TableModel[RecordingFacts]) -> RecordingTable:
@@ -122,27 +122,27 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if found is not None or is_new:
             self._recorder_seen = seen
             self.rebuild()
-        if self._take_pictures():
-            self.table.tell_visible_changed()
-        self._follow_strip()
-        self._follow_export()
+        if self._collect_thumbnails():
+            self.table.refresh_visible()
+        self._poll_strip()
+        self._poll_export()
 
     def rebuild(self) -> None:
         words = self.filter_words()
-        known = [self._now(each) for each in self._look.files]
+        known = [self._with_live_state(each) for each in self._look.files]
         rows = [each for each in known if all(word in _haystack(each) for word in words)]
         self.model.set_rows(self.table.order.sort(rows))
-        self.table.tell_visible_changed()
+        self.table.refresh_visible()
         if self._wanted and self.model.index_of(self._wanted).isValid():
-            self.table.choose(self._wanted)
+            self.table.select_key(self._wanted)
             self._wanted = ""
-        self._say_counts(known)
+        self._update_counts(known)
         self.show_table(bool(rows), bool(words) and bool(known))
         self._show_details()
 
-    def _now(self, facts: RecordingFacts) -> RecordingFacts:
+    def _with_live_state(self, facts: RecordingFacts) -> RecordingFacts:
         # Size and duration of a recording in progress come from the recorder.
-        if not self._is_written(facts):
+        if not self._is_being_written(facts):
             return facts
         state = self._recordings.client.state
         return replace(
@@ -150,25 +150,25 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             size_bytes=max(facts.size_bytes, state.size_bytes),
             duration_s=state.duration_s,
             message_count=state.message_count,
-            lost=state.lost + state.unkept,
+            lost=state.lost + state.unwritten,
             topics=tuple(sorted(state.topics))[:3],
         )
 
-    def _is_written(self, facts: RecordingFacts) -> bool:
+    def _is_being_written(self, facts: RecordingFacts) -> bool:
         state = self._recordings.client.state
         return bool(state.phase) and facts.path == state.path
 
-    def _say_counts(self, known: Sequence[RecordingFacts]) -> None:
-        count = len(known) + self._look.left_out
+    def _update_counts(self, known: Sequence[RecordingFacts]) -> None:
+        count = len(known) + self._look.omitted_count
         words = ngettext("{count} recording, {size}", "{count} recordings, {size}", count)
-        size = size_words(sum(each.size_bytes for each in known))
-        self.count.setText(words.format(count=grouped(count), size=size) if count else "")
+        size = size_text(sum(each.size_bytes for each in known))
+        self.count.setText(words.format(count=group_digits(count), size=size) if count else "")
         self.filter.setVisible(count > 0)
-        left_out = self._look.left_out
+        left_out = self._look.omitted_count
         older = ngettext(
             "{count} older recording not listed", "{count} older recordings not listed", left_out
         )
-        self.foot.setText(older.format(count=grouped(left_out)) if left_out else "")
+        self.foot.setText(older.format(count=group_digits(left_out)) if left_out else "")
         self.foot.setVisible(bool(left_out))
         self.line.setVisible(bool(left_out))
 
@@ -177,9 +177,9 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             super().show_table(any_rows, filtered)
             return
         self.pages.setCurrentIndex(1)
-        self.say_empty()
+        self.update_empty_state()
 
-    def say_empty(self) -> None:
+    def update_empty_state(self) -> None:
         folder = self._recordings.folder
         is_own = bool(self.session.settings.get(FOLDER_KEY, ""))
         if not self._has_looked:
@@ -195,25 +195,25 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             said = _("Start recording, or save the last seconds when something happened.")
             self.empty.set_texts(_("No recordings yet"), said, "film")
             record = EmptyAction(
-                _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", primary=True
+                _("Record"), lambda: self.context.run("recording.toggle"), "circle-dot", is_primary=True
             )
-            self.empty.set_actions([record, self.why()])
+            self.empty.set_actions([record, self.doctor_action()])
 
     def _show_details(self) -> None:
-        facts = self._chosen()
+        facts = self._selected()
         self._below.setVisible(facts is not None)
         if facts is not None:
-            self.details.show_facts(facts, self._is_written(facts))
-        self._want_strip(facts)
+            self.details.show_facts(facts, self._is_being_written(facts))
+        self._request_strip(facts)
 
-    def _chosen(self) -> RecordingFacts | None:
+    def _selected(self) -> RecordingFacts | None:
         return self.model.row_at(self.table.currentIndex())
 
     # -- pictures -----------------------------------------------------------------------------------------
 
     def _picture(self, facts: RecordingFacts) -> QImage | None:
         # Missing thumbnails are requested from a background thread.
-        if not facts.is_read or facts.problem or facts.not_scanned:
+        if not facts.is_read or facts.problem or facts.scan_problem:
             return None
         mark = (facts.path, facts.changed_s, facts.size_bytes)
         if mark in self._pictures:
@@ -222,10 +222,10 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         owner = str(facts.path)
         if self._asked.get(owner) != mark:
             self._asked[owner] = mark
-            self._artist.ask(owner, lambda: (_drawn(facts.path, self._opener),))
+            self._artist.submit(owner, lambda: (_load_thumbnail(facts.path, self._opener),))
         return None
 
-    def _take_pictures(self) -> bool:
+    def _collect_thumbnails(self) -> bool:
         is_any = False
         for owner, mark in list(self._asked.items()):
             made = self._artist.pop_result(owner)
@@ -239,9 +239,11 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     # -- film strip ---------------------------------------------------------------------------------------
 
-    def _want_strip(self, facts: RecordingFacts | None) -> None:
+    def _request_strip(self, facts: RecordingFacts | None) -> None:
         # Loads the film strip in a background thread.
-        can_read = facts is not None and facts.is_read and not facts.problem and not self._is_written(facts)
+        can_read = (
+            facts is not None and facts.is_read and not facts.problem and not self._is_being_written(facts)
+        )
         mark = (facts.path, facts.changed_s, facts.size_bytes) if facts is not None and can_read else None
         if mark == self._strip_of:
             return
@@ -249,9 +251,9 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.details.show_strip(None)
         if mark is not None:
             path = mark[0]
-            self._strips.ask("strip", lambda: _strip(path, self._opener))
+            self._strips.submit("strip", lambda: _strip(path, self._opener))
 
-    def _follow_strip(self) -> None:
+    def _poll_strip(self) -> None:
         # Shows the film strip once it is loaded; a loop on the timeline becomes the selected part.
         made = self._strips.pop_result("strip")
         if made is not None:
@@ -271,8 +273,8 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def _of_chosen(self, do: Callable[[str], object]) -> None:
-        facts = self._chosen()
+    def _run_on_selected(self, do: Callable[[str], object]) -> None:
+        facts = self._selected()
         if facts is not None:
             do(str(facts.path))
 
@@ -287,7 +289,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             RowAction(_("Delete"), "trash-2", lambda: self._delete(key)),
         )
 
-    def choose_file(self, path: Path) -> None:
+    def select_file(self, path: Path) -> None:
         """Select a recording as soon as it appears in the list."""
         self.filter.clear()
         self._wanted = str(path)
@@ -299,14 +301,14 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _rename(self, key: str) -> None:
         facts = self._facts_of(key)
-        if facts is None or self._is_written(facts):
+        if facts is None or self._is_being_written(facts):
             self.context.toast(_("A recording can be renamed after it has ended"))
             return
         table = self.table
         if isinstance(table, RecordingTable):
-            table.rename(key, facts.path.stem, lambda name: self._take_name(facts.path, name))
+            table.rename(key, facts.path.stem, lambda name: self._apply_name(facts.path, name))
 
-    def _take_name(self, path: Path, name: str) -> bool:
+    def _apply_name(self, path: Path, name: str) -> bool:
         stem = file_stem(name)
         if stem == path.stem:
             return True
@@ -317,13 +319,13 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         if new.exists():
             self.context.toast(_("A recording named “{name}” already exists").format(name=stem))
             return False
-        if not self._moved(path, new):
+        if not self._move_files(path, new):
             return False
         self._wanted = str(new)
-        self._put(path, new)
+        self._update_listing(path, new)
         return True
 
-    def _moved(self, path: Path, new: Path) -> bool:
+    def _move_files(self, path: Path, new: Path) -> bool:
         try:
             replace_file(path, new)
             beside = path.with_name(path.name + SIDECAR)
@@ -335,7 +337,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             return False
         return True
 
-    def _put(self, path: Path, new: Path | None) -> None:
+    def _update_listing(self, path: Path, new: Path | None) -> None:
         # Shown before the next scan confirms the change.
         files = [
             replace(each, path=new) if each.path == path and new is not None else each
@@ -348,7 +350,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _delete(self, key: str) -> None:
         facts = self._facts_of(key)
-        if facts is None or self._is_written(facts):
+        if facts is None or self._is_being_written(facts):
             self.context.toast(_("A recording can be deleted after it has ended"))
             return
         path = facts.path
@@ -357,16 +359,16 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             words = _("Can't move {file} to the bin: {reason}")
             self.context.toast(words.format(file=path.name, reason=bin_file.errorString().lower()))
             return
-        self._put(path, None)
+        self._update_listing(path, None)
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
         there = Path(bin_file.fileName())
         words = _("Moved “{name}” to the bin").format(name=path.stem)
         if there != path and there.is_file():
-            self.context.toast(words, _("Undo"), lambda: self._put_back(there, path))
+            self.context.toast(words, _("Undo"), lambda: self._restore_deleted(there, path))
         else:
             self.context.toast(words)
 
-    def _put_back(self, there: Path, path: Path) -> None:
+    def _restore_deleted(self, there: Path, path: Path) -> None:
         try:
             replace_file(there, free(path))
             about = there.parent.parent / "info" / f"{there.name}.trashinfo"
@@ -380,33 +382,33 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _show_file(self, key: str) -> None:
         path = Path(key)
-        if not open_outside(QUrl.fromLocalFile(str(path.parent))):
+        if not open_externally(QUrl.fromLocalFile(str(path.parent))):
             self.context.toast(_("File: {path}").format(path=path))
 
     # -- export -------------------------------------------------------------------------------------------
 
     def _export(self, kind: str) -> None:
-        facts, part = self._chosen(), self.details.part()
+        facts, part = self._selected(), self.details.part()
         if facts is None or self._job is not None:
             return
         if part is None:
             self.context.toast(_("No matching topics in this recording"))
             return
-        folder = free(self.details.place() or facts.path.with_suffix(""), is_folder=True)
+        folder = free(self.details.export_path() or facts.path.with_suffix(""), is_folder=True)
         self._job = RecordingExport(facts.path, kind, folder, part, self._recordings.new_opener())
         self.details.show_export(self._job)
 
-    def _choose_folder(self) -> None:
-        facts = self._chosen()
+    def _select_folder(self) -> None:
+        facts = self._selected()
         if facts is not None:
             place = self.details.folder or facts.path.parent
-            self.context.files.choose_folder(str(place), self.details.set_folder)
+            self.context.files.select_folder(str(place), self.details.set_folder)
 
     def _cancel(self) -> None:
         if self._job is not None:
             self._job.cancel()
 
-    def _follow_export(self) -> None:
+    def _poll_export(self) -> None:
         job = self._job
         if job is None:
             return
@@ -417,9 +419,9 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
         self.details.show_export(None)
         self._show_details()
         if job.files:
-            self.context.toast(job.words(), _("Show"), lambda: self._show_file(str(job.files[0].path)))
+            self.context.toast(job.result_text(), _("Show"), lambda: self._show_file(str(job.files[0].path)))
         else:
-            self.context.toast(job.words())
+            self.context.toast(job.result_text())
 
     # -- overrides ----------------------------------------------------------------------------------------
 
@@ -431,7 +433,7 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
                 event.accept()
                 return True
             if event.type() == QEvent.Type.KeyPress:
-                self._of_chosen(self._rename)
+                self._run_on_selected(self._rename)
                 return True
         return super().event(event)
 
@@ -464,10 +466,10 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
             self._job.close()
 
 
-def _drawn(path: Path, opener: RecordingOpener) -> QImage | None:
+def _load_thumbnail(path: Path, opener: RecordingOpener) -> QImage | None:
     # Runs in a background thread.
-    found = picture_in(path, (2 * PICTURE.width(), 2 * PICTURE.height()), opener)
-    return cropped(_image(found)).copy() if found is not None else None
+    found = picture_in(path, (2 * THUMBNAIL_SIZE.width(), 2 * THUMBNAIL_SIZE.height()), opener)
+    return crop_to_thumbnail(_image(found)).copy() if found is not None else None
 
 
 def _image(picture: Picture) -> QImage:
@@ -476,7 +478,7 @@ def _image(picture: Picture) -> QImage:
     return QImage(pixels.tobytes(), wide, high, wide * 4, QImage.Format.Format_RGB32).copy()
 
 
-def _strip(path: Path, opener: RecordingOpener) -> tuple[FilmStripLook | None, Sequence[QImage | None]]:
+def _strip(path: Path, opener: RecordingOpener) -> tuple[FilmStripPreview | None, Sequence[QImage | None]]:
     # Runs in a background thread.
     look = film_strip(path, STRIP_PICTURES, STRIP_BARS, STRIP_SIZE, opener)
     if look is None:
@@ -488,4 +490,4 @@ def _haystack(facts: RecordingFacts) -> str:
     return " ".join((facts.path.stem, facts.note, *facts.topics)).casefold()
 
 
-PANEL = Panel("recordings", WORDS.title, "film", (), RecordingsPanel)
+PANEL = Panel("recordings", TABLE_TEXTS.title, "film", (), RecordingsPanel)

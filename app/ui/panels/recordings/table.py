@@ -8,7 +8,7 @@ from PySide6.QtCore import QModelIndex, QRect, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
 from app.core.recording.folder import RecordingFacts
-from app.ui.panels.recordings.columns import GAP, PICTURE
+from app.ui.panels.recordings.columns import GAP, THUMBNAIL_SIZE
 from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.rename_field import RenameField
 from app.ui.widgets.keyboard import is_plain
@@ -24,16 +24,16 @@ class RecordingTable(TableView[RecordingFacts]):
     `chosen` carries the key of the row, also for selection by keyboard.
     """
 
-    chosen = Signal(str)
-    rename_wanted = Signal(str)
-    delete_wanted = Signal(str)
+    selected = Signal(str)
+    rename_requested = Signal(str)
+    delete_requested = Signal(str)
 
     def __init__(self, theme: Theme, model: TableModel[RecordingFacts]) -> None:
         super().__init__(theme, model, "when")
-        self.order.falling = True
+        self.order.is_descending = True
         self.field: RenameField | None = None
         self.doubleClicked.connect(self._open_row)
-        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
+        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._emit_selected())
 
     def _open(self, index: QModelIndex) -> None:
         # A click doesn't open the recording, because that would replace the source of all panels.
@@ -42,36 +42,36 @@ class RecordingTable(TableView[RecordingFacts]):
     def _open_row(self, index: QModelIndex) -> None:
         super()._open(index)
 
-    def _tell_chosen(self) -> None:
-        self.chosen.emit(self.chosen_key() or "")
+    def _emit_selected(self) -> None:
+        self.selected.emit(self.selected_key() or "")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key = self.chosen_key()
+        key = self.selected_key()
         if key is None or not is_plain(event):
             super().keyPressEvent(event)
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self._open_row(self.currentIndex())
         elif event.key() == Qt.Key.Key_F2:
-            self.rename_wanted.emit(key)
+            self.rename_requested.emit(key)
         elif event.key() == Qt.Key.Key_Delete:
-            self.delete_wanted.emit(key)
+            self.delete_requested.emit(key)
         else:
             super().keyPressEvent(event)
 
     def rename(self, key: str, name: str, take: Callable[[str], bool]) -> None:
         """Start in-place editing of a recording's name; `take` receives the new name."""
-        self.choose(key)
+        self.select_key(key)
         index = self.currentIndex()
         self.scrollTo(index)
         row = self.visualRect(self.model().index(index.row(), 0))
-        left = row.left() + EDGE + round(self.theme.scaled(PICTURE.width())) + GAP - 8
+        left = row.left() + EDGE + round(self.theme.scaled(THUMBNAIL_SIZE.width())) + GAP - 8
         high = min(row.height() - 8, round(self.theme.scaled(32)))
         rect = QRect(left, row.center().y() - high // 2, max(80, row.right() - left - 8), high)
         said = _("Recording name")
         self.field = RenameField(self.theme, self.viewport(), rect, name, take, said)
-        self.field.ended.connect(self._renamed)
+        self.field.closed.connect(self._rename_finished)
 
-    def _renamed(self) -> None:
+    def _rename_finished(self) -> None:
         had = self.field is not None and self.field.hasFocus()
         self.field = None
         if had:

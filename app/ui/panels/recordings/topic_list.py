@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Sequence
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.ui.text.numbers import grouped, size_words
+from app.ui.text.numbers import group_digits, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel
 from app.ui.widgets.flow_layout import Flow
@@ -23,7 +23,7 @@ TABLE_HEIGHT = 150
 class TopicList(QWidget):
     """Checklist of topics; `chosen` carries the names of all checked topics after a change."""
 
-    chosen = Signal(list)
+    selection_changed = Signal(list)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -34,16 +34,16 @@ class TopicList(QWidget):
         self.filter.textChanged.connect(self._show_rows)
         self.all = Button(theme, _("All"), "check", size="small")
         self.none = Button(theme, _("None"), "minus", size="small")
-        self.all.clicked.connect(lambda: self._choose_shown(wanted=True))
-        self.none.clicked.connect(lambda: self._choose_shown(wanted=False))
+        self.all.clicked.connect(lambda: self._set_matching_selected(wanted=True))
+        self.none.clicked.connect(lambda: self._set_matching_selected(wanted=False))
         self.count = ElidedLabel("small", "textSecondary", least=60)
         self.model: TableModel[RecordedTopic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[RecordedTopic] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics to export"))
         self.table.opened.connect(self._toggle)
         self.table.order_changed.connect(self._show_rows)
-        self.table.filter_wanted.connect(lambda: self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self.filter.leave.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.table.filter_requested.connect(lambda: self.filter.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.filter.exited.connect(lambda: self.table.setFocus(Qt.FocusReason.ShortcutFocusReason))
         self.table.setFixedHeight(round(theme.scaled(TABLE_HEIGHT)))
         row = Flow(gap=8, row_gap=6)
         for widget in (self.all, self.none):
@@ -57,32 +57,33 @@ class TopicList(QWidget):
         column.addWidget(self.table)
 
     def _columns(self) -> tuple[Column[RecordedTopic], ...]:
-        def is_there(topic: RecordedTopic) -> Cell:
+        def included_cell(topic: RecordedTopic) -> Cell:
             if topic.name in self._names:
-                return Cell(icon="check", role="accentText", said=_("exported"))
-            return Cell(icon="minus", role="textTertiary", said=_("excluded"))
+                return Cell(icon="check", role="accentText", accessible_text=_("exported"))
+            return Cell(icon="minus", role="textTertiary", accessible_text=_("excluded"))
 
-        def ink(topic: RecordedTopic) -> str:
+        def text_role(topic: RecordedTopic) -> str:
             return "text" if topic.name in self._names else "textTertiary"
 
         return (
-            Column("has", "", 40, is_there, words=lazy("Is exported")),
-            Column("topic", lazy("Topic"), 150, lambda topic: Cell(topic.name, role=ink(topic), mono=True),
+            Column("has", "", 40, included_cell, label=lazy("Is exported")),
+            Column("topic", lazy("Topic"), 150, lambda topic: Cell(topic.name, role=text_role(topic),
+                   mono=True),
                    key=lambda topic: topic.name, stretch=True, tip=lambda topic: topic.name),
             Column("type", lazy("Type"), 110,
                    lambda topic: Cell(topic.msg_type.rpartition("/")[2] or topic.codec, role="textSecondary"),
-                   key=lambda topic: topic.msg_type, yields=2, tip=lambda topic: topic.msg_type),
+                   key=lambda topic: topic.msg_type, hide_order=2, tip=lambda topic: topic.msg_type),
             Column("messages", lazy("Messages"), 96,
-                   lambda topic: Cell(grouped(topic.message_count), role=ink(topic)),
-                   key=lambda topic: topic.message_count, figures=True, yields=1),
+                   lambda topic: Cell(group_digits(topic.message_count), role=text_role(topic)),
+                   key=lambda topic: topic.message_count, is_numeric=True, hide_order=1),
             Column("size", lazy("Size"), 84,
-                   lambda topic: Cell(self._size_words(topic), role=ink(topic)),
-                   key=lambda topic: self._size_of(topic) or 0.0, figures=True, yields=3),
+                   lambda topic: Cell(self._size_text(topic), role=text_role(topic)),
+                   key=lambda topic: self._size_of(topic) or 0.0, is_numeric=True, hide_order=3),
         )  # fmt: skip
 
-    def _size_words(self, topic: RecordedTopic) -> str:
+    def _size_text(self, topic: RecordedTopic) -> str:
         size = self._size_of(topic)
-        return "" if size is None else size_words(size)
+        return "" if size is None else size_text(size)
 
     def show_topics(
         self,
@@ -97,7 +98,7 @@ class TopicList(QWidget):
             self.filter.clear()
         self._show_rows()
 
-    def _shown(self) -> list[RecordedTopic]:
+    def _matching_topics(self) -> list[RecordedTopic]:
         words = self.filter.text().casefold().split()
         return [
             topic
@@ -106,25 +107,25 @@ class TopicList(QWidget):
         ]
 
     def _show_rows(self) -> None:
-        self.model.set_rows(self.table.order.sort(self._shown()))
-        self.table.tell_visible_changed()
+        self.model.set_rows(self.table.order.sort(self._matching_topics()))
+        self.table.refresh_visible()
         self.table.viewport().update()
         count = sum(topic.message_count for topic in self._topics if topic.name in self._names)
         words = ngettext("{count} message", "{count} messages", count)
-        self.count.setText(words.format(count=grouped(count)))
+        self.count.setText(words.format(count=group_digits(count)))
 
     def _toggle(self, name: str) -> None:
-        self._choose(self._names ^ {name})
+        self._set_selection(self._names ^ {name})
 
-    def _choose_shown(self, *, wanted: bool) -> None:
+    def _set_matching_selected(self, *, wanted: bool) -> None:
         # Topics that match the filter.
-        shown = {topic.name for topic in self._shown()}
-        self._choose(self._names | shown if wanted else self._names - shown)
+        shown = {topic.name for topic in self._matching_topics()}
+        self._set_selection(self._names | shown if wanted else self._names - shown)
 
-    def _choose(self, names: frozenset[str]) -> None:
+    def _set_selection(self, names: frozenset[str]) -> None:
         self._names = names
         self._show_rows()
-        self.chosen.emit([topic.name for topic in self._topics if topic.name in names])
+        self.selection_changed.emit([topic.name for topic in self._topics if topic.name in names])
 
 
 def shortest_choice(

@@ -25,13 +25,13 @@ class LargeRoom(QWidget):
     closed = Signal()
 
     def __init__(self, theme: Theme, panel: QWidget, stage: QWidget, tools: Sequence[QWidget] = ()) -> None:
-        over = _middle_of(panel)
+        over = _workbench_of(panel)
         super().__init__(over)
         self._theme, self._over = theme, over
         self.filled = False
         self.setAccessibleName(_("Large room"))
         self.screen_button = Button(theme, _("Full screen"), "fullscreen", size="small")
-        self.screen_button.clicked.connect(self.fill_screen)
+        self.screen_button.clicked.connect(self.toggle_full_screen)
         self.back = Button(theme, _("Back to the panels"), "minimize-2", size="small")
         self.back.clicked.connect(self.dispose)
         row = QHBoxLayout()
@@ -51,7 +51,7 @@ class LargeRoom(QWidget):
         self._top.installEventFilter(self)
         application = QApplication.instance()
         if isinstance(application, QApplication):
-            application.focusChanged.connect(self._keep_keys)
+            application.focusChanged.connect(self._retain_focus)
         self.setGeometry(over.rect())
         stage.show()
         self.show()
@@ -60,24 +60,24 @@ class LargeRoom(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _keep_keys(self, _old: QWidget | None, now: QWidget | None) -> None:
+    def _retain_focus(self, _old: QWidget | None, now: QWidget | None) -> None:
         # Covered widgets must not get the focus: Esc would not reach the overlay, and the editor would change
         # invisibly.
         covered = now is not None and self._over.isAncestorOf(now) and not self.isAncestorOf(now)
         if covered and now is not self and self.isVisible():
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def fill_screen(self) -> None:
+    def toggle_full_screen(self) -> None:
         """Toggle the window's full screen mode."""
         window = self.window()
         self.filled = not self.filled
         window.setWindowState(window.windowState() ^ Qt.WindowState.WindowFullScreen)
-        self.screen_button.set_word(_("Leave full screen") if self.filled else _("Full screen"))
+        self.screen_button.set_label(_("Leave full screen") if self.filled else _("Full screen"))
 
     def dispose(self) -> None:
         """Close the overlay, leave full screen mode and return the stage to the panel."""
         if self.filled:
-            self.fill_screen()
+            self.toggle_full_screen()
         self._over.removeEventFilter(self)
         self._top.removeEventFilter(self)
         self.hide()
@@ -106,7 +106,7 @@ class LargeRoom(QWidget):
         painter.end()
 
 
-def _middle_of(panel: QWidget) -> QWidget:
+def _workbench_of(panel: QWidget) -> QWidget:
     # Returns the window if the panel is not within the workbench.
     around = panel.parentWidget()
     while around is not None and not isinstance(around, QMainWindow):

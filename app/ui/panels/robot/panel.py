@@ -11,12 +11,12 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.core.robots.awaited import awaited_values
-from app.errors import RobotUnknownError, SettingsError
+from app.errors import SettingsError, UnknownRobotError
 from app.robots.description.description import Event
 from app.robots.virtual.room import Ball, Box, Room
 from app.robots.virtual.room_map import kind_of
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.no_robot import NoRobot
+from app.ui.panels.no_robot import NoRobotState
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robot.large_room import LargeRoom
 from app.ui.panels.robot.room_view import RoomView
@@ -25,7 +25,7 @@ from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
 from app.ui.widgets import Chip, EmptyAction, EmptyState, IconButton
 from app.ui.widgets.indicators import ROBOT_STATUS
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _, lazy
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ Virtual robots publish it many times a second.
 """
 
 
-ADDED = {
+ADDABLE_THINGS = {
     "ball": (lazy("Add a ball"), "circle"),
     "person": (lazy("Add a person"), "person-standing"),
     "marker": (lazy("Add a marker"), "qr-code"),
@@ -74,7 +74,7 @@ class RobotPanel(OneRobotPanel):
         self._told: Mapping[str, object] | None = None
         self._told_s = 0.0
         self.chip = Chip(self.theme)
-        self.add, self.reset = self._room_tools(size=30)
+        self.add, self.reset = self._make_room_tools(size=30)
         self.reset.setVisible(False)
         self.choose = IconButton(self.theme, "chevron-down", _("Choose a robot"), size=26)
         self.choose.setProperty("place", "start")
@@ -91,16 +91,16 @@ class RobotPanel(OneRobotPanel):
         text = _("With a virtual robot you can try everything right away.")
         start = EmptyAction(_("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot")
         self.empty = EmptyState(self.theme, "bot", title, text, [start])
-        self._no_robot = NoRobot(self.empty, title, text, [start])
-        self._no_robot.set_starting(self.session.coming)
-        self.pages = self.show_one_of(self.empty, self.stage)
+        self._no_robot = NoRobotState(self.empty, title, text, [start])
+        self._no_robot.set_starting(self.session.starting_robots)
+        self.pages = self.make_page_stack(self.empty, self.stage)
 
-    def _room_tools(self, size: int) -> tuple[IconButton, IconButton]:
+    def _make_room_tools(self, size: int) -> tuple[IconButton, IconButton]:
         # Called once for the title bar and once for the enlarged room.
         add = IconButton(self.theme, "plus", _("Add something to the room"), size=size)
         add.clicked.connect(lambda: self._show_room_menu("", None, add))
         reset = IconButton(self.theme, "rotate-cw", _("Reset the robot and its room"), size=size)
-        reset.clicked.connect(self._put_back)
+        reset.clicked.connect(self._reset_room)
         return add, reset
 
     def _make_stage(self) -> None:
@@ -109,17 +109,17 @@ class RobotPanel(OneRobotPanel):
         view = self.view
         view.touched.connect(lambda name, part, down: self._change({"touch": part, "down": down}, name))
         view.moved.connect(self._move)
-        view.carried.connect(
+        view.robot_moved.connect(
             lambda name, x, y: self._change({"move": "robot", "x": round(x, 3), "y": round(y, 3)}, name)
         )
-        view.held.connect(lambda name, on: self._change({"hold": on}, name))
-        view.bumped.connect(lambda name, side: self._change({"happen": "bump", "side": side}, name))
+        view.robot_lifted.connect(lambda name, on: self._change({"hold": on}, name))
+        view.bumper_pressed.connect(lambda name, side: self._change({"happen": "bump", "side": side}, name))
         view.removed.connect(self.session.room.remove)
-        view.menu_wanted.connect(self._show_room_menu)
+        view.menu_requested.connect(self._show_room_menu)
         view.enlarged.connect(self.enlarge)
-        self.say = SayBar(self.theme, self._awaited)
-        self.say.said.connect(lambda words: self._change({"say": words}))
-        self.say.happened.connect(self._change)
+        self.say = SayBar(self.theme, self._awaited_values)
+        self.say.speech_submitted.connect(lambda words: self._change({"say": words}))
+        self.say.event_simulated.connect(self._change)
         stage = QWidget()
         column = QVBoxLayout(stage)
         column.setContentsMargins(0, 0, 0, 0)
@@ -128,10 +128,10 @@ class RobotPanel(OneRobotPanel):
         column.addWidget(self.say)
         self.stage = stage
         self.sound = IconButton(self.theme, "volume-2", _("Unmute the robots"), size=26)
-        self.sound.clicked.connect(self._switch_sound)
+        self.sound.clicked.connect(self._toggle_sound)
         self.say.add(self.sound)
         self._sound_shown: object = None
-        self._show_sound()
+        self._update_sound_button()
         self._large: LargeRoom | None = None
         self._things: tuple[int, tuple[Thing, ...]] = (-1, ())
         self._looks: dict[str, Watch] = {}
@@ -141,37 +141,39 @@ class RobotPanel(OneRobotPanel):
 
     def refresh_robot(self, link: RobotLink | None) -> None:
         if link is None:
-            self._no_robot.set_starting(self.session.coming)
+            self._no_robot.set_starting(self.session.starting_robots)
             return
-        self._show_sound()
+        self._update_sound_button()
         if self._large is not None:
             self._large.raise_()  # a panel raised in its tab group would cover it
-        self.chip.set(link.chip, ROBOT_STATUS[link.state])
+        self.chip.set(link.chip_text, ROBOT_STATUS[link.state])
         if link.drawing is not None:
             now = time.monotonic()
             if link.drawing is not self._told:
                 self._told, self._told_s = link.drawing, now
             self._show_room(link)
-            self.view.show_heard(self._heard_beside())
-            self.view.set_stale(not link.connected or link.mute or now - self._told_s > STALE_AFTER_S)
+            self.view.set_caption(self._speech_caption())
+            self.view.set_stale(
+                not link.is_connected or link.is_unresponsive or now - self._told_s > STALE_AFTER_S
+            )
             if self._large is None:
                 self.pages.setCurrentWidget(self.stage)
 
     def _show_menu(self) -> None:
         menu = Menu(self.theme, self)
         for link in self.session.fleet.links:
-            action = menu.addAction(plain.entry(link.name))
+            action = menu.addAction(plain.escape_menu_text(link.name))
             action.setCheckable(True)
             action.setChecked(link.name == self._robot)
-            action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.choose(name))
+            action.triggered.connect(lambda _on=False, name=link.name: self.session.fleet.select(name))
         if self._robot in self.session.launcher.wanted:
             menu.addSeparator()
-            away = menu.addAction(plain.entry(_("Remove {robot}").format(robot=self._robot)))
+            away = menu.addAction(plain.escape_menu_text(_("Remove {robot}").format(robot=self._robot)))
             away.triggered.connect(
                 lambda _on=False, name=self._robot: self.context.run(f"robot.end_virtual:{name}")
             )
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        drop_below(menu, self.choose)
+        open_below(menu, self.choose)
 
     def show_robot(self, link: RobotLink) -> None:
         self.set_title(link.name)
@@ -179,20 +181,20 @@ class RobotPanel(OneRobotPanel):
             button.setVisible(link.virtual)
         self.view.robot_name = link.name
         self.say.show_robot(link.robot)
-        self._say_nothing(link)
+        self._update_empty_state(link)
 
-    def _say_nothing(self, link: RobotLink) -> None:
+    def _update_empty_state(self, link: RobotLink) -> None:
         self.pages.setCurrentWidget(self.empty)
         if link.virtual:
             title = _("{robot} is starting").format(robot=link.name)
             self.empty.set_texts(title, _("The robot appears as soon as it reports its position."))
             self.empty.set_actions([])
         else:
-            self.empty.set_texts(link.name, _where_to_look(link))
+            self.empty.set_texts(link.name, _hint_text(link))
             show = EmptyAction(_("Show actions"), lambda: self.context.run("panel:robots"), "bot")
             self.empty.set_actions([show])
 
-    def _awaited(self, event: Event, name: str) -> Sequence[str]:
+    def _awaited_values(self, event: Event, name: str) -> Sequence[str]:
         # Values used in the active behaviour come first.
         link, shown = self.session.fleet.link(self._robot), self.session.document
         if link is None:
@@ -200,15 +202,15 @@ class RobotPanel(OneRobotPanel):
         documents = [shown, *(each for each in self.session.documents if each is not shown)]
         return awaited_values((each.workspace for each in documents), link.robot, event, name)
 
-    def _switch_sound(self) -> None:
+    def _toggle_sound(self) -> None:
         # Speech bubbles are shown even if speech is off.
         with suppress(SettingsError):
-            self.session.voices.switch(on=not self.session.voices.on)
-        self._show_sound()
+            self.session.voices.set_on(on=not self.session.voices.is_on)
+        self._update_sound_button()
 
-    def _show_sound(self) -> None:
+    def _update_sound_button(self) -> None:
         # The reason is shown if speech is on but does not work.
-        on, problem = self.session.voices.on, self.session.voices.problem
+        on, problem = self.session.voices.is_on, self.session.voices.problem
         if (on, problem) == self._sound_shown:
             return
         self._sound_shown = (on, problem)
@@ -224,7 +226,7 @@ class RobotPanel(OneRobotPanel):
     def _show_room(self, link: RobotLink) -> None:
         # The main robot, others in the same room, and things.
         drawing = link.drawing or {}
-        if not RobotState.parse(drawing).shared:
+        if not RobotState.parse(drawing).is_room_shared:
             self.view.show_state(drawing)
             return
         room = self.session.room
@@ -232,22 +234,24 @@ class RobotPanel(OneRobotPanel):
             self._things = (room.revision, things_of(room.room))
         others = [
             (other.name, other.drawing)
-            for other in self._others(link)
-            if other.drawing is not None and not other.mute and RobotState.parse(other.drawing).shared
+            for other in self._watch_other_robots(link)
+            if other.drawing is not None
+            and not other.is_unresponsive
+            and RobotState.parse(other.drawing).is_room_shared
         ]
         self.view.show_state(drawing, others, self._things[1])
 
-    def _heard_beside(self) -> str:
+    def _speech_caption(self) -> str:
         # Caption of speech that is still playing after its bubble disappeared, or of words that a robot
         # heard.
-        said = self.session.voices.saying
+        said = self.session.voices.current
         robots = [(self._robot, self.view.state), *self.view.others]
-        if said is not None and said.words not in {state.speech for _name, state in robots}:
-            return f"{said.robot}: {said.words}"
-        heard = [(name, state.heard) for name, state in robots if state.heard]
+        if said is not None and said.text not in {state.speech for _name, state in robots}:
+            return f"{said.robot}: {said.text}"
+        heard = [(name, state.heard_text) for name, state in robots if state.heard_text]
         return _("{robot} heard “{words}”").format(robot=heard[0][0], words=heard[0][1]) if heard else ""
 
-    def _others(self, link: RobotLink) -> list[RobotLink]:
+    def _watch_other_robots(self, link: RobotLink) -> list[RobotLink]:
         # Every other virtual robot is watched while the panel is visible.
         fleet = self.session.fleet
         there = [each for each in fleet.connected if each.virtual and each.name != link.name]
@@ -255,20 +259,20 @@ class RobotPanel(OneRobotPanel):
         for name in self._looks.keys() - names:
             self._looks.pop(name).close()
         for name in names - self._looks.keys():
-            self._looks[name] = fleet.look_at(name)
+            self._looks[name] = fleet.watch_sensors(name)
         return there
 
     def _move(self, name: str, x: float, y: float) -> None:
-        if self.view.state.shared:
+        if self.view.state.is_room_shared:
             states = [self.view.state, *(state for _name, state in self.view.others)]
             robots = {str(at): (each.x, each.y, radius_of(each)) for at, each in enumerate(states)}
             self.session.room.move(name, x, y, robots)
         else:
             self._change({"move": name, "x": round(x, 3), "y": round(y, 3)})
 
-    def _put_back(self) -> None:
+    def _reset_room(self) -> None:
         # Resets robots and room.
-        self.session.room.put_back()
+        self.session.room.reset()
         for name in ("", *(name for name, _state in self.view.others)):
             self._change({"reset": True}, name)
 
@@ -276,23 +280,23 @@ class RobotPanel(OneRobotPanel):
         # Opens at a position (context menu), or below a button.
         menu = Menu(self.theme, self)
         if thing:
-            words = plain.entry(_("Remove {thing}").format(thing=thing))
+            words = plain.escape_menu_text(_("Remove {thing}").format(thing=thing))
             action = menu.addAction(self.theme.icon("trash-2"), words)
             action.triggered.connect(lambda: self.session.room.remove(thing))
             menu.addSeparator()
-        if self.view.state.shared:
-            for kind, (words, icon) in ADDED.items():
+        if self.view.state.is_room_shared:
+            for kind, (words, icon) in ADDABLE_THINGS.items():
                 action = menu.addAction(self.theme.icon(icon), _(words))
                 action.triggered.connect(lambda _on=False, kind=kind: self._add(kind))
             menu.addSeparator()
-        menu.addAction(self.theme.icon("rotate-cw"), _("Reset room")).triggered.connect(self._put_back)
+        menu.addAction(self.theme.icon("rotate-cw"), _("Reset room")).triggered.connect(self._reset_room)
         start = menu.addAction(_("Reset robots to their start position before each run"))
         start.setCheckable(True)
-        start.setChecked(self.session.fleet.begins_at_start)
+        start.setChecked(self.session.fleet.resets_at_start)
         start.triggered.connect(lambda: self.context.run("run.from_start"))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if place is None:
-            drop_below(menu, button or self.add)
+            open_below(menu, button or self.add)
         else:
             menu.popup(place)
 
@@ -315,12 +319,12 @@ class RobotPanel(OneRobotPanel):
         if self._large is not None:
             self._large.dispose()
             return
-        self._large = LargeRoom(self.theme, self, self.stage, self._room_tools(size=26))
-        self._large.closed.connect(self._give_back)
-        self.context.keys_to_question()  # the question lies above the room
+        self._large = LargeRoom(self.theme, self, self.stage, self._make_room_tools(size=26))
+        self._large.closed.connect(self._restore_stage)
+        self.context.focus_question()  # the question lies above the room
         self.large.set_icon("minimize-2")
 
-    def fill_screen(self) -> None:
+    def toggle_full_screen(self) -> None:
         """Show or hide the room in full screen mode, with the run bar above it."""
         if self._large is not None and self._large.filled:
             self._large.dispose()
@@ -328,9 +332,9 @@ class RobotPanel(OneRobotPanel):
         if self._large is None:
             self.enlarge()
         if self._large is not None:
-            self._large.fill_screen()
+            self._large.toggle_full_screen()
 
-    def _give_back(self) -> None:
+    def _restore_stage(self) -> None:
         self._large = None
         self.pages.insertWidget(1, self.stage)
         self.pages.setCurrentWidget(self.stage)
@@ -339,8 +343,8 @@ class RobotPanel(OneRobotPanel):
 
     def _change(self, change: Mapping[str, object], robot: str = "") -> None:
         if robot or self._robot:
-            with suppress(RobotUnknownError):
-                self.session.fleet.world(robot or self._robot, change)
+            with suppress(UnknownRobotError):
+                self.session.fleet.change_world(robot or self._robot, change)
 
     def suspendables(self) -> Iterable[Suspendable | None]:
         return (*super().suspendables(), *self._looks.values())
@@ -352,13 +356,13 @@ class RobotPanel(OneRobotPanel):
         self._looks.clear()
 
     def resume(self) -> None:
-        if self._watch is not None and self._watch.resting:
+        if self._watch is not None and self._watch.is_suspended:
             # the watch was suspended, so the age of the state is unknown rather than stale
             self._told_s = time.monotonic()
         super().resume()
 
 
-def _where_to_look(link: RobotLink) -> str:
+def _hint_text(link: RobotLink) -> str:
     # Mentions only parts that the robot has.
     images = [sensor.is_image for sensor in link.robot.sensors]
     if True in images and False in images:

@@ -17,7 +17,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.ui.robot_drawing.bubble import paint_heard
+from app.ui.robot_drawing.bubble import paint_caption
 from app.ui.robot_drawing.scene import TURTLE, Marks, RobotDrawing
 from app.ui.robot_drawing.state import RobotState, Thing
 from app.ui.text import plain
@@ -26,7 +26,7 @@ from app.ui.widgets import paint
 from app.ui.widgets.keyboard import is_plain
 from nep.i18n import _
 
-TOUCHABLE = ("head", "left_hand", "right_hand")
+TOUCHABLE_PARTS = ("head", "left_hand", "right_hand")
 BODY = "body"
 """Name of the part by which a robot is lifted and moved."""
 STALE_COLOUR = QColor(90, 90, 90, 150)
@@ -57,11 +57,11 @@ class RoomView(QWidget):
 
     touched = Signal(str, str, bool)  # robot ("" for the main one), part, True if pressed
     moved = Signal(str, float, float)  # thing, x, y in m
-    carried = Signal(str, float, float)  # robot, x, y in m
-    held = Signal(str, bool)  # robot, True if lifted
-    bumped = Signal(str, str)  # robot, side of the bumper
+    robot_moved = Signal(str, float, float)  # robot, x, y in m
+    robot_lifted = Signal(str, bool)  # robot, True if lifted
+    bumper_pressed = Signal(str, str)  # robot, side of the bumper
     removed = Signal(str)  # thing
-    menu_wanted = Signal(str, QPoint)  # thing or "", position on the screen
+    menu_requested = Signal(str, QPoint)  # thing or "", position on the screen
     enlarged = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -119,35 +119,35 @@ class RoomView(QWidget):
         parsed = [(name, RobotState.parse(each)) for name, each in others]
         if (state, parsed) != (self.state, self.others):
             self.state, self.others = state, parsed
-            self.setAccessibleDescription(self._described())
+            self.setAccessibleDescription(self._description())
             self.update()
 
     def set_stale(self, stale: bool) -> None:
         """Show the robot as stale: drawn in grey, without speech."""
         if stale != self.stale:
             self.stale = stale
-            self.setAccessibleDescription(self._described())
+            self.setAccessibleDescription(self._description())
             self.update()
 
-    def show_heard(self, words: str) -> None:
+    def set_caption(self, words: str) -> None:
         """Show heard words as a caption below the drawing; "" for none."""
         if words != self.heard:
             self.heard = words
             self.update()
 
-    def _described(self) -> str:
+    def _description(self) -> str:
         return "" if self.stale else self.state.caption
 
     def sizeHint(self) -> QSize:
         return QSize(382, 286)
 
-    def place_of(self, part: str) -> QPointF | None:
+    def position_of(self, part: str) -> QPointF | None:
         """Return the position of a part in the view; for tests and tools."""
-        return self._drawing.place_of(part, QRectF(self.rect()), self.state, self.others)
+        return self._drawing.point_of(part, QRectF(self.rect()), self.state, self.others)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
-        state = replace(self.state, speech=None, sound="", moving=False) if self.stale else self.state
+        state = replace(self.state, speech=None, sound="", is_moving=False) if self.stale else self.state
         chosen = self.chosen if self.hasFocus() else None
         marks = Marks(self._hovered, chosen, self._theme.colour("focus"))
         area = QRectF(self.rect())
@@ -155,12 +155,12 @@ class RoomView(QWidget):
         if self.stale:
             painter.fillRect(self.rect(), STALE_COLOUR)
         if self.heard:
-            paint_heard(painter, area, self.heard, self._theme.font("label"))
+            paint_caption(painter, area, self.heard, self._theme.font("label"))
         painter.end()
 
     # -- geometry -----------------------------------------------------------------------------------------
 
-    def _at(self, position: QPointF) -> str | None:
+    def _part_at(self, position: QPointF) -> str | None:
         return self._drawing.part_at(position, QRectF(self.rect()), self.state, self.others)
 
     def _thing(self, part: str | None) -> Thing | None:
@@ -172,27 +172,32 @@ class RoomView(QWidget):
         name, of = split(part or "")
         return ({"": self.state} | dict(self.others)).get(name) if of == BODY else None
 
-    def _where(self, part: str | None) -> tuple[float, float] | None:
+    def _position_m(self, part: str | None) -> tuple[float, float] | None:
         # Returns the position in m of an item that can be moved.
         found = self._robot(part) or self._thing(part)
-        movable = found is not None and (isinstance(found, RobotState) or self._movable(found))
+        movable = found is not None and (isinstance(found, RobotState) or self._is_movable(found))
         return (found.x, found.y) if found is not None and movable else None
 
-    def _movable(self, thing: Thing) -> bool:
-        return self.state.shared or thing.kind in {"ball", "person"}
+    def _is_movable(self, thing: Thing) -> bool:
+        return self.state.is_room_shared or thing.kind in {"ball", "person"}
 
-    def choices(self) -> list[str]:
+    def selectable_items(self) -> list[str]:
         """Return the items that can be selected by keyboard: robots, then things."""
         robots = [BODY, *(f"{name}/{BODY}" for name, _state in self.others)]
-        return [*robots, *(thing.name for thing in self.state.objects if thing.name and self._movable(thing))]
+        return [
+            *robots,
+            *(thing.name for thing in self.state.objects if thing.name and self._is_movable(thing)),
+        ]
 
     # -- mouse --------------------------------------------------------------------------------------------
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        self._pressed = self._at(event.position()) if event.button() == Qt.MouseButton.LeftButton else None
+        self._pressed = (
+            self._part_at(event.position()) if event.button() == Qt.MouseButton.LeftButton else None
+        )
         self._pressed_at, self._dragging = event.position(), False
-        where = self._where(self._pressed)
-        if self._pressed is not None and split(self._pressed)[1] in TOUCHABLE:
+        where = self._position_m(self._pressed)
+        if self._pressed is not None and split(self._pressed)[1] in TOUCHABLE_PARTS:
             self.touched.emit(*split(self._pressed), True)
         elif where is not None:
             self.chosen = self._pressed
@@ -202,14 +207,14 @@ class RoomView(QWidget):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._pressed is None:
-            part = self._at(event.position())
+            part = self._part_at(event.position())
             self._hover(part)
-        elif self._where(self._pressed) is not None:
+        elif self._position_m(self._pressed) is not None:
             self._drag(event.position())
 
     def _hover(self, part: str | None) -> None:
-        touchable = part is not None and split(part)[1] in TOUCHABLE
-        movable = self._where(part) is not None
+        touchable = part is not None and split(part)[1] in TOUCHABLE_PARTS
+        movable = self._position_m(part) is not None
         shape = Qt.CursorShape.PointingHandCursor if touchable else Qt.CursorShape.OpenHandCursor
         self.setCursor(shape if touchable or movable else Qt.CursorShape.ArrowCursor)
         hovered = part if movable else None
@@ -224,33 +229,33 @@ class RoomView(QWidget):
             self._dragging = True
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
             if self._robot(self._pressed) is not None:
-                self.held.emit(split(self._pressed or "")[0], True)
+                self.robot_lifted.emit(split(self._pressed or "")[0], True)
         area = QRectF(self.rect())
         self._move(self._pressed or "", *self._drawing.floor_at(position + self._offset, area, self.state))
 
     def _move(self, part: str, x: float, y: float) -> None:
         if self._robot(part) is not None:
-            self.carried.emit(split(part)[0], x, y)
+            self.robot_moved.emit(split(part)[0], x, y)
         else:
             self.moved.emit(part, x, y)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         pressed, self._pressed = self._pressed, None
-        if pressed is not None and split(pressed)[1] in TOUCHABLE:
+        if pressed is not None and split(pressed)[1] in TOUCHABLE_PARTS:
             self.touched.emit(*split(pressed), False)
         elif self._dragging and self._robot(pressed) is not None:
-            self.held.emit(split(pressed or "")[0], False)
+            self.robot_lifted.emit(split(pressed or "")[0], False)
         elif pressed is not None:
             self._bump(pressed, event.position())
         self._dragging = False
-        self._hover(self._at(event.position()))
+        self._hover(self._part_at(event.position()))
 
     def _bump(self, part: str, position: QPointF) -> bool:
         # Returns False for robots without a bumper.
         area = QRectF(self.rect())
         side = self._drawing.side_at(position, area, part, self.state, self.others)
         if side is not None:
-            self.bumped.emit(split(part)[0], side)
+            self.bumper_pressed.emit(split(part)[0], side)
         return side is not None
 
     def _has_bumper(self, part: str | None) -> bool:
@@ -258,8 +263,8 @@ class RoomView(QWidget):
         return robot is not None and robot.figure == TURTLE
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        part = self._at(event.position())
-        if part is not None and (split(part)[1] in TOUCHABLE or self._has_bumper(part)):
+        part = self._part_at(event.position())
+        if part is not None and (split(part)[1] in TOUCHABLE_PARTS or self._has_bumper(part)):
             self.mousePressEvent(event)  # second press of a fast double click
         elif event.button() == Qt.MouseButton.LeftButton:
             self.enlarged.emit()
@@ -270,17 +275,19 @@ class RoomView(QWidget):
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         if event.reason() == QContextMenuEvent.Reason.Mouse:
-            part, place = self._at(QPointF(event.pos())), event.globalPos()
+            part, place = self._part_at(QPointF(event.pos())), event.globalPos()
         else:
             part = self.chosen
-            place = self.mapToGlobal((self.place_of(part or "") or QPointF(self.rect().center())).toPoint())
+            place = self.mapToGlobal(
+                (self.position_of(part or "") or QPointF(self.rect().center())).toPoint()
+            )
         thing = self._thing(part)
-        self.menu_wanted.emit(thing.name if thing is not None and self._movable(thing) else "", place)
+        self.menu_requested.emit(thing.name if thing is not None and self._is_movable(thing) else "", place)
 
     # -- keyboard -----------------------------------------------------------------------------------------
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        choices = self.choices()
+        choices = self.selectable_items()
         at = choices.index(self.chosen) if self.chosen in choices else -1 if forward else len(choices)
         at += 1 if forward else -1
         if 0 <= at < len(choices):
@@ -295,7 +302,7 @@ class RoomView(QWidget):
         return super().focusNextPrevChild(forward)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, where = Qt.Key(event.key()), self._where(self.chosen)
+        key, where = Qt.Key(event.key()), self._position_m(self.chosen)
         if key in ARROW_DIRECTIONS and where is not None and self.chosen is not None:
             small = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
             step = SMALL_STEP_M if small else STEP_M
@@ -303,19 +310,19 @@ class RoomView(QWidget):
             self._move(self.chosen, where[0] + ahead * step, where[1] + aside * step)
         elif key in {Qt.Key.Key_Delete, Qt.Key.Key_Backspace} and self._thing(self.chosen) is not None:
             self.removed.emit(self.chosen)
-        elif key in PRESS_KEYS and self._has_bumper(self._pressed_by_keys()) and is_plain(event):
+        elif key in PRESS_KEYS and self._has_bumper(self._keyboard_target()) and is_plain(event):
             if not event.isAutoRepeat():
-                self.bumped.emit(split(self.chosen or "")[0], "front")
+                self.bumper_pressed.emit(split(self.chosen or "")[0], "front")
         else:
-            self._touch_by(event, key)
+            self._touch_with_key(event, key)
 
-    def _pressed_by_keys(self) -> str:
+    def _keyboard_target(self) -> str:
         # Space acts on the selected item, else on the main robot.
         return self.chosen or BODY
 
-    def _touch_by(self, event: QKeyEvent, key: Qt.Key) -> None:
+    def _touch_with_key(self, event: QKeyEvent, key: Qt.Key) -> None:
         part = TOUCH_KEYS.get(key) if is_plain(event) else None
-        if key in PRESS_KEYS and is_plain(event) and self._robot(self._pressed_by_keys()) is not None:
+        if key in PRESS_KEYS and is_plain(event) and self._robot(self._keyboard_target()) is not None:
             part = "head"
         if part is None:
             event.ignore()

@@ -14,7 +14,7 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import IconButton, SearchField
 from app.ui.widgets.keyboard import is_plain
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
 HEARD_EVENT = "heard"
@@ -23,14 +23,14 @@ MAX_ENTRIES = 24
 MAX_WIDTH = 720
 """Maximum width in px, which limits the bar of the enlarged room."""
 Awaited: TypeAlias = Callable[[Event, str], Sequence[str]]
-Happening: TypeAlias = dict[str, object]
+SimulatedEvent: TypeAlias = dict[str, object]
 
 
 class SayField(SearchField):
     """Text field for speech. Return emits `said`; Down emits `asked` to show suggestions."""
 
-    said = Signal(str)
-    asked = Signal()
+    submitted = Signal(str)
+    suggestions_requested = Signal()
     icon_name = "message-circle"
 
     def __init__(self, theme: Theme) -> None:
@@ -48,7 +48,7 @@ class SayField(SearchField):
         if words.strip():
             self._last = words.strip()
             self.clear()
-            self.said.emit(self._last)
+            self.submitted.emit(self._last)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = event.key() if is_plain(event) else None
@@ -57,7 +57,7 @@ class SayField(SearchField):
         elif key == Qt.Key.Key_Up and not self.text():
             self.setText(self._last)
         elif key == Qt.Key.Key_Down:
-            self.asked.emit()
+            self.suggestions_requested.emit()
         else:
             super().keyPressEvent(event)
 
@@ -69,8 +69,8 @@ class SayBar(QWidget):
         awaited: Returns the values of an event's field that programs are waiting for.
     """
 
-    said = Signal(str)
-    happened = Signal(object)  # `Happening`, in the format of a virtual robot's world
+    speech_submitted = Signal(str)
+    event_simulated = Signal(object)  # `Happening`, in the format of a virtual robot's world
 
     def __init__(self, theme: Theme, awaited: Awaited) -> None:
         super().__init__()
@@ -79,10 +79,10 @@ class SayBar(QWidget):
         self.field = SayField(theme)
         self.words = IconButton(theme, "chevron-down", _("Choose what to say"), size=26)
         self.events = IconButton(theme, "zap", _("Simulate an event"), size=26)
-        self.field.said.connect(self.said)
-        self.field.asked.connect(self.show_words)
-        self.words.clicked.connect(self.show_words)
-        self.events.clicked.connect(self.show_events)
+        self.field.submitted.connect(self.speech_submitted)
+        self.field.suggestions_requested.connect(self.show_suggestions)
+        self.words.clicked.connect(self.show_suggestions)
+        self.events.clicked.connect(self.show_event_menu)
         row = QHBoxLayout(self)
         row.setContentsMargins(8, 6, 8, 6)
         row.setSpacing(4)
@@ -107,21 +107,21 @@ class SayBar(QWidget):
         self.field.setAccessibleName(words)
         self.field.setVisible(hears)
         self.words.setVisible(hears)
-        self.events.setVisible(any(True for _entry in self.happenings()))
+        self.events.setVisible(any(True for _entry in self.simulated_events()))
         self.setVisible(robot.virtual and (hears or self.events.isVisibleTo(self)))
 
     # -- speech -------------------------------------------------------------------------------------------
 
-    def choices(self) -> Sequence[str]:
+    def suggestions(self) -> Sequence[str]:
         """Return the words that programs are waiting for."""
         event = self._robot.event(HEARD_EVENT) if self._robot is not None else None
         return self._awaited(event, event.filters[0]) if event is not None and event.filters else ()
 
-    def show_words(self) -> None:
+    def show_suggestions(self) -> None:
         """Show a menu of the words that programs are waiting for; choosing one speaks it."""
         menu = Menu(self._theme, self)
-        for word in self.choices():
-            menu.addAction(plain.entry(word)).triggered.connect(
+        for word in self.suggestions():
+            menu.addAction(plain.escape_menu_text(word)).triggered.connect(
                 lambda _on=False, word=word: self.field.submit(word)
             )
         if menu.isEmpty():
@@ -130,30 +130,30 @@ class SayBar(QWidget):
 
     # -- simulated events ---------------------------------------------------------------------------------
 
-    def happenings(self) -> Iterator[tuple[str, str, Happening]]:
+    def simulated_events(self) -> Iterator[tuple[str, str, SimulatedEvent]]:
         """Yield text, icon and data of each event that can be simulated."""
         for event in self._robot.events if self._robot is not None else ():
             if event.name in {HEARD_EVENT, "released"}:  # a tap includes the release
                 continue
             yield from _entries(event, self._awaited)
 
-    def show_events(self) -> None:
+    def show_event_menu(self) -> None:
         """Show the menu of events."""
         menu = Menu(self._theme, self)
-        for words, icon, happening in list(self.happenings())[:MAX_ENTRIES]:
-            action = menu.addAction(self._theme.icon(icon), plain.entry(words))
-            action.triggered.connect(lambda _on=False, told=happening: self.happened.emit(told))
+        for words, icon, happening in list(self.simulated_events())[:MAX_ENTRIES]:
+            action = menu.addAction(self._theme.icon(icon), plain.escape_menu_text(words))
+            action.triggered.connect(lambda _on=False, told=happening: self.event_simulated.emit(told))
         self._pop_up(menu, self.events)
 
     def _pop_up(self, menu: Menu, anchor: QWidget) -> None:
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        drop_below(menu, anchor)
+        open_below(menu, anchor)
 
 
-def _entries(event: Event, awaited: Awaited) -> Iterator[tuple[str, str, Happening]]:
+def _entries(event: Event, awaited: Awaited) -> Iterator[tuple[str, str, SimulatedEvent]]:
     # One entry per value, such as "head is touched" and "left hand is touched".
     if not event.filters:
-        yield _sentence(event, {}), event.icon, {"happen": event.name}
+        yield _event_text(event, {}), event.icon, {"happen": event.name}
         return
     name = event.filters[0]
     parameter = next((each for each in event.fields if each.name == name), None)
@@ -162,10 +162,10 @@ def _entries(event: Event, awaited: Awaited) -> Iterator[tuple[str, str, Happeni
     else:
         values = [(value, value) for value in awaited(event, name)]
     for value, title in values:
-        yield _sentence(event, {name: title}), event.icon, {"happen": event.name, name: value}
+        yield _event_text(event, {name: title}), event.icon, {"happen": event.name, name: value}
 
 
-def _sentence(event: Event, values: dict[str, str]) -> str:
+def _event_text(event: Event, values: dict[str, str]) -> str:
     # Text of the event's block without the robot, such as "Sees something red".
     words = event.text.partition("%robot")[2].strip() or event.title
     for name, title in values.items():

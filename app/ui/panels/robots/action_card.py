@@ -11,9 +11,16 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.errors import InputProblem
 from app.robots.description.description import Action
-from app.ui.panels.robots.controls.chooser import Pictures
+from app.ui.panels.robots.controls.chooser import ImageSource
 from app.ui.panels.robots.form import ActionForm
-from app.ui.panels.robots.tries import TryList, end_words, left_words, now_words, output_words, progress_of
+from app.ui.panels.robots.tries import (
+    TryList,
+    output_text,
+    progress_of,
+    remaining_text,
+    result_texts,
+    state_text,
+)
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, Chip, ElidedLabel, IconButton, ValueBar, label, set_role
 from app.ui.widgets.cards import Tile
@@ -34,7 +41,7 @@ class ActionCard(Card):
         title_of: Returns the title of another action by its name.
     """
 
-    tried = Signal(dict)
+    try_requested = Signal(dict)
     cancelled = Signal()
 
     def __init__(
@@ -44,7 +51,7 @@ class ActionCard(Card):
         options: Callable[[str], Sequence[str]],
         *,
         folded: bool = False,
-        pictures: Pictures | None = None,
+        pictures: ImageSource | None = None,
         title_of: Callable[[str], str] = str,
     ) -> None:
         super().__init__(theme)
@@ -54,7 +61,7 @@ class ActionCard(Card):
         self._given: Mapping[str, object] = {}
         self._folded = False
         self.form = ActionForm(theme, action, options, pictures)
-        self.form.changed.connect(self._say_summary)
+        self.form.changed.connect(self._update_summary)
         self.title = label(action.title[:1].upper() + action.title[1:], "card", wrap=True)
         self.summary = ElidedLabel("bodyLarge", "textSecondary")
         self.risk = Chip(theme, _(RISKS.get(action.risk or "", "")), "warn")
@@ -67,18 +74,18 @@ class ActionCard(Card):
         tries = _("Recent tries of {action}").format(action=action.title)
         self.past = IconButton(theme, "history", tries, size=30)
         self.past.setCheckable(True)
-        self.past.toggled.connect(self._show_past)
+        self.past.toggled.connect(self._set_tries_visible)
         self.past.hide()
         self.fold = IconButton(theme, "chevron-down", _("Show values"), size=30)
-        self.fold.clicked.connect(lambda: self.set_folded(not self._folded))
+        self.fold.clicked.connect(lambda: self.set_collapsed(not self._folded))
         self.fold.setVisible(folded and bool(action.parameters))
         self.error = label("", "small", role="error", wrap=True)
         self.progress = ValueBar(theme)
         self.tries = TryList(theme, action)
-        self.tries.chosen.connect(self._take_back)
+        self.tries.selected.connect(self._reuse_input)
         self.tries.hide()
         self._lay_out(theme)
-        self.set_folded(folded)
+        self.set_collapsed(folded)
         self.show_invocation(None)
 
     def _lay_out(self, theme: Theme) -> None:
@@ -100,19 +107,19 @@ class ActionCard(Card):
         for widget in below:
             column.addWidget(widget)
 
-    def set_folded(self, folded: bool) -> None:
+    def set_collapsed(self, folded: bool) -> None:
         """Collapse or expand the form."""
         self._folded = folded
         self.form.setVisible(not folded and bool(self.action.parameters))
         self.fold.set_icon("chevron-down" if folded else "chevron-up")
         self.fold.set_name(_("Show values") if folded else _("Hide values"))
-        self._say_summary()
+        self._update_summary()
 
-    def _say_summary(self) -> None:
+    def _update_summary(self) -> None:
         self.summary.setText(self.form.summary() if self._folded else "")
         self.summary.setVisible(self._folded)
 
-    def set_first(self, first: bool) -> None:
+    def set_highlighted(self, first: bool) -> None:
         """Highlight the card, or remove the highlight: accent border and filled Try button."""
         border = "accent" if first else "border"
         if border != self.border:
@@ -126,7 +133,7 @@ class ActionCard(Card):
             self.cancelled.emit()
         else:
             self._given = self.form.input()
-            self.tried.emit(dict(self._given))
+            self.try_requested.emit(dict(self._given))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
@@ -135,19 +142,19 @@ class ActionCard(Card):
         else:
             super().keyPressEvent(event)
 
-    def _show_past(self, on: bool) -> None:
+    def _set_tries_visible(self, on: bool) -> None:
         self.tries.setVisible(on)
 
-    def _take_back(self, given: Mapping[str, object]) -> None:
+    def _reuse_input(self, given: Mapping[str, object]) -> None:
         # Puts the input of an earlier try into the form.
-        self.set_folded(False)
+        self.set_collapsed(False)
         self.form.set_input(given)
         self.form.show_problems(())
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
         """Show why the input was rejected."""
         if problems and self._folded:
-            self.set_folded(False)
+            self.set_collapsed(False)
         self.form.show_problems(problems)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
@@ -157,37 +164,37 @@ class ActionCard(Card):
 
     def show_invocation(self, invocation: Invocation | None, *, may_move: bool = False) -> None:
         """Show the state of the latest try. `may_move` is True if the robot may still be moving."""
-        self._running = invocation is not None and invocation.running
+        self._running = invocation is not None and invocation.is_running
         can_cancel = self._running and (
             self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))
         )
         if can_cancel:
-            self.try_button.set_word(_("Cancel"), "x")
+            self.try_button.set_label(_("Cancel"), "x")
         else:
-            self.try_button.set_word(_("Try"), "play")
+            self.try_button.set_label(_("Try"), "play")
         said = _("Cancel {action}") if can_cancel else _("Try {action}")
         self.try_button.setAccessibleName(said.format(action=self.action.title))
         self.try_button.setEnabled(can_cancel or not self._running)
-        self.set_first(self.border == "accent")
+        self.set_highlighted(self.border == "accent")
         share, words, left = None, "", ""
         if invocation is not None and self._running:
             share = progress_of(self.action, self._given or invocation.given, invocation.feedback)
-            words = now_words(self.action, invocation, self._title_of)
-            left = left_words(invocation)
+            words = state_text(self.action, invocation, self._title_of)
+            left = remaining_text(invocation)
         self.progress.setVisible(share is not None)
         self.progress.set_fraction(share)
         self.words.setText(words)
         self.left.setText(left)
         self.left.setVisible(bool(left))
-        self._say_end(None if self._running else invocation, may_move)
+        self._show_result(None if self._running else invocation, may_move)
 
-    def _say_end(self, invocation: Invocation | None, may_move: bool) -> None:
+    def _show_result(self, invocation: Invocation | None, may_move: bool) -> None:
         said, status, sentence = ("", "ok", "")
         if invocation is not None:
-            said, status, sentence = end_words(invocation, may_move=may_move)
+            said, status, sentence = result_texts(invocation, may_move=may_move)
         self.result.set(said, status)
         if invocation is not None and invocation.state == "succeeded":
-            self.words.setText(output_words(self.action, invocation.output))
+            self.words.setText(output_text(self.action, invocation.output))
         set_role(self.error, "textSecondary" if status == "off" else "error")
         self.error.setText(sentence)
         self.error.setVisible(bool(sentence))

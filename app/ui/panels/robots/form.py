@@ -10,10 +10,10 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QLineEdit, QVBoxLayout, QWidg
 
 from app.errors import InputProblem
 from app.robots.description.description import Action, Parameter
-from app.robots.description.inputs import wrong_value
-from app.ui.panels.robots.controls.chooser import ROW_HEIGHT, Control, Pictures, control_for, sentence_case
+from app.robots.description.inputs import value_problem
+from app.ui.panels.robots.controls.chooser import ROW_HEIGHT, Control, ImageSource, control_for, sentence_case
 from app.ui.panels.robots.controls.colour import ColourChoice
-from app.ui.panels.robots.input_text import input_words
+from app.ui.panels.robots.input_text import input_summary
 from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Segments, label
@@ -40,7 +40,7 @@ class ActionForm(QWidget):
         theme: Theme,
         action: Action,
         options: Callable[[str], Sequence[str]] = lambda _property: (),
-        pictures: Pictures | None = None,
+        pictures: ImageSource | None = None,
     ) -> None:
         super().__init__()
         self.action = action
@@ -76,7 +76,7 @@ class ActionForm(QWidget):
     def _add(self, parameter: Parameter, options: Sequence[str]) -> None:
         control = control_for(self._theme, parameter, options, self._pictures)
         # not plain text: with a buddy, "&" would define a mnemonic
-        words = plain.entry(sentence_case(parameter.title))
+        words = plain.escape_menu_text(sentence_case(parameter.title))
         name = label(words, "bodyLarge", role="textSecondary", wrap=True)
         name.setBuddy(control.widget)
         wrong = label("", "small", role="error", wrap=True)
@@ -89,12 +89,12 @@ class ActionForm(QWidget):
         inside.addWidget(wrong)
         control.widget.setMinimumHeight(ROW_HEIGHT)
         self._heights[name] = max(ROW_HEIGHT, min(TALL_ROW, control.widget.sizeHint().height()))
-        self._put(2 * len(self._rows), name, cell)
+        self._position_row(2 * len(self._rows), name, cell)
         self.controls[parameter.name] = control
         self._sentences[parameter.name] = wrong
         self._rows[parameter.name] = (name, cell)
-        control.changed(self._told)
-        control.finished(lambda: self._left(parameter))
+        control.changed(self._control_changed)
+        control.finished(lambda: self._validate_field(parameter))
 
     # -- layout -------------------------------------------------------------------------------------------
 
@@ -106,7 +106,7 @@ class ActionForm(QWidget):
         if stacked != self._stacked:
             self._stacked = stacked
             for place, (name, cell) in enumerate(self._rows.values()):
-                self._put(2 * place, name, cell)
+                self._position_row(2 * place, name, cell)
 
     def _control_width(self) -> int:
         # Wrapping controls count with the width that they need for a single row.
@@ -114,7 +114,7 @@ class ActionForm(QWidget):
         in_one_row = (one.sizeHint().width() for one in each if isinstance(one, Segments | ColourChoice))
         return max((*in_one_row, *(one.minimumSizeHint().width() for one in each)), default=0)
 
-    def _put(self, row: int, name: QWidget, cell: QWidget) -> None:
+    def _position_row(self, row: int, name: QWidget, cell: QWidget) -> None:
         for widget in (name, cell):
             self._grid.removeWidget(widget)
         name.setMinimumHeight(0 if self._stacked else self._heights[name])
@@ -134,22 +134,22 @@ class ActionForm(QWidget):
         least = max((cell.minimumSizeHint().width() for _name, cell in self._rows.values()), default=0)
         return QSize(least, super().minimumSizeHint().height())
 
-    def _told(self) -> None:
+    def _control_changed(self) -> None:
         self.show_problems(())
         self.changed.emit()
 
-    def _left(self, parameter: Parameter) -> None:
+    def _validate_field(self, parameter: Parameter) -> None:
         # Validates when a field loses the focus, so that errors are shown before a try.
         value = self.controls[parameter.name].value()
-        wrong = None if value is None else wrong_value(parameter, value)
+        wrong = None if value is None else value_problem(parameter, value)
         said = [] if wrong is None else [wrong]
-        self._judge(parameter, said)
+        self._show_errors_of(parameter, said)
 
     def _show_advanced(self, on: bool) -> None:
         if on:
-            self.more.set_word(_("Fewer"), "chevron-up")
+            self.more.set_label(_("Fewer"), "chevron-up")
         else:
-            self.more.set_word(_("More"), "chevron-down")
+            self.more.set_label(_("More"), "chevron-down")
         for parameter in self.action.parameters:
             if parameter.advanced:
                 for widget in self._rows[parameter.name]:
@@ -169,14 +169,16 @@ class ActionForm(QWidget):
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
         """Show each error below its parameter, and other errors at the end of the form."""
         for parameter in self.action.parameters:
-            self._judge(parameter, [each.sentence for each in problems if each.parameter == parameter.name])
+            self._show_errors_of(
+                parameter, [each.message for each in problems if each.parameter == parameter.name]
+            )
         rows = {parameter.name for parameter in self.action.parameters}
-        self._set_errors(self.problem, [each.sentence for each in problems if each.parameter not in rows])
+        self._set_errors(self.problem, [each.message for each in problems if each.parameter not in rows])
 
-    def _judge(self, parameter: Parameter, said: Sequence[str]) -> None:
+    def _show_errors_of(self, parameter: Parameter, said: Sequence[str]) -> None:
         control = self.controls[parameter.name]
-        self._set_errors(self._sentences[parameter.name], () if control.sentence else said)
-        self._mark(control.widget, wrong=bool(said or control.sentence))
+        self._set_errors(self._sentences[parameter.name], () if control.error_text else said)
+        self._mark(control.widget, wrong=bool(said or control.error_text))
         if said and parameter.advanced:
             self.more.setChecked(True)
 
@@ -186,7 +188,7 @@ class ActionForm(QWidget):
 
     def _mark(self, widget: QWidget, *, wrong: bool) -> None:
         if isinstance(widget, LongText):
-            widget.mark(wrong=wrong)
+            widget.set_invalid(wrong=wrong)
             return
         for field in [widget, *widget.findChildren(QLineEdit)]:
             if isinstance(field, QLineEdit) and (field.property("wrong") == "true") != wrong:
@@ -197,7 +199,7 @@ class ActionForm(QWidget):
     def summary(self) -> str:
         """Return a short description of the input, such as "happy, for 2 s"."""
         given = {name: control.value() for name, control in self.controls.items()}
-        return input_words(self.action, given, texts=False)
+        return input_summary(self.action, given, texts=False)
 
     def dispose(self) -> None:
         """Release the resources of all controls."""

@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.robots.description.description import Action, Parameter
-from app.robots.description.inputs import to_words
+from app.robots.description.inputs import format_for_editing
 from nep.i18n import _, number, translate
 
 UNITS = {"s": "seconds", "min": "minutes"}
 MAX_TEXT_LENGTH = 32
 
 
-def input_words(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
+def input_summary(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
     """Describe the most important values of an input, in the order of the parameters.
 
     If `texts` is True, texts are included in quotation marks.
     """
-    found = (_words(parameter, given.get(parameter.name), texts=texts) for parameter in action.parameters)
+    found = (
+        _value_text(parameter, given.get(parameter.name), texts=texts) for parameter in action.parameters
+    )
     return ", ".join(words for words in found if words)
 
 
@@ -27,11 +29,11 @@ def is_unit(title: str, unit: str | None) -> bool:
     return english is not None and title in {english, translate("robot", english)}
 
 
-def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
+def _value_text(parameter: Parameter, value: object, *, texts: bool) -> str:
     title = next((choice.title for choice in parameter.choices if choice.value == value), None)
     if title is not None:
         return title
-    if parameter.kind in NUMBERS and isinstance(value, (int, float)):
+    if parameter.kind in NUMBER_KINDS and isinstance(value, (int, float)):
         said = number(value) if isinstance(value, float) else str(value)
         said += f"{'' if parameter.unit in {'°', None} else ' '}{parameter.unit or ''}"
         if is_unit(parameter.title, parameter.unit):
@@ -45,9 +47,9 @@ def _words(parameter: Parameter, value: object, *, texts: bool) -> str:
         text = " ".join(value.split())
         return f"“{text if len(text) <= MAX_TEXT_LENGTH else text[: MAX_TEXT_LENGTH - 1] + '…'}”"
     if parameter.kind in ("list", "object") and value:
-        words = to_words(value)
+        words = format_for_editing(value)
         return words if len(words) <= MAX_TEXT_LENGTH else f"{words[: MAX_TEXT_LENGTH - 1]}…"
     return str(value) if parameter.kind == "colour" and value else ""
 
 
-NUMBERS = frozenset({"number", "integer", "angle"})
+NUMBER_KINDS = frozenset({"number", "integer", "angle"})

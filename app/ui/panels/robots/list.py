@@ -11,7 +11,7 @@ from PySide6.QtCore import QPoint, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QContextMenuEvent, QPainter
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from app.core.robots.robot_link import STATE_WORDS
+from app.core.robots.robot_link import STATE_LABELS
 from app.ui.text import dates, plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -30,16 +30,16 @@ TURTLE = "diffdrive"
 LIST_WIDTH = 300
 
 
-def seen_words(seen_s: float, now: dt.datetime | None = None) -> str:
+def seen_text(seen_s: float, now: dt.datetime | None = None) -> str:
     """Format when a robot was last seen, such as "seen today, 8:12" or "seen 17 November, 16:20"."""
     now = now or dt.datetime.now().astimezone()
-    return dates.seen_words(dt.datetime.fromtimestamp(seen_s, tz=now.tzinfo), now)
+    return dates.last_seen_text(dt.datetime.fromtimestamp(seen_s, tz=now.tzinfo), now)
 
 
 class RobotItem(PaintedButton):
     """Row of a robot; `menu_wanted` carries the screen position for a context menu."""
 
-    menu_wanted = Signal(QPoint)
+    menu_requested = Signal(QPoint)
 
     def __init__(self, theme: Theme, name: str) -> None:
         super().__init__(theme, radius="panel", checkable=True)
@@ -57,11 +57,11 @@ class RobotItem(PaintedButton):
     def show_link(self, link: RobotLink, seen: str = "") -> None:
         """Show the state of a robot; `seen` replaces the description of a disconnected one."""
         where = _("virtual, this computer") if link.virtual else link.robot.title
-        away = not link.connected
+        away = not link.is_connected
         self._show(link.state, seen if away and seen else where, away=away)
         self.may_be_forgotten = self._away and not link.virtual
 
-    def show_away(self, seen: str) -> None:
+    def show_disconnected(self, seen: str) -> None:
         """Show a robot of an earlier session that is not connected; clicking it opens the context menu."""
         self.setAutoExclusive(False)
         self.setCheckable(False)
@@ -69,7 +69,7 @@ class RobotItem(PaintedButton):
         self.may_be_forgotten = True
 
     def _show(self, state: str, where: str, *, away: bool) -> None:
-        said = _(STATE_WORDS[state])
+        said = _(STATE_LABELS[state])
         self.chip.set(said, ROBOT_STATUS[state])
         self.where, self._away = where, away
         self.setAccessibleName(f"{self.name}, {where}, {said}")
@@ -80,7 +80,7 @@ class RobotItem(PaintedButton):
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
         by_mouse = event.reason() == QContextMenuEvent.Reason.Mouse
-        self.menu_wanted.emit(event.globalPos() if by_mouse else self.mapToGlobal(self.rect().center()))
+        self.menu_requested.emit(event.globalPos() if by_mouse else self.mapToGlobal(self.rect().center()))
         event.accept()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -98,9 +98,9 @@ class RobotItem(PaintedButton):
         ink = theme.colour("selectedText" if self.isChecked() else "textTertiary" if quiet else "text")
         high = max(19.0, paint.height_of(bold) - 2)
         words = QRectF(60, rect.center().y() - high, rect.width() - 66 - self.chip.width() - 12, high)
-        paint.words(painter, words, self.name, bold, ink)
+        paint.text_line(painter, words, self.name, bold, ink)
         where = theme.colour("textTertiary" if quiet else "textSecondary")
-        paint.words(painter, words.translated(0, high), self.where, theme.font("small"), where)
+        paint.text_line(painter, words.translated(0, high), self.where, theme.font("small"), where)
 
 
 class RobotList(QWidget):
@@ -110,8 +110,8 @@ class RobotList(QWidget):
         run: Executes a command by its id.
     """
 
-    chosen = Signal(str)
-    forgotten = Signal(str)
+    selected = Signal(str)
+    discard_requested = Signal(str)
 
     def __init__(self, theme: Theme, run: Callable[[str], object]) -> None:
         super().__init__()
@@ -152,48 +152,50 @@ class RobotList(QWidget):
     def show_fleet(self, fleet: Fleet) -> list[str]:
         """Show the robots of this session, then those of earlier ones. Return the names of the former."""
         self._known = {robot.name: robot for robot in fleet.known.robots}
-        links = [link for link in fleet.links if link.connected or link.virtual or link.name in self._known]
+        links = [
+            link for link in fleet.links if link.is_connected or link.virtual or link.name in self._known
+        ]
         names = [link.name for link in links]
         self._show(links, [robot for name, robot in self._known.items() if name not in names])
         return names
 
     def last_seen_text(self, name: str) -> str:
         """Return the text with the time when a real robot was last last_seen_text, or ""."""
-        return seen_words(self._known[name].seen_s) if name in self._known else ""
+        return seen_text(self._known[name].seen_s) if name in self._known else ""
 
     def _show(self, links: Sequence[RobotLink], away: Sequence[KnownRobot]) -> None:
         gone = {robot.name: robot for robot in away}
         for name in [name for name in self.items if name not in {link.name for link in links}]:
-            self._drop(self.items.pop(name))
+            self._remove_item(self.items.pop(name))
         for name in [name for name in self.away if name not in gone]:
-            self._drop(self.away.pop(name))
+            self._remove_item(self.away.pop(name))
         for link in links:
             if link.name not in self.items:
                 item = self._make_item(link.name, len(self.items))
-                item.clicked.connect(lambda _on=False, name=link.name: self.chosen.emit(name))
+                item.clicked.connect(lambda _on=False, name=link.name: self.selected.emit(name))
                 self.items[link.name] = item
         for robot in away:
             if robot.name not in self.away:
                 item = self._make_item(robot.name, len(self.items) + len(self.away))
-                item.clicked.connect(partial(self._open_below, item))
+                item.clicked.connect(partial(self._open_menu_below, item))
                 self.away[robot.name] = item
-            self.away[robot.name].show_away(seen_words(robot.seen_s))
-        self.turtle.setVisible(not any(link.robot.model == TURTLE and link.connected for link in links))
+            self.away[robot.name].show_disconnected(seen_text(robot.seen_s))
+        self.turtle.setVisible(not any(link.robot.model == TURTLE and link.is_connected for link in links))
 
     def _make_item(self, name: str, place: int) -> RobotItem:
         item = RobotItem(self._theme, name)
-        item.menu_wanted.connect(lambda at: self._open_menu(item, at))
+        item.menu_requested.connect(lambda at: self._open_menu(item, at))
         self._column.insertWidget(place, item)
         return item
 
-    def _drop(self, item: RobotItem) -> None:
+    def _remove_item(self, item: RobotItem) -> None:
         self._column.removeWidget(item)
         item.hide()
         item.deleteLater()
 
     # -- context menu of disconnected robots --------------------------------------------------------------
 
-    def _open_below(self, item: RobotItem) -> None:
+    def _open_menu_below(self, item: RobotItem) -> None:
         self._open_menu(item, item.mapToGlobal(item.rect().bottomLeft()))
 
     def _open_menu(self, item: RobotItem, at: QPoint) -> None:
@@ -208,6 +210,6 @@ class RobotList(QWidget):
         menu = Menu(self._theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction(_("Find the cause")).triggered.connect(lambda: self._run("help.doctor"))
-        forget = menu.addAction(plain.entry(_("Forget {robot}").format(robot=item.name)))
-        forget.triggered.connect(lambda: self.forgotten.emit(item.name))
+        forget = menu.addAction(plain.escape_menu_text(_("Forget {robot}").format(robot=item.name)))
+        forget.triggered.connect(lambda: self.discard_requested.emit(item.name))
         return menu

@@ -20,11 +20,11 @@ from app.core.robots.motion.permission import MayNotMoveError
 from app.core.robots.robot_link import NOT_STOPPED, STOPPING
 from app.errors import AppError, InputProblem, RobotInputError
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.no_robot import NoRobot
+from app.ui.panels.no_robot import NoRobotState
 from app.ui.panels.one_robot_panel import OneRobotPanel
 from app.ui.panels.robots.action_card import ActionCard
 from app.ui.panels.robots.list import LIST_WIDTH, RobotList
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Chip, ElidedLabel, EmptyAction, EmptyState, SearchField, Separator, label
 from app.ui.widgets.file_dialogs import FileDialogs
@@ -69,7 +69,7 @@ class RobotHead(QWidget):
         row.addWidget(self.stop)
 
 
-class SessionPictures:
+class SessionImageSource:
     """Image source for forms: image topics of the session, and files."""
 
     def __init__(self, session: Session, files: FileDialogs) -> None:
@@ -79,7 +79,7 @@ class SessionPictures:
     @property
     def streams(self) -> Sequence[ImageStream]:
         """Open streams."""
-        self._opened = [stream for stream in self._opened if not stream.closed]
+        self._opened = [stream for stream in self._opened if not stream.is_closed]
         return self._opened
 
     def topics(self) -> Sequence[str]:
@@ -94,7 +94,7 @@ class SessionPictures:
         self._opened = [*self.streams, made]
         return made
 
-    def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
+    def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
         """Show the dialog to choose an image file."""
         self._files.open_picture(folder, take)
 
@@ -107,13 +107,13 @@ class RobotsPanel(OneRobotPanel):
         self._names: list[str] = []  # names of the robots in the list
         self.cards: dict[str, ActionCard] = {}
         self._cards_of = ""
-        self._pictures = SessionPictures(self.session, self.context.files)
+        self._pictures = SessionImageSource(self.session, self.context.files)
         self._seen: dict[str, tuple[object, ...]] = {}
         self._told: dict[tuple[str, str], list[str]] = {}
         self._lay_out()
         application = QApplication.instance()
         if isinstance(application, QApplication):
-            application.focusChanged.connect(self._focus_moved)
+            application.focusChanged.connect(self._focus_changed)
 
     # -- construction -------------------------------------------------------------------------------------
 
@@ -122,14 +122,14 @@ class RobotsPanel(OneRobotPanel):
         title = _("No robot is connected")
         text = _("A robot's actions appear here once it is connected.")
         start = EmptyAction(
-            _("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot", primary=True
+            _("Use the virtual robot"), lambda: self.context.run("robots.virtual"), "bot", is_primary=True
         )
         self.empty = EmptyState(theme, "bot", title, text, [start])
-        self._no_robot = NoRobot(self.empty, title, text, [start])
-        self._no_robot.set_starting(self.session.coming)
+        self._no_robot = NoRobotState(self.empty, title, text, [start])
+        self._no_robot.set_starting(self.session.starting_robots)
         self.list = RobotList(theme, self.context.run)
-        self.list.chosen.connect(self.choose)
-        self.list.forgotten.connect(self.forget)
+        self.list.selected.connect(self.select_robot)
+        self.list.discard_requested.connect(self.discard)
         self.items = self.list.items
         self._list_line = Separator(theme, upright=True)
         right = QVBoxLayout()
@@ -171,7 +171,7 @@ class RobotsPanel(OneRobotPanel):
         self.pages.setCurrentIndex(1 if self._names else 0)
         self._fit()
 
-    def wanted_robot(self) -> RobotLink | None:
+    def robot_to_show(self) -> RobotLink | None:
         """Return the robot that was selected here while it is listed, else the shown or the first one."""
         fleet, names = self.session.fleet, self._names
         if self._robot in names:
@@ -182,32 +182,32 @@ class RobotsPanel(OneRobotPanel):
     def refresh_robot(self, link: RobotLink | None) -> None:
         for name, item in self.items.items():
             its = self.session.fleet.link(name)
-            if its is not None and self._new(name, its.state):
+            if its is not None and self._has_changed(name, its.state):
                 item.show_link(its, self.list.last_seen_text(name))
         if link is not None:
             self._show_link(link)
         else:
-            self._no_robot.set_starting(self.session.coming)
+            self._no_robot.set_starting(self.session.starting_robots)
 
-    def _new(self, what: str, *now: object) -> bool:
+    def _has_changed(self, what: str, *now: object) -> bool:
         # Returns True if the value differs from the one that was shown last.
         changed = self._seen.get(what) != now
         self._seen[what] = now
         return changed
 
-    def forget(self, name: str) -> None:
+    def discard(self, name: str) -> None:
         """Remove a disconnected robot from the list until it connects again."""
-        self.session.fleet.known.forget(name)
+        self.session.fleet.known.discard(name)
         self._seen.pop(name, None)
         self._revision = -1
         self.refresh()
 
-    def choose(self, name: str) -> None:
+    def select_robot(self, name: str) -> None:
         """Select a robot, here and in all panels that show one robot."""
-        self.session.fleet.choose(name)
+        self.session.fleet.select(name)
         link = self.session.fleet.link(name)
         if link is not None:
-            self.turn_to(link)
+            self.switch_to(link)
 
     def show_robot(self, link: RobotLink) -> None:
         self._seen.pop("cards", None)
@@ -217,10 +217,12 @@ class RobotsPanel(OneRobotPanel):
 
     def _make_forms(self) -> None:
         link = self.session.fleet.link(self._robot)
-        if link is None or not self._new("cards", link.name, link.robot, self._offered(link)):
+        if link is None or not self._has_changed("cards", link.name, link.robot, self._offered_values(link)):
             return
-        kept = {name: card.form.input() for name, card in self.cards.items()} if self._made_for(link) else {}
-        self._drop_cards()
+        kept = (
+            {name: card.form.input() for name, card in self.cards.items()} if self._has_cards_of(link) else {}
+        )
+        self._remove_cards()
         actions = [action for action in link.robot.actions if action.name != link.robot.safe_stop.action]
         titles = {action.name: action.title for action in link.robot.actions}
         for place, action in enumerate(actions):
@@ -233,27 +235,27 @@ class RobotsPanel(OneRobotPanel):
                 title_of=lambda name: titles.get(name, name.replace("_", " ")),
             )
             card.form.set_input(kept.get(action.name, {}))
-            card.tried.connect(lambda given, name=action.name: self.attempt(name, given))
+            card.try_requested.connect(lambda given, name=action.name: self.start_action(name, given))
             card.cancelled.connect(lambda name=action.name: self.session.fleet.cancel(self._robot, name))
             self.cards[action.name] = card
             self._card_column.insertWidget(place, card)
         self._cards_of = link.name
-        self._set_first(next(iter(self.cards.values()), None))
+        self._set_highlighted(next(iter(self.cards.values()), None))
         self.name.setText(link.name)
-        self.stop.set_word(_("Stop {robot}").format(robot=link.name))
+        self.stop.set_label(_("Stop {robot}").format(robot=link.name))
         count = len(actions)
         if link.virtual:
             about = ngettext("virtual, {count} action", "virtual, {count} actions", count)
         else:
             about = ngettext("{count} action", "{count} actions", count)
-        self.about.setText(about.format(count=grouped(count)))
+        self.about.setText(about.format(count=group_digits(count)))
         self._filter()
 
-    def _made_for(self, link: RobotLink) -> bool:
+    def _has_cards_of(self, link: RobotLink) -> bool:
         # Returns True if the typed input of the cards was kept.
         return self._cards_of == link.name
 
-    def _drop_cards(self) -> None:
+    def _remove_cards(self) -> None:
         for card in self.cards.values():
             card.form.dispose()
             self._card_column.removeWidget(card)
@@ -261,22 +263,22 @@ class RobotsPanel(OneRobotPanel):
         self.cards = {}
         self._seen = {what: seen for what, seen in self._seen.items() if not what.startswith("card ")}
 
-    def _offered(self, link: RobotLink) -> tuple[object, ...]:
+    def _offered_values(self, link: RobotLink) -> tuple[object, ...]:
         # The forms are rebuilt when the offered values change.
         named = {one.options_from for action in link.robot.actions for one in action.parameters}
         return tuple((name, tuple(self._options(name))) for name in sorted(filter(None, named)))
 
     def _show_link(self, link: RobotLink) -> None:
         self._make_forms()
-        if self._new("head", link.state, link.chip):
-            self.chip.set(link.state_words, ROBOT_STATUS[link.state])
+        if self._has_changed("head", link.state, link.chip_text):
+            self.chip.set(link.state_label, ROBOT_STATUS[link.state])
         may_move = link.state in {NOT_STOPPED, STOPPING}
         for name, card in self.cards.items():
             made = link.invocations.get(name)
             now = (made.id, made.state, made.feedback, int(made.elapsed_s * 5)) if made is not None else ()
-            if self._new(f"card {name}", may_move, *now):
+            if self._has_changed(f"card {name}", may_move, *now):
                 card.show_invocation(made, may_move=may_move)
-                card.show_tries(tuple(link.tried))
+                card.show_tries(tuple(link.past_invocations))
 
     def _options(self, name: str) -> Sequence[str]:
         # Values that a property of the robot offers.
@@ -298,7 +300,7 @@ class RobotsPanel(OneRobotPanel):
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def attempt(self, action: str, given: Mapping[str, object]) -> None:
+    def start_action(self, action: str, given: Mapping[str, object]) -> None:
         """Start an action; errors in its input are shown in the card."""
         card = self.cards[action]
         try:
@@ -312,15 +314,15 @@ class RobotsPanel(OneRobotPanel):
         else:
             card.show_problems(())
 
-    def _focus_moved(self, _old: QWidget | None, new: QWidget | None) -> None:
+    def _focus_changed(self, _old: QWidget | None, new: QWidget | None) -> None:
         if new is not None and self.isAncestorOf(new):
             for card in self.cards.values():
                 if card.isAncestorOf(new):
-                    self._set_first(card)
+                    self._set_highlighted(card)
 
-    def _set_first(self, first: ActionCard | None) -> None:
+    def _set_highlighted(self, first: ActionCard | None) -> None:
         for card in self.cards.values():
-            card.set_first(card is first)
+            card.set_highlighted(card is first)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

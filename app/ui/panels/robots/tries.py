@@ -11,27 +11,27 @@ from PySide6.QtGui import QPainter
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from app.robots.description.description import Action, DataField
-from app.ui.panels.robots.input_text import input_words, is_unit
+from app.ui.panels.robots.input_text import input_summary, is_unit
 from app.ui.text import plain
-from app.ui.text.numbers import seconds_words
-from app.ui.text.sensor_values import number_words, yes_words
+from app.ui.text.numbers import seconds_text
+from app.ui.text.sensor_values import quantity_text, yes_no_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 
 if TYPE_CHECKING:
     from app.core.robots.robot_link import Invocation
 
-TO_GO = "to_go"
+REMAINING_FIELD = "to_go"
 RATIO_FIELDS = ("progress", "ratio", "share")
 PERCENT_FIELDS = ("percent", "percentage")
 ROW_HEIGHT = 28
-MAX_SHOWN = 5
+MAX_TRIES = 5
 
 
-def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
+def fields_text(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
     """Format the values of fields, such as "0.3 m to go, moved 0.5 m"."""
     parts = []
     for field in fields:
@@ -39,10 +39,10 @@ def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
         if value is None or field.name in RATIO_FIELDS:
             continue
         if isinstance(value, bool):
-            parts.append(f"{field.title} {yes_words(value)}")
+            parts.append(f"{field.title} {yes_no_text(value)}")
         elif isinstance(value, (int, float)):
-            words = number_words(float(round(value, 2)), field.unit)
-            if field.name == TO_GO:
+            words = quantity_text(float(round(value, 2)), field.unit)
+            if field.name == REMAINING_FIELD:
                 parts.append(f"{words} {field.title}")
             else:
                 bare = is_unit(field.title, field.unit)
@@ -52,15 +52,15 @@ def field_words(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
     return ", ".join(parts)
 
 
-def feedback_words(action: Action, feedback: Mapping[str, object]) -> str:
+def feedback_text(action: Action, feedback: Mapping[str, object]) -> str:
     """Format the feedback of a running action, such as "0.3 m to go"."""
-    return field_words(action.feedback, feedback)
+    return fields_text(action.feedback, feedback)
 
 
-def output_words(action: Action, output: Mapping[str, object]) -> str:
+def output_text(action: Action, output: Mapping[str, object]) -> str:
     """Format the output of an action, without the duration, which is part of the result."""
     told = [field for field in action.output if not is_unit(field.title, field.unit)]
-    return field_words(told, output)
+    return fields_text(told, output)
 
 
 def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
@@ -71,13 +71,13 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
     for name in RATIO_FIELDS:
         share = _number(feedback.get(name))
         if share is not None:
-            return _within(share)
+            return _clamp_ratio(share)
     for field in action.feedback:
         value = _number(feedback.get(field.name))
         if value is None:
             continue
         if field.unit == "%" or field.name in PERCENT_FIELDS:
-            return _within(value / 100)
+            return _clamp_ratio(value / 100)
         asked = next(
             (
                 _number(given.get(one.name))
@@ -88,50 +88,52 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
         )
         if asked:
             done = abs(value / asked)
-            return _within(1.0 - done if field.name == TO_GO else done)
+            return _clamp_ratio(1.0 - done if field.name == REMAINING_FIELD else done)
     return None
 
 
-def now_words(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
+def state_text(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
     """Describe the current state of a running try."""
     if made.state == "sent":
         return _("sent")
     if made.state == "accepted":
         if made.waits_for:
             return _("waits for {actions}").format(
-                actions=listed([title_of(name) for name in made.waits_for])
+                actions=format_list([title_of(name) for name in made.waits_for])
             )
         if made.replaces:
-            return _("replaces {actions}").format(actions=listed([title_of(name) for name in made.replaces]))
+            return _("replaces {actions}").format(
+                actions=format_list([title_of(name) for name in made.replaces])
+            )
         return _("sent")
-    took = _("for {duration}").format(duration=seconds_words(made.elapsed_s))
-    return feedback_words(action, made.feedback) or took
+    took = _("for {duration}").format(duration=seconds_text(made.elapsed_s))
+    return feedback_text(action, made.feedback) or took
 
 
-def left_words(made: Invocation) -> str:
+def remaining_text(made: Invocation) -> str:
     """Format the remaining time; "" if there is no limit."""
-    left_s = made.left_s
-    if left_s is None or not made.running:
+    left_s = made.remaining_s
+    if left_s is None or not made.is_running:
         return ""
     return _("{seconds} s left").format(seconds=max(0, int(left_s + 0.999)))
 
 
-def end_words(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
+def result_texts(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
     """Return text and status of the chip of an ended try, and a sentence or "".
 
     If `may_move` is True, the robot may still be moving, so the text doesn't say "stopped".
     """
-    took = seconds_words(made.elapsed_s)
+    took = seconds_text(made.elapsed_s)
     if made.state == "succeeded":
         return _("done in {duration}").format(duration=took), "ok", ""
     if made.state == "canceled":
         reason = made.error if made.error and made.error != "stopped" else ""
         said = _("ended after {duration}") if may_move else _("stopped after {duration}")
-        return said.format(duration=took), "off", _sentence(reason)
-    return _("failed"), "error", _sentence(made.error or _("The robot reported no reason"))
+        return said.format(duration=took), "off", _as_sentence(reason)
+    return _("failed"), "error", _as_sentence(made.error or _("The robot reported no reason"))
 
 
-def _sentence(words: str) -> str:
+def _as_sentence(words: str) -> str:
     return f"{words[:1].upper()}{words[1:]}{'' if words.endswith('.') or not words else '.'}"
 
 
@@ -140,7 +142,7 @@ def _number(value: object) -> float | None:
     return float(value) if good else None  # type: ignore[arg-type]
 
 
-def _within(share: float) -> float:
+def _clamp_ratio(share: float) -> float:
     return min(1.0, max(0.0, share))
 
 
@@ -150,10 +152,10 @@ class TryRow(PaintedButton):
     def __init__(self, theme: Theme, action: Action, made: Invocation) -> None:
         super().__init__(theme)
         self.made = made
-        said, status, sentence = end_words(made)
-        self.when = time.strftime("%H:%M:%S", time.localtime(made.at_s))
-        self.given = input_words(action, made.given)
-        told = output_words(action, made.output) if made.state == "succeeded" else ""
+        said, status, sentence = result_texts(made)
+        self.when = time.strftime("%H:%M:%S", time.localtime(made.sent_at_s))
+        self.given = input_summary(action, made.given)
+        told = output_text(action, made.output) if made.state == "succeeded" else ""
         self.result = f"{said}, {told}" if told else sentence.rstrip(".") or said
         self.status = status
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -172,7 +174,7 @@ class TryRow(PaintedButton):
         quiet = theme.colour("textSecondary")
         left = rect.left() + 6
         wide = paint.width_of(font, "00:00:00") + 14
-        paint.words(
+        paint.text_line(
             painter,
             QRectF(left, rect.top(), wide, rect.height()),
             self.when,
@@ -185,15 +187,15 @@ class TryRow(PaintedButton):
         status = theme.status(self.status)
         mark = QRectF(right.left() - 20, rect.center().y() - 7, 14, 14)
         paint_icon(painter, mark, status.icon, theme.colour(status.colour))
-        paint.words(painter, right, self.result, font, quiet)
+        paint.text_line(painter, right, self.result, font, quiet)
         middle = QRectF(left, rect.top(), mark.left() - left - 8, rect.height())
-        paint.words(painter, middle, self.given, font, theme.colour("text"))
+        paint.text_line(painter, middle, self.given, font, theme.colour("text"))
 
 
 class TryList(QWidget):
     """List of the latest tries of one action, newest first."""
 
-    chosen = Signal(dict)
+    selected = Signal(dict)
 
     def __init__(self, theme: Theme, action: Action) -> None:
         super().__init__()
@@ -207,7 +209,9 @@ class TryList(QWidget):
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
         """Show those of the latest tries that have ended."""
-        ended = [made for made in tries if made.action == self._action.name and not made.running][-MAX_SHOWN:]
+        ended = [made for made in tries if made.action == self._action.name and not made.is_running][
+            -MAX_TRIES:
+        ]
         ids = tuple(made.id for made in ended)
         if ids == self._shown:
             return
@@ -218,6 +222,6 @@ class TryList(QWidget):
         self.rows = []
         for made in reversed(ended):
             row = TryRow(self._theme, self._action, made)
-            row.clicked.connect(lambda _on=False, made=made: self.chosen.emit(dict(made.given)))
+            row.clicked.connect(lambda _on=False, made=made: self.selected.emit(dict(made.given)))
             self._column.addWidget(row)
             self.rows.append(row)

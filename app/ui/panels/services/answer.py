@@ -11,10 +11,10 @@ from PySide6.QtCore import QSize
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QSizePolicy, QStackedWidget, QVBoxLayout, QWidget
 
-from app.core.run.acting.acting import call_words, time_words
+from app.core.run.acting.acting import call_text, duration_text
 from app.core.run.acting.calling import CallRecord
 from app.ui.panels.base import ShowToast
-from app.ui.text.numbers import seconds_words, size_words
+from app.ui.text.numbers import seconds_text, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, ElidedLabel, IconButton, Segments, label
 from app.ui.widgets.inputs.json_edit import JsonEdit
@@ -25,80 +25,82 @@ from nep.text import shortened
 
 MAX_ROWS = 500
 MAX_DEPTH = 12
-TEXT_LETTERS = 200
+MAX_TEXT_CHARS = 200
 INDENT_PX = 14
 # px at 100 % text size: minimum width, and width from which the header is one row
 MIN_WIDTH_PX, ONE_ROW_WIDTH_PX = 200, 420
 
 
 @dataclass(frozen=True, slots=True)
-class AnswerRow:
+class ReplyRow:
     """Row of a reply: path, depth, name and text (such as "{2}" for an object with two fields)."""
 
     path: str
     depth: int
     name: str
-    words: str
+    text: str
 
 
-def answer_rows(answer: object) -> list[AnswerRow]:
+def reply_rows(answer: object) -> list[ReplyRow]:
     """Return a reply as at most `MAX_ROWS` rows, with children below their parents."""
-    found: list[AnswerRow] = []
+    found: list[ReplyRow] = []
     for row in (
-        _rows("", 0, "", answer) if _has_parts(answer) else [AnswerRow("", 0, _("reply"), _words(answer))]
+        _iter_rows("", 0, "", answer)
+        if _is_container(answer)
+        else [ReplyRow("", 0, _("reply"), _value_text(answer))]
     ):
         if len(found) == MAX_ROWS:
-            found.append(AnswerRow("…", 0, "…", _("truncated; see the JSON for the rest")))
+            found.append(ReplyRow("…", 0, "…", _("truncated; see the JSON for the rest")))
             break
         found.append(row)
     return found
 
 
-def _has_parts(value: object) -> bool:
+def _is_container(value: object) -> bool:
     return isinstance(value, Mapping) or (isinstance(value, Sequence) and not isinstance(value, (str, bytes)))
 
 
-def _rows(path: str, depth: int, name: str, value: object) -> Iterator[AnswerRow]:
+def _iter_rows(path: str, depth: int, name: str, value: object) -> Iterator[ReplyRow]:
     if name:
-        yield AnswerRow(path, depth - 1, name, _words(value))
-    if depth >= MAX_DEPTH or not _has_parts(value):
+        yield ReplyRow(path, depth - 1, name, _value_text(value))
+    if depth >= MAX_DEPTH or not _is_container(value):
         return
     inside = value.items() if isinstance(value, Mapping) else enumerate(value)  # type: ignore[arg-type]
     for key, part in inside:
         here = f"{path}[{key}]" if isinstance(key, int) else f"{path}.{key}" if path else str(key)
-        yield from _rows(here, depth + 1, str(key), part)
+        yield from _iter_rows(here, depth + 1, str(key), part)
 
 
-def _words(value: object) -> str:
+def _value_text(value: object) -> str:
     if isinstance(value, Mapping):
         return "{}" if not value else f"{{{len(value)}}}"
-    if _has_parts(value):
+    if _is_container(value):
         return f"[{len(value) or ''}]"  # type: ignore[arg-type]
     if isinstance(value, bytes):
-        return shortened(value.hex(" "), TEXT_LETTERS)
-    return shortened(json.dumps(value, ensure_ascii=False, default=str), TEXT_LETTERS)
+        return shortened(value.hex(" "), MAX_TEXT_CHARS)
+    return shortened(json.dumps(value, ensure_ascii=False, default=str), MAX_TEXT_CHARS)
 
 
-def took_cell(record: CallRecord) -> Cell:
+def duration_cell(record: CallRecord) -> Cell:
     """Return the cell with state and duration of a call."""
     match record.state:
         case "waiting":
             return Cell(_("waiting"), "circle-dashed", "textSecondary")
         case "answered":
-            return Cell(time_words(record.took_s), "circle-check", "ok")
+            return Cell(duration_text(record.duration_s), "circle-check", "ok")
         case "canceled":
             return Cell(_("canceled"), "circle-x", "textSecondary")
         case _:
-            return Cell(record.sentence, "circle-x", "error")
+            return Cell(record.error, "circle-x", "error")
 
 
-def clock_of(record: CallRecord) -> str:
+def clock_text(record: CallRecord) -> str:
     """Format the time of a call, such as "8:41:50"."""
     then = dt.datetime.fromtimestamp(record.at_s, tz=dt.timezone.utc).astimezone()
     return then.strftime("%H:%M:%S").lstrip("0")
 
 
-class AnswerView(QWidget):
+class ReplyView(QWidget):
     """View of one call: the latest of the selected service, or an earlier one from the table."""
 
     def __init__(self, theme: Theme, toast: ShowToast) -> None:
@@ -114,13 +116,13 @@ class AnswerView(QWidget):
             size="small",
             name=_("Reply as"),
         )
-        self.way.changed.connect(self._turn)
+        self.way.changed.connect(self._set_mode)
         self.copy = IconButton(theme, "copy", _("Copy reply"), size=26)
         self.copy.clicked.connect(self._copy)
-        self.model: TableModel[AnswerRow] = TableModel(
+        self.model: TableModel[ReplyRow] = TableModel(
             (
                 Column("name", lazy("Field"), 90, _name_cell, stretch=True, tip=lambda row: row.path),
-                Column("value", lazy("Value"), 150, _value_cell, figures=True, tip=lambda row: row.words),
+                Column("value", lazy("Value"), 150, _value_cell, is_numeric=True, tip=lambda row: row.text),
             ),
             lambda row: row.path,
         )
@@ -174,11 +176,11 @@ class AnswerView(QWidget):
     def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
         """Show a call, or an empty view if `record` is None."""
         if record is not None and record.state == "waiting":
-            self.chip.set(_("waiting {time}").format(time=seconds_words(waited_s)), "info", "circle-dashed")
+            self.chip.set(_("waiting {time}").format(time=seconds_text(waited_s)), "info", "circle-dashed")
         if record == self.record and record is not None:
             return
         self.record = record
-        has_answer = record is not None and record.state == "answered" and record.is_kept
+        has_answer = record is not None and record.state == "answered" and record.is_retained
         self.way.setVisible(has_answer)
         self.copy.setVisible(has_answer)
         if record is None:
@@ -187,33 +189,33 @@ class AnswerView(QWidget):
             self.sentence.setText(_("No calls yet."))
         elif record.state != "waiting":
             status = "ok" if record.state == "answered" else "off" if record.state == "canceled" else "error"
-            self.chip.set(call_words(record), status)
-        self._say_facts(record)
+            self.chip.set(call_text(record), status)
+        self._update_details(record)
         if has_answer and record is not None:
-            self.model.set_rows(answer_rows(record.answer) if not record.is_cut else [])
+            self.model.set_rows(reply_rows(record.reply) if not record.is_truncated else [])
             self.text.set_text(record.text)
-        self._turn(self.way.value)
+        self._set_mode(self.way.value)
 
-    def _say_facts(self, record: CallRecord | None) -> None:
+    def _update_details(self, record: CallRecord | None) -> None:
         if record is None:
             return
-        self.facts.setText(clock_of(record))
+        self.facts.setText(clock_text(record))
         if record.state == "waiting":
             self.sentence.setText(_("Waiting for the reply."))
         elif record.state != "answered":
-            self.sentence.setText(record.sentence)
-        elif not record.is_kept:
+            self.sentence.setText(record.error)
+        elif not record.is_retained:
             self.sentence.setText(_("The reply was discarded to make room for newer ones."))
         else:
-            size = size_words(len(record.text.encode("utf-8", "replace")))
-            self.facts.setText(_("{time}, {size}").format(time=clock_of(record), size=size))
+            size = size_text(len(record.text.encode("utf-8", "replace")))
+            self.facts.setText(_("{time}, {size}").format(time=clock_text(record), size=size))
 
-    def _turn(self, way: str) -> None:
+    def _set_mode(self, way: str) -> None:
         record = self.record
-        if record is None or record.state != "answered" or not record.is_kept:
+        if record is None or record.state != "answered" or not record.is_retained:
             self.pages.setCurrentIndex(0)
         else:
-            self.pages.setCurrentIndex(2 if way == "json" or record.is_cut else 1)
+            self.pages.setCurrentIndex(2 if way == "json" or record.is_truncated else 1)
 
     def _copy(self) -> None:
         if self.record is not None:
@@ -221,9 +223,9 @@ class AnswerView(QWidget):
             self._toast(_("Copied the reply of {service}").format(service=self.record.service))
 
 
-def _name_cell(row: AnswerRow) -> Cell:
+def _name_cell(row: ReplyRow) -> Cell:
     return Cell(row.name, mono=True, role="textSecondary", indent=row.depth * INDENT_PX)
 
 
-def _value_cell(row: AnswerRow) -> Cell:
-    return Cell(row.words, mono=True)
+def _value_cell(row: ReplyRow) -> Cell:
+    return Cell(row.text, mono=True)

@@ -10,15 +10,15 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.core.run.acting.arming import Target
 from app.core.run.acting.calling import MAX_S, MIN_S, TIMEOUT_S, CallRecord
-from app.core.run.acting.json_text import JsonText, pretty, read_json
+from app.core.run.acting.json_text import JsonText, format_json, parse_json_text
 from app.ui.panels.armed_strip import ArmedMinutes, ArmedStrip
 from app.ui.panels.base import Panel, PanelContext, PanelWidget
-from app.ui.panels.row_actions import RowAction, copies, filled
-from app.ui.panels.services.answer import AnswerView, clock_of, took_cell
+from app.ui.panels.row_actions import RowAction, copy_action, fill_menu
+from app.ui.panels.services.answer import ReplyView, clock_text, duration_cell
 from app.ui.panels.services.request_form import RequestForm
-from app.ui.panels.services.service_list import ServiceList, count_words, offered
+from app.ui.panels.services.service_list import ServiceList, count_text, offered_services
 from app.ui.text import plain
-from app.ui.text.numbers import seconds_words, tip_with_key
+from app.ui.text.numbers import seconds_text, tip_with_key
 from app.ui.widgets import (
     Button,
     ElidedLabel,
@@ -32,7 +32,7 @@ from app.ui.widgets import (
 from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.fields import FilterField
 from app.ui.widgets.inputs.json_edit import JsonEdit
-from app.ui.widgets.lists.list_beside import ListBeside
+from app.ui.widgets.lists.list_beside import ListDetailView
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import Menu
 from app.ui.widgets.table.model import Cell, Column, TableModel
@@ -95,10 +95,10 @@ class ServicesPanel(PanelWidget):
         self.timeout_s = TIMEOUT_S
 
     def _make_calls(self) -> None:
-        self.answer = AnswerView(self.theme, self.context.toast)
+        self.answer = ReplyView(self.theme, self.context.toast)
         columns: tuple[Column[CallRecord], ...] = (
             Column(
-                "at", lazy("Calls"), 88, lambda each: Cell(clock_of(each), role="textSecondary", mono=True)
+                "at", lazy("Calls"), 88, lambda each: Cell(clock_text(each), role="textSecondary", mono=True)
             ),
             Column(
                 "request",
@@ -108,7 +108,9 @@ class ServicesPanel(PanelWidget):
                 stretch=True,
                 tip=lambda each: each.request[:2000],
             ),
-            Column("took", lazy("Duration"), 120, took_cell, figures=True, tip=lambda each: each.sentence),
+            Column(
+                "took", lazy("Duration"), 120, duration_cell, is_numeric=True, tip=lambda each: each.error
+            ),
         )
         self.calls_model: TableModel[CallRecord] = TableModel(columns, lambda each: str(each.number))
         self.calls = TableView(self.theme, self.calls_model)
@@ -118,24 +120,24 @@ class ServicesPanel(PanelWidget):
 
     def _connect(self) -> None:
         self.filter.textChanged.connect(lambda _text: self._rebuild())
-        self.filter.leave.connect(lambda: self.list.setFocus(Qt.FocusReason.ShortcutFocusReason))
-        self.list.filter_wanted.connect(self.focus_filter)
-        self.list.chosen.connect(lambda _name: self._show_chosen())
-        self.list.call_wanted.connect(self.call)
-        self.list.menu_wanted.connect(self._show_menu)
-        self.way.changed.connect(self._turn)
+        self.filter.exited.connect(lambda: self.list.setFocus(Qt.FocusReason.ShortcutFocusReason))
+        self.list.filter_requested.connect(self.focus_filter)
+        self.list.selected.connect(lambda _name: self._show_selected())
+        self.list.call_requested.connect(self.call)
+        self.list.menu_requested.connect(self._show_menu)
+        self.way.changed.connect(self._set_mode)
         self.form.typed.connect(self._form_typed)
         self.edit.changed.connect(self._text_typed)
-        self.edit.sent.connect(self.call)
-        self.fix.clicked.connect(self._put_right)
+        self.edit.submitted.connect(self.call)
+        self.fix.clicked.connect(self._apply_fix)
         self.call_button.clicked.connect(self.call)
-        self.give_up.clicked.connect(self._give_up)
+        self.give_up.clicked.connect(self._cancel_call)
         self.seconds.number.connect(lambda value: setattr(self, "timeout_s", value))
         self.calls.opened.connect(self._open_call)
-        self.calls.menu_wanted.connect(self._show_call_menu)
+        self.calls.menu_requested.connect(self._show_call_menu)
 
     def _arrange(self) -> None:
-        self._sides = ListBeside(
+        self._sides = ListDetailView(
             self.theme,
             (self.filter, self.list, self._right_side()),
             list_px=LIST_WIDTH_PX,
@@ -207,69 +209,69 @@ class ServicesPanel(PanelWidget):
         if facts != self._seen:
             self._seen = facts
             self._rebuild()
-        elif acting.calls.waiting is not None:
-            self._say_call()
+        elif acting.calls.in_flight is not None:
+            self._update_call()
 
     def source_changed(self) -> None:
         self._seen = ()
 
     def _rebuild(self) -> None:
-        services = offered(self.session.live.graph)
+        services = offered_services(self.session.live.graph)
         words = self.filter.text().casefold().split()
         rows = [
             each
             for each in services
             if each.name == self._wanted
-            or all(word in f"{each.name} {each.said}".casefold() for word in words)
+            or all(word in f"{each.name} {each.servers_text}".casefold() for word in words)
         ]
-        chosen = self._wanted or self.list.chosen_key() or self._shown
+        chosen = self._wanted or self.list.selected_key() or self._shown
         self.list.model().set_rows(rows)  # type: ignore[attr-defined]  # always a TableModel
         names = [each.name for each in rows]
         if names:
             wanted = chosen if chosen in names else names[0]
-            if self.list.chosen_key() != wanted:
-                self.list.choose(wanted)
+            if self.list.selected_key() != wanted:
+                self.list.select_key(wanted)
             self._wanted = ""
-        self.list.tell_visible_changed()
-        self.count.setText(count_words(services))
+        self.list.refresh_visible()
+        self.count.setText(count_text(services))
         self.pages.setCurrentIndex(1 if services else 0)
         if not services:
-            self._say_empty()
-        self._show_chosen()
+            self._update_empty_state()
+        self._show_selected()
 
-    def _say_empty(self) -> None:
+    def _update_empty_state(self) -> None:
         if self.session.master.kind == "none":
             self.empty.set_texts(
                 _("No master is running"), _("A master lets programs find each other."), "radio-tower"
             )
             start = self.session.launcher.ensure_master
-            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", primary=True)])
+            self.empty.set_actions([EmptyAction(_("Start a master here"), start, "play", is_primary=True)])
         else:
             said = _("Services appear here as soon as a program offers one.")
             self.empty.set_texts(_("No services available"), said, "spline")
-            self.empty.set_actions([self.why()])
+            self.empty.set_actions([self.doctor_action()])
 
     @property
     def service(self) -> str:
         """Name of the selected service, or ""."""
-        return self.list.chosen_key() or ""
+        return self.list.selected_key() or ""
 
-    def _show_chosen(self) -> None:
+    def _show_selected(self) -> None:
         name = self.service
         if name and name != self._shown:
             self._shown = name
             self.name.setText(name)
-            self.form.forget()
-            self._put_text(self._text_of(name))
-            self._turn("form")
+            self.form.reset_kinds()
+            self._set_text(self._request_text(name))
+            self._set_mode("form")
             self.answer.show_record(None)
         if name:
             records = [each for each in reversed(self.acting.calls.records) if each.service == name]
             self.calls_model.set_rows(records)
-            self.calls.tell_visible_changed()
-            self._say_call()
+            self.calls.refresh_visible()
+            self._update_call()
 
-    def _text_of(self, service: str) -> str:
+    def _request_text(self, service: str) -> str:
         return self._texts.get(service) or self.acting.shelf.requests.get(service, EMPTY_REQUEST)
 
     @property
@@ -277,95 +279,99 @@ class ServicesPanel(PanelWidget):
         """Request as JSON text."""
         return self._texts.get(self._shown, EMPTY_REQUEST)
 
-    def _put_text(self, text: str) -> None:
+    def _set_text(self, text: str) -> None:
         # Updates the form and the JSON editor.
         self._texts[self._shown] = text
         self._is_showing = True
         self.edit.set_text(text)
-        read = read_json(text)
+        read = parse_json_text(text)
         if read.fault is None and not read.places:
-            self.form.show_request(read.filled({}))
+            self.form.show_request(read.fill({}))
         self._is_showing = False
-        self._judge()
+        self._validate()
 
-    def _fits_a_form(self) -> bool:
-        read = read_json(self.text)
-        return read.fault is None and not read.places and isinstance(read.filled({}), Mapping)
+    def _can_show_form(self) -> bool:
+        read = parse_json_text(self.text)
+        return read.fault is None and not read.places and isinstance(read.fill({}), Mapping)
 
-    def _judge(self) -> None:
-        fault = self._read().fault
+    def _validate(self) -> None:
+        fault = self._parse_text().fault
         self.edit.mark(fault.line if fault is not None else 0)
-        said = fault.sentence if fault is not None else self._problem()
+        said = fault.message if fault is not None else self._problem()
         self.sentence.setText(said)
         self.sentence.setVisible(bool(said))
         self.fix.setVisible(fault is not None and fault.fix is not None)
-        self._say_call()
+        self._update_call()
 
-    def _read(self) -> JsonText:
-        return read_json(self.text)
+    def _parse_text(self) -> JsonText:
+        return parse_json_text(self.text)
 
     def _problem(self) -> str:
         # Reason why the request can't be sent although it is valid JSON.
         if self.way.value == "form" and self.form.problems:
             return next(iter(self.form.problems.values()))
-        read = self._read()
-        return _("Fill in “{name}” first.").format(name=read.to_fill[0]) if read.to_fill else ""
+        read = self._parse_text()
+        return (
+            _("Fill in “{name}” first.").format(name=read.manual_placeholders[0])
+            if read.manual_placeholders
+            else ""
+        )
 
-    def _say_call(self) -> None:
+    def _update_call(self) -> None:
         acting, name = self.acting, self.service
-        waiting = acting.calls.waiting
+        waiting = acting.calls.in_flight
         is_mine = waiting is not None and waiting.service == name
-        can_call = self._read().fault is None and not self._problem() and waiting is None
+        can_call = self._parse_text().fault is None and not self._problem() and waiting is None
         self.call_button.setEnabled(can_call and not self.session.is_replaying)
         is_armed = acting.arming.allows(Target("service", name))
         if is_mine:
-            said = _("Waiting {time}").format(time=seconds_words(acting.calls.waited_s))
-            self.call_button.set_word(said, "circle-dashed")
+            said = _("Waiting {time}").format(time=seconds_text(acting.calls.elapsed_s))
+            self.call_button.set_label(said, "circle-dashed")
         else:
-            self.call_button.set_word(
+            self.call_button.set_label(
                 _("Call") if is_armed else _("Arm and call"), "play" if is_armed else "lock"
             )
         self.give_up.setVisible(is_mine)
-        record = self._shown_record()
-        self.answer.show_record(record, acting.calls.waited_s)
+        record = self._displayed_record()
+        self.answer.show_record(record, acting.calls.elapsed_s)
 
-    def _shown_record(self) -> CallRecord | None:
+    def _displayed_record(self) -> CallRecord | None:
         records = [each for each in self.acting.calls.records if each.service == self.service]
-        chosen = self.calls.chosen_key()
+        chosen = self.calls.selected_key()
         return next(
             (each for each in records if str(each.number) == chosen), records[-1] if records else None
         )
 
     # -- user actions -------------------------------------------------------------------------------------
 
-    def begin(self, service: str) -> None:
+    def open_for(self, service: str) -> None:
         """Select a service and focus the Call button."""
         self._wanted = service
         self.filter.clear()
         self._rebuild()
         self.call_button.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _turn(self, way: str) -> None:
-        if way == "form" and not self._fits_a_form():
+    def _set_mode(self, way: str) -> None:
+        if way == "form" and not self._can_show_form():
             way = "json"  # the request can't be shown as fields
         self.way.set_value(way)
         self.requests.setCurrentIndex(1 if way == "json" else 0)
-        self._judge()
+        self._validate()
 
     def _form_typed(self, request: object) -> None:
         if self._is_showing:
             return
         if self.form.problems:
-            self._judge()
+            self._validate()
         else:
-            self._put_text(pretty(request))
+            self._set_text(format_json(request))
 
     def _text_typed(self) -> None:
         if not self._is_showing:
-            self._put_text(self.edit.text())
+            self._set_text(self.edit.text())
 
-    def _put_right(self) -> None:
-        fault = self._read().fault
+    def _apply_fix(self) -> None:
+        fault = self._parse_text().fault
         if fault is not None and fault.fix is not None:
             self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)
 
@@ -380,25 +386,25 @@ class ServicesPanel(PanelWidget):
             self.context.toast(why_not)
         self.refresh()
 
-    def _give_up(self) -> None:
-        self.acting.calls.give_up()
+    def _cancel_call(self) -> None:
+        self.acting.calls.cancel()
         self.refresh()
 
     def _open_call(self, _key: str) -> None:
-        self._say_call()
+        self._update_call()
 
     def _clear_calls(self) -> None:
         self.acting.calls.clear()
         self.refresh()
 
     def _show_menu(self, service: str, at: QPoint) -> None:
-        menu = filled(Menu(self.theme, self), self.theme, self.service_menu(service))
+        menu = fill_menu(Menu(self.theme, self), self.theme, self.service_actions(service))
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.popup(at)
 
-    def service_menu(self, service: str) -> list[RowAction]:
+    def service_actions(self, service: str) -> list[RowAction]:
         """Return the context menu actions of a service."""
-        return [RowAction(_("Call"), "play", self.call), copies(self.context, service)]
+        return [RowAction(_("Call"), "play", self.call), copy_action(self.context, service)]
 
     def _show_call_menu(self, key: str, at: QPoint) -> None:
         record = next((each for each in self.acting.calls.records if str(each.number) == key), None)
@@ -407,7 +413,7 @@ class ServicesPanel(PanelWidget):
         menu = Menu(self.theme, self)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         menu.addAction(
-            self.theme.icon("repeat"), _("Repeat the call"), lambda: self._put_text(record.request)
+            self.theme.icon("repeat"), _("Repeat the call"), lambda: self._set_text(record.request)
         )
         menu.addAction(self.theme.icon("copy"), _("Copy the request"), lambda: self._copy(record.request))
         menu.popup(at)
@@ -445,7 +451,7 @@ class ServicesPanel(PanelWidget):
 def _request_cell(record: CallRecord) -> Cell:
     # Formats a request in one line, such as "name Aiko, pictures 12".
     try:
-        asked = read_json(record.request).filled({})
+        asked = parse_json_text(record.request).fill({})
     except NepError:
         asked = None
     if isinstance(asked, Mapping):
@@ -456,7 +462,7 @@ def _request_cell(record: CallRecord) -> Cell:
 
 
 def _short(value: object) -> str:
-    return value if isinstance(value, str) else " ".join(pretty(value).split())
+    return value if isinstance(value, str) else " ".join(format_json(value).split())
 
 
 PANEL = Panel("services", lazy("Services"), "spline", (), ServicesPanel)

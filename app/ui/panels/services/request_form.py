@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QVBoxLayout, QWidget
 
-from app.core.run.acting.json_text import value_typed
+from app.core.run.acting.json_text import parse_typed_value
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Switch, label
@@ -64,7 +64,7 @@ class RequestForm(QWidget):
         column.addLayout(self._grid)
         column.addStretch(1)
 
-    def forget(self) -> None:
+    def reset_kinds(self) -> None:
         """Discard the kinds of the fields; called before the request of another service is shown."""
         self._kinds, self._request = {}, {}
 
@@ -104,7 +104,9 @@ class RequestForm(QWidget):
             return
         words = value if isinstance(value, str) and kind == "str" else json.dumps(value, ensure_ascii=False)
         # don't replace "12" by "12.0" while the user types
-        if field.text() != words and not (field.hasFocus() and self._meant(name, field.text()) == (value,)):
+        if field.text() != words and not (
+            field.hasFocus() and self._parse_value(name, field.text()) == (value,)
+        ):
             field.setText(words)
         self._mark(field, wrong=False)
 
@@ -128,7 +130,7 @@ class RequestForm(QWidget):
     def _field(self, name: str, kind: str) -> QLineEdit | Switch:
         if kind == "bool":
             switch = Switch(self._theme, "")
-            switch.clicked.connect(lambda: self._put(name, switch.isChecked()))
+            switch.clicked.connect(lambda: self._set_value(name, switch.isChecked()))
             return switch
         line = QLineEdit()
         line.setProperty("focusRadius", self._theme.radius("control"))
@@ -137,7 +139,7 @@ class RequestForm(QWidget):
         return line
 
     def _typed(self, name: str, text: str) -> None:
-        meant = self._meant(name, text)
+        meant = self._parse_value(name, text)
         field = self.fields[name]
         if meant is None:
             said = TYPE_ERRORS["separators" if self._has_separators(name, text) else self._kinds[name]]
@@ -149,14 +151,14 @@ class RequestForm(QWidget):
             self.problems.pop(name, None)
             if isinstance(field, QLineEdit):
                 self._mark(field, wrong=False)
-            self._put(name, meant[0])
+            self._set_value(name, meant[0])
 
-    def _meant(self, name: str, text: str) -> tuple[object] | None:
+    def _parse_value(self, name: str, text: str) -> tuple[object] | None:
         # Returns the value in a tuple, or None if the text is invalid.
         kind = self._kinds[name]
         if kind == "str":
             return (text,)
-        value = value_typed(text)
+        value = parse_typed_value(text)
         if isinstance(value, str) and value == text:
             return None  # invalid JSON
         if kind == "json":
@@ -175,7 +177,7 @@ class RequestForm(QWidget):
             return error.has_separators
         return False
 
-    def _put(self, name: str, value: object) -> None:
+    def _set_value(self, name: str, value: object) -> None:
         self._request = {**self._request, name: value}
         self.typed.emit(dict(self._request))
 

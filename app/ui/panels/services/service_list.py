@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from PySide6.QtCore import QModelIndex, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 
-from app.core.graph.node_graph import OWN
+from app.core.graph.node_graph import INTERNAL_PREFIX
 from app.ui.theme.theme import Theme
 from app.ui.widgets.table.model import Cell, Column, TableModel
 from app.ui.widgets.table.two_lines import ROW_PX, TwoLines
 from app.ui.widgets.table.view import TableView
-from nep.i18n import _, lazy, listed, ngettext
+from nep.i18n import _, format_list, lazy, ngettext
 from nep.protocol.graph_view import GraphView
-from nep.protocol.service_wire import SURVEY
+from nep.protocol.service_wire import SURVEY_PREFIX
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,24 +26,24 @@ class OfferedService:
     nodes: tuple[str, ...]
 
     @property
-    def said(self) -> str:
+    def servers_text(self) -> str:
         """Names of the servers as text, such as "face_tracker"."""
-        return listed(list(self.nodes))
+        return format_list(list(self.nodes))
 
 
-def offered(view: GraphView | None) -> list[OfferedService]:
+def offered_services(view: GraphView | None) -> list[OfferedService]:
     """Return the services sorted by name, without parameter services and surveys."""
     if view is None:
         return []
     found = []
     for name, info in sorted(view.services.items()):
-        if info.servers and not name.startswith((OWN, SURVEY)):
+        if info.servers and not name.startswith((INTERNAL_PREFIX, SURVEY_PREFIX)):
             nodes = [view.nodes[each.node_id].name for each in info.servers if each.node_id in view.nodes]
             found.append(OfferedService(name, tuple(dict.fromkeys(nodes))))
     return found
 
 
-def count_words(services: Sequence[OfferedService]) -> str:
+def count_text(services: Sequence[OfferedService]) -> str:
     """Format the numbers of services and nodes, such as "6 services of 3 nodes"."""
     if not services:
         return ""
@@ -59,8 +59,8 @@ class ServiceList(TableView[OfferedService]):
     `chosen` carries the name of the selected service, also for selection by keyboard.
     """
 
-    chosen = Signal(str)
-    call_wanted = Signal()
+    selected = Signal(str)
+    call_requested = Signal()
 
     def __init__(self, theme: Theme) -> None:
         columns: tuple[Column[OfferedService], ...] = (
@@ -69,16 +69,17 @@ class ServiceList(TableView[OfferedService]):
                 lazy("Service"),
                 90,
                 lambda each: Cell(
-                    mark=TwoLines(each.name, each.said, mono=True), said=f"{each.name}, {each.said}"
+                    mark=TwoLines(each.name, each.servers_text, mono=True),
+                    accessible_text=f"{each.name}, {each.servers_text}",
                 ),
                 stretch=True,
-                tip=lambda each: f"{each.name}\n{each.said}",
+                tip=lambda each: f"{each.name}\n{each.servers_text}",
             ),
         )
         super().__init__(theme, TableModel(columns, lambda each: each.name))
         self.horizontalHeader().hide()
         self.setAccessibleName(_("Services"))
-        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._tell_chosen())
+        self.selectionModel().currentRowChanged.connect(lambda _new, _old: self._emit_selected())
         self.fit_rows()
 
     def fit_rows(self) -> None:
@@ -89,12 +90,12 @@ class ServiceList(TableView[OfferedService]):
         # A click only selects.
         ...
 
-    def _tell_chosen(self) -> None:
-        self.chosen.emit(self.chosen_key() or "")
+    def _emit_selected(self) -> None:
+        self.selected.emit(self.selected_key() or "")
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         held = event.modifiers() == Qt.KeyboardModifier.ControlModifier
         if held and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self.call_wanted.emit()
+            self.call_requested.emit()
         else:
             super().keyPressEvent(event)

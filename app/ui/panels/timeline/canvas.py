@@ -27,11 +27,11 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QAbstractScrollArea, QToolTip
 
 from app.core.recording.replay.replay import Replay
-from app.core.recording.replay.scale import TimeScale, clock_words, span_words
-from app.ui.panels.timeline.event_lanes import NAMES as NAMES_OF_LANES
-from app.ui.panels.timeline.event_lanes import RUNS, EventLanes, LaneMark, shown_lanes
+from app.core.recording.replay.scale import TimeScale, clock_text, duration_text
+from app.ui.panels.timeline.event_lanes import LANE_LABELS as NAMES_OF_LANES
+from app.ui.panels.timeline.event_lanes import RUNS, EventLanes, LaneMark, visible_lanes
 from app.ui.text import plain
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -64,10 +64,10 @@ class TimelineCanvas(QAbstractScrollArea):
         menu_wanted: Bookmark and screen position for a context menu.
     """
 
-    chosen = Signal(str)
+    selected = Signal(str)
     opened = Signal(str)
-    rename_wanted = Signal(object)
-    menu_wanted = Signal(object, QPoint)
+    rename_requested = Signal(object)
+    menu_requested = Signal(object, QPoint)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -87,7 +87,7 @@ class TimelineCanvas(QAbstractScrollArea):
         self.setAccessibleName(_("Timeline"))
         self.setFrameShape(QAbstractScrollArea.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.verticalScrollBar().valueChanged.connect(lambda _value: self.renew())
+        self.verticalScrollBar().valueChanged.connect(lambda _value: self.refresh_lanes())
         self.viewport().setMouseTracking(True)
         theme.changed.connect(self._restyle)
 
@@ -96,13 +96,13 @@ class TimelineCanvas(QAbstractScrollArea):
     def show_replay(self, replay: Replay | None) -> None:
         """Show another recording in its full length, or None for none."""
         if self.field is not None:
-            self.field.leave()
+            self.field.close_field()
         self._replay = replay
-        self._topics = tuple(replay.recorded) if replay is not None else ()
+        self._topics = tuple(replay.recorded_topics) if replay is not None else ()
         there = replay is not None and replay.opened is not None
-        self.scale = TimeScale.whole(replay.start_ns, replay.end_ns) if replay is not None and there else None
+        self.scale = TimeScale.full(replay.start_ns, replay.end_ns) if replay is not None and there else None
         self._position_ns, self._loop, self._follows = 0, None, True
-        self.fit()
+        self.update_scroll_range()
 
     def move_to(self, position_ns: int, loop: tuple[int, int] | None) -> None:
         """Move the playhead. The view follows unless the user scrolled away from it."""
@@ -117,7 +117,7 @@ class TimelineCanvas(QAbstractScrollArea):
         """Set the visible time range."""
         if scale != self.scale:
             self.scale = scale
-            self.renew()
+            self.refresh_lanes()
 
     def zoom(self, factor: float, at_ns: int | None = None) -> None:
         """Scale the visible range by `factor` around a time, by default the playhead."""
@@ -127,30 +127,30 @@ class TimelineCanvas(QAbstractScrollArea):
     def show_all(self) -> None:
         """Show the whole recording."""
         if self.scale is not None:
-            self.set_scale(TimeScale.whole(self.scale.first_ns, self.scale.last_ns))
+            self.set_scale(TimeScale.full(self.scale.first_ns, self.scale.last_ns))
 
-    def renew(self) -> None:
+    def refresh_lanes(self) -> None:
         """Repaint the lanes and request their message counts."""
         self._lanes = None
-        self.want()
+        self.request_counts()
         self.viewport().update()
 
-    def want(self) -> None:
+    def request_counts(self) -> None:
         """Request the message counts of the visible range from the background thread."""
         replay, scale = self._replay, self.scale
         if replay is not None and replay.densities is not None and scale is not None:
             buckets = max(1, min(MAX_BUCKETS, round(self._plot().width())))
-            replay.densities.want(scale.begin_ns, scale.end_ns + 1, buckets)
+            replay.densities.request(scale.begin_ns, scale.end_ns + 1, buckets)
 
     # -- geometry -----------------------------------------------------------------------------------------
 
-    def _row(self) -> float:
+    def _row_height(self) -> float:
         return max(float(ROW_HEIGHT), self._theme.scaled(ROW_HEIGHT))
 
-    def _top(self) -> float:
+    def _lanes_top(self) -> float:
         # Top of the topic lanes.
         return self._theme.scaled(RULER_HEIGHT) + self._theme.scaled(LANE_HEIGHT) * len(
-            shown_lanes(self._replay)
+            visible_lanes(self._replay)
         )
 
     def _plot(self) -> QRectF:
@@ -163,14 +163,14 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def x_of(self, at_ns: int) -> float:
         """Return the x coordinate of a time."""
-        return self._places(self._plot())(at_ns)
+        return self._x_mapper(self._plot())(at_ns)
 
-    def _places(self, plot: QRectF) -> Callable[[int], float]:
+    def _x_mapper(self, plot: QRectF) -> Callable[[int], float]:
         # Returns a closure for speed: each rendering maps thousands of times.
         scale, left, wide = self.scale, plot.left(), plot.width()
         if scale is None:
             return lambda _at_ns: left
-        share = scale.share
+        share = scale.relative_position
         return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * wide
 
     def time_at(self, x: float) -> int:
@@ -180,33 +180,33 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def topic_at(self, y: float) -> str:
         """Return the topic of the lane at a y coordinate, or ""."""
-        if y < self._top():
+        if y < self._lanes_top():
             return ""
-        place = int((y - self._top() + self.verticalScrollBar().value()) / self._row())
+        place = int((y - self._lanes_top() + self.verticalScrollBar().value()) / self._row_height())
         return self._topics[place] if 0 <= place < len(self._topics) else ""
 
     def show_topic(self, topic: str) -> None:
         """Scroll to the lane of a topic."""
         if topic in self._topics:
-            top, bar = round(self._topics.index(topic) * self._row()), self.verticalScrollBar()
-            if not bar.value() <= top <= bar.value() + bar.pageStep() - self._row():
+            top, bar = round(self._topics.index(topic) * self._row_height()), self.verticalScrollBar()
+            if not bar.value() <= top <= bar.value() + bar.pageStep() - self._row_height():
                 bar.setValue(top)
-        self.renew()
+        self.refresh_lanes()
 
-    def fit(self) -> None:
+    def update_scroll_range(self) -> None:
         """Update the scroll range and repaint."""
-        bar, room = self.verticalScrollBar(), self.viewport().height() - self._top()
-        bar.setRange(0, max(0, round(len(self._topics) * self._row() - room)))
+        bar, room = self.verticalScrollBar(), self.viewport().height() - self._lanes_top()
+        bar.setRange(0, max(0, round(len(self._topics) * self._row_height() - room)))
         bar.setPageStep(max(1, round(room)))
-        bar.setSingleStep(round(self._row()))
-        self.renew()
+        bar.setSingleStep(round(self._row_height()))
+        self.refresh_lanes()
 
     def _restyle(self) -> None:
-        self.fit()
+        self.update_scroll_range()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.fit()
+        self.update_scroll_range()
 
     def sizeHint(self) -> QSize:
         return QSize(900, 260)
@@ -221,14 +221,14 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.fillRect(self.viewport().rect(), self._theme.colour("panel"))
         if self._replay is not None and self.scale is not None:
             if self._lanes is None:
-                self._lanes = self._painted()
+                self._lanes = self._render_lanes()
             painter.drawPixmap(0, 0, self._lanes)
-            self._paint_run_now(painter)
+            self._paint_current_run(painter)
             self._paint_loop(painter)
             self._paint_playhead(painter)
         painter.end()
 
-    def _painted(self) -> QPixmap:
+    def _render_lanes(self) -> QPixmap:
         ratio = self.viewport().devicePixelRatioF()
         made = QPixmap(self.viewport().size() * ratio)
         made.setDevicePixelRatio(ratio)
@@ -236,9 +236,9 @@ class TimelineCanvas(QAbstractScrollArea):
         painter = QPainter(made)
         plot = self._plot()
         painter.save()
-        painter.setClipRect(QRectF(0, self._top(), self.viewport().width(), self.viewport().height()))
-        first = int(self.verticalScrollBar().value() / self._row())
-        shown = int((self.viewport().height() - self._top()) / self._row()) + 2
+        painter.setClipRect(QRectF(0, self._lanes_top(), self.viewport().width(), self.viewport().height()))
+        first = int(self.verticalScrollBar().value() / self._row_height())
+        shown = int((self.viewport().height() - self._lanes_top()) / self._row_height()) + 2
         for place in range(first, min(len(self._topics), first + shown)):
             self._paint_topic(painter, plot, place)
         painter.restore()
@@ -260,11 +260,11 @@ class TimelineCanvas(QAbstractScrollArea):
             x = self.x_of(at_ns)
             painter.setPen(QPen(theme.colour("controlBorder"), 1))
             painter.drawLine(QPointF(x, high - 6), QPointF(x, high))
-            from_start = span_words(at_ns - scale.first_ns, digits=digits)
-            words = clock_words(at_ns, digits=digits) if self.by_clock else from_start
+            from_start = duration_text(at_ns - scale.first_ns, digits=digits)
+            words = clock_text(at_ns, digits=digits) if self.by_clock else from_start
             # otherwise it would overlap the text at the right
             if x + 3 + paint.width_of(font, words) <= plot.right():
-                paint.words(
+                paint.text_line(
                     painter, QRectF(x + 3, 0, theme.scaled(LABEL_SPACING_PX), high - 4), words, font, ink
                 )
         paint.hairline(
@@ -274,8 +274,8 @@ class TimelineCanvas(QAbstractScrollArea):
         tertiary = theme.colour("textTertiary")
         if right.width() > theme.scaled(FIGURES_WIDTH) - 12:
             half = QRectF(right.left(), 0, right.width() / 2, high)
-            paint.words(painter, half, _("Messages"), font, tertiary, paint.RIGHT)
-        paint.words(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
+            paint.text_line(painter, half, _("Messages"), font, tertiary, paint.RIGHT)
+        paint.text_line(painter, right, _("Lost"), font, tertiary, paint.RIGHT)
 
     def _paint_lanes(self, painter: QPainter, plot: QRectF) -> None:
         # Bookmarks, and the lanes of runs and alarms if there are any.
@@ -283,8 +283,8 @@ class TimelineCanvas(QAbstractScrollArea):
         self._marks = []
         if replay is None:
             return
-        lanes, high = EventLanes(theme, painter, plot, self._places(plot)), theme.scaled(LANE_HEIGHT)
-        for place, lane in enumerate(shown_lanes(replay)):
+        lanes, high = EventLanes(theme, painter, plot, self._x_mapper(plot)), theme.scaled(LANE_HEIGHT)
+        for place, lane in enumerate(visible_lanes(replay)):
             top = theme.scaled(RULER_HEIGHT) + place * high
             icon, name = NAMES_OF_LANES[lane]
             box = QRectF(0, top, plot.left(), high)
@@ -293,15 +293,15 @@ class TimelineCanvas(QAbstractScrollArea):
             whole = QRectF(0, 0, self.viewport().width(), top + high)
             paint.hairline(painter, whole, Qt.Edge.BottomEdge, theme.colour("border"))
 
-    def _paint_run_now(self, painter: QPainter) -> None:
+    def _paint_current_run(self, painter: QPainter) -> None:
         # Highlights the run at the playhead.
         replay, theme, at_ns = self._replay, self._theme, self._position_ns
-        lanes = shown_lanes(replay)
+        lanes = visible_lanes(replay)
         if replay is None or replay.densities is None or RUNS not in lanes:
             return
         plot, high = self._plot(), theme.scaled(LANE_HEIGHT)
         top = theme.scaled(RULER_HEIGHT) + lanes.index(RUNS) * high
-        event_lanes = EventLanes(theme, painter, plot, self._places(plot))
+        event_lanes = EventLanes(theme, painter, plot, self._x_mapper(plot))
         painter.save()
         painter.setClipRect(QRectF(plot.left(), top, plot.width(), high))
         for span in replay.densities.spans.runs:
@@ -316,26 +316,26 @@ class TimelineCanvas(QAbstractScrollArea):
         paint_icon(painter, square, icon, theme.colour("textTertiary"))
         rest = box.adjusted(18 + side, 0, -6, 0)
         font = theme.font("code" if role in {"text", "selectedText"} else "body")
-        paint.words(painter, rest, words, font, theme.colour(role))
+        paint.text_line(painter, rest, words, font, theme.colour(role))
 
     def _paint_topic(self, painter: QPainter, plot: QRectF, place: int) -> None:
         theme, replay, topic = self._theme, self._replay, self._topics[place]
         if replay is None:
             return
-        top = self._top() + place * self._row() - self.verticalScrollBar().value()
-        whole = QRectF(0, top, self.viewport().width(), self._row())
+        top = self._lanes_top() + place * self._row_height() - self.verticalScrollBar().value()
+        whole = QRectF(0, top, self.viewport().width(), self._row_height())
         is_chosen = topic == replay.chosen
         if is_chosen:
             painter.fillRect(whole, theme.colour("selected"))
-        known = replay.recorded[topic]
+        known = replay.recorded_topics[topic]
         role = "selectedText" if is_chosen else "text"
         icon = ICONS.get(known.codec, "binary")
-        self._paint_name(painter, QRectF(0, top, plot.left(), self._row()), icon, topic, role)
+        self._paint_name(painter, QRectF(0, top, plot.left(), self._row_height()), icon, topic, role)
         self._paint_density(painter, plot, top, topic, is_chosen=is_chosen)
         self._paint_losses(painter, plot, top, topic)
         self._paint_alarms_of(painter, plot, top, topic)
-        self._paint_figures(
-            painter, QRectF(plot.right(), top, whole.right() - plot.right() - 10, self._row()), topic
+        self._paint_stats(
+            painter, QRectF(plot.right(), top, whole.right() - plot.right() - 10, self._row_height()), topic
         )
 
     def _paint_density(
@@ -350,10 +350,10 @@ class TimelineCanvas(QAbstractScrollArea):
         peak = density.peak(topic)
         colour = self._theme.colour("accentText" if is_chosen else "textTertiary")
         left, right = self.x_of(density.start_ns), self.x_of(density.end_ns)
-        box = QRectF(left, top + (self._row() - DENSITY_HEIGHT) / 2, right - left, DENSITY_HEIGHT)
+        box = QRectF(left, top + (self._row_height() - DENSITY_HEIGHT) / 2, right - left, DENSITY_HEIGHT)
         painter.save()
         painter.setClipRect(
-            QRectF(plot.left(), top, plot.width(), self._row()), Qt.ClipOperation.IntersectClip
+            QRectF(plot.left(), top, plot.width(), self._row_height()), Qt.ClipOperation.IntersectClip
         )
         if filled * SPARSE_PX < density.buckets:
             per_px = box.width() / density.buckets
@@ -364,7 +364,7 @@ class TimelineCanvas(QAbstractScrollArea):
                     )
         elif peak:
             painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform, False)
-            painter.drawImage(box, shades(counts, peak, colour))
+            painter.drawImage(box, density_image(counts, peak, colour))
         painter.restore()
 
     def _paint_losses(self, painter: QPainter, plot: QRectF, top: float, topic: str) -> None:
@@ -379,7 +379,7 @@ class TimelineCanvas(QAbstractScrollArea):
             x = self.x_of(mark.at_ns)
             if plot.left() <= x <= plot.right() and x >= painted + 3:
                 painted = x
-                middle = top + self._row() / 2
+                middle = top + self._row_height() / 2
                 painter.fillRect(QRectF(x - 1, middle - 8, 2, 16), ink)
                 notch = [QPointF(x - 4, middle - 8), QPointF(x + 4, middle - 8), QPointF(x, middle - 3)]
                 painter.drawPolygon(QPolygonF(notch))
@@ -391,31 +391,36 @@ class TimelineCanvas(QAbstractScrollArea):
             return
         painter.save()
         painter.setClipRect(
-            QRectF(plot.left(), top, plot.width(), self._row()), Qt.ClipOperation.IntersectClip
+            QRectF(plot.left(), top, plot.width(), self._row_height()), Qt.ClipOperation.IntersectClip
         )
         about = [span for span in replay.densities.spans.alarms if span.topic == topic]
-        for span in EventLanes(self._theme, painter, plot, self._places(plot)).visible_spans(about):
+        for span in EventLanes(self._theme, painter, plot, self._x_mapper(plot)).visible_spans(about):
             left, right = self.x_of(span.start_ns), self.x_of(span.end_ns)
             box = QRectF(
-                left, top + (self._row() - DENSITY_HEIGHT) / 2 - 2, max(4.0, right - left), DENSITY_HEIGHT + 4
+                left,
+                top + (self._row_height() - DENSITY_HEIGHT) / 2 - 2,
+                max(4.0, right - left),
+                DENSITY_HEIGHT + 4,
             )
             edge = self._theme.colour("error" if span.is_error else "warn")
             paint.box(painter, box, 2, None, edge)
         painter.restore()
 
-    def _paint_figures(self, painter: QPainter, box: QRectF, topic: str) -> None:
+    def _paint_stats(self, painter: QPainter, box: QRectF, topic: str) -> None:
         theme, replay = self._theme, self._replay
         if replay is None:
             return
-        font, count = theme.font("code"), replay.recorded[topic].message_count
-        known = replay.figures.get(topic)
+        font, count = theme.font("code"), replay.recorded_topics[topic].message_count
+        known = replay.stats.get(topic)
         lost = None if known is None or known.lost is None else known.lost + known.unkept
         if box.width() > theme.scaled(FIGURES_WIDTH) - 12:
             half = QRectF(box.left(), box.top(), box.width() / 2, box.height())
-            paint.words(painter, half, grouped(count), font, theme.colour("textSecondary"), paint.RIGHT)
+            paint.text_line(
+                painter, half, group_digits(count), font, theme.colour("textSecondary"), paint.RIGHT
+            )
         if lost is not None:
-            words, role = grouped(lost), "warn" if lost else "textTertiary"
-            paint.words(painter, box, words, font, theme.colour(role), paint.RIGHT)
+            words, role = group_digits(lost), "warn" if lost else "textTertiary"
+            paint.text_line(painter, box, words, font, theme.colour(role), paint.RIGHT)
             if lost:
                 side = theme.scaled(13)
                 left = box.right() - paint.width_of(font, words) - side - 4
@@ -447,12 +452,14 @@ class TimelineCanvas(QAbstractScrollArea):
         painter.fillRect(QRectF(x - 0.75, 0, 1.5, plot.height()), theme.colour("text"))
         font = theme.font("small")
         first_ns = self.scale.first_ns
-        words = clock_words(self._position_ns) if self.by_clock else span_words(self._position_ns - first_ns)
+        words = (
+            clock_text(self._position_ns) if self.by_clock else duration_text(self._position_ns - first_ns)
+        )
         wide = paint.width_of(font, words) + 12
         left = max(plot.left(), min(plot.right() - wide, x - wide / 2))
         flag = QRectF(left, 3, wide, theme.scaled(RULER_HEIGHT) - 7)
         paint.box(painter, flag, theme.radius("small"), theme.colour("tooltip"))
-        paint.words(painter, flag, words, font, theme.colour("tooltipText"), paint.CENTRE)
+        paint.text_line(painter, flag, words, font, theme.colour("tooltipText"), paint.CENTRE)
 
     # -- mouse --------------------------------------------------------------------------------------------
 
@@ -461,7 +468,7 @@ class TimelineCanvas(QAbstractScrollArea):
         found = [mark for mark in self._marks if mark.box.contains(at)]
         return min(found, key=lambda mark: mark.box.width(), default=None)
 
-    def _grip(self, at: QPointF) -> str:
+    def _grip_at(self, at: QPointF) -> str:
         # Part that is dragged after a press at this position.
         plot = self._plot()
         if not plot.left() - GRIP_PX <= at.x() <= plot.right() + GRIP_PX or self.scale is None:
@@ -480,15 +487,15 @@ class TimelineCanvas(QAbstractScrollArea):
         if mark is not None:
             self._replay.seek(mark.at_ns)
             return
-        self._held = self._grip(event.position())
+        self._held = self._grip_at(event.position())
         topic = self.topic_at(event.position().y())
         if topic:
-            self.chosen.emit(topic)
+            self.selected.emit(topic)
         if self._held == "playhead":
             self._replay.seek(self.time_at(event.position().x()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        held = self._held or self._grip(event.position())
+        held = self._held or self._grip_at(event.position())
         self.viewport().setCursor(
             Qt.CursorShape.SplitHCursor if held in {"start", "end"} else Qt.CursorShape.ArrowCursor
         )
@@ -507,7 +514,7 @@ class TimelineCanvas(QAbstractScrollArea):
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         mark = self.mark_at(event.position())
         if mark is not None and mark.bookmark is not None:
-            self.rename_wanted.emit(mark.bookmark)
+            self.rename_requested.emit(mark.bookmark)
             return
         topic = self.topic_at(event.position().y())
         if topic and event.position().x() < self._plot().left():
@@ -517,14 +524,14 @@ class TimelineCanvas(QAbstractScrollArea):
         # Context menu of the bookmark under the mouse or, by keyboard, at the playhead.
         bookmark, place = None, event.globalPos()
         if event.reason() == QContextMenuEvent.Reason.Keyboard:
-            bookmark = self._replay.bookmark_here() if self._replay is not None else None
+            bookmark = self._replay.current_bookmark() if self._replay is not None else None
             if bookmark is not None:
                 corner = QPoint(round(self.x_of(bookmark.at_ns)), round(self._theme.scaled(RULER_HEIGHT)))
                 place = self.viewport().mapToGlobal(corner)
         elif (mark := self.mark_at(QPointF(event.pos()))) is not None:
             bookmark = mark.bookmark
         if bookmark is not None:
-            self.menu_wanted.emit(bookmark, place)
+            self.menu_requested.emit(bookmark, place)
             event.accept()
 
     def rename(self, bookmark: Bookmark, take: Callable[[str], bool]) -> None:
@@ -538,9 +545,9 @@ class TimelineCanvas(QAbstractScrollArea):
         left = max(0, min(round(self.x_of(bookmark.at_ns)), view.width() - wide))
         place = QRect(left, round(scaled(RULER_HEIGHT)), wide, round(scaled(LANE_HEIGHT)))
         self.field = RenameField(self._theme, view, place, bookmark.name, take, _("Bookmark name"))
-        self.field.ended.connect(self._renamed)
+        self.field.closed.connect(self._rename_finished)
 
-    def _renamed(self) -> None:
+    def _rename_finished(self) -> None:
         had = self.field is not None and self.field.hasFocus()
         self.field = None
         if had:
@@ -563,30 +570,30 @@ class TimelineCanvas(QAbstractScrollArea):
 
     def viewportEvent(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ToolTip and isinstance(event, QHelpEvent):
-            words = self._tip(QPointF(event.pos()))
+            words = self._tooltip_at(QPointF(event.pos()))
             QToolTip.showText(event.globalPos(), plain.tip(words) if words else "", self.viewport())
             return True
         return super().viewportEvent(event)
 
-    def _tip(self, at: QPointF) -> str:
+    def _tooltip_at(self, at: QPointF) -> str:
         # Tooltip of a mark, of losses, or of an elided name.
         replay, topic = self._replay, self.topic_at(at.y())
         if replay is None or self.scale is None:
             return ""
         if not topic:
             mark = self.mark_at(at)
-            return mark.words if mark is not None else ""
+            return mark.text if mark is not None else ""
         losses = replay.densities.losses.get(topic, ()) if replay.densities is not None else ()
         lost = sum(each.count for each in losses if abs(self.x_of(each.at_ns) - at.x()) <= GRIP_PX)
         if at.x() >= self._plot().left() and lost:
             words = ngettext(
                 "{count} message of {topic} was lost here", "{count} messages of {topic} were lost here", lost
             )
-            return words.format(count=grouped(lost), topic=topic)
+            return words.format(count=group_digits(lost), topic=topic)
         return topic
 
 
-def shades(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
+def density_image(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
     """Return a one-line image with one pixel per bucket, which is more opaque for higher counts."""
     levels = []
     for level in range(256):

@@ -9,7 +9,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QPainter, QPen
 
 from app.core.recording.replay.replay import Replay
-from app.core.recording.replay.scale import span_words
+from app.core.recording.replay.scale import duration_text
 from app.core.recording.replay.spans import RecordedSpan
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -18,7 +18,7 @@ from nep.i18n import _, lazy
 from nep.recordings.bookmarks import Bookmark
 
 BOOKMARKS, RUNS, ALARMS = "bookmarks", "runs", "alarms"
-NAMES = {
+LANE_LABELS = {
     BOOKMARKS: ("bookmark", lazy("Bookmarks")),
     RUNS: ("blocks", lazy("Behaviours")),
     ALARMS: ("bell", lazy("Alarms")),
@@ -41,11 +41,11 @@ class LaneMark:
 
     box: QRectF
     at_ns: int
-    words: str
+    text: str
     bookmark: Bookmark | None = None
 
 
-def shown_lanes(replay: Replay | None) -> tuple[str, ...]:
+def visible_lanes(replay: Replay | None) -> tuple[str, ...]:
     """Return the lanes to show: bookmarks, and the other ones that are not empty."""
     spans = replay.densities.spans if replay is not None and replay.densities is not None else None
     if spans is None:
@@ -67,13 +67,15 @@ class EventLanes:
         self._painter.save()
         self._painter.setClipRect(box)
         if lane == BOOKMARKS:
-            made = self._bookmarks(replay, box)
+            made = self._paint_bookmarks(replay, box)
         elif spans is None:
             made = []
         elif lane == RUNS:
-            made = [self._run(span, box, replay.start_ns) for span in self.visible_spans(spans.runs)]
+            made = [
+                self._paint_run_mark(span, box, replay.start_ns) for span in self.visible_spans(spans.runs)
+            ]
         else:
-            made = self._alarms(list(self.visible_spans(spans.alarms)), box, replay.start_ns)
+            made = self._paint_alarms(list(self.visible_spans(spans.alarms)), box, replay.start_ns)
         self._painter.restore()
         return made
 
@@ -89,12 +91,14 @@ class EventLanes:
 
     # -- bookmarks ----------------------------------------------------------------------------------------
 
-    def _bookmarks(self, replay: Replay, box: QRectF) -> list[LaneMark]:
+    def _paint_bookmarks(self, replay: Replay, box: QRectF) -> list[LaneMark]:
         theme, painter, marks = self._theme, self._painter, replay.bookmarks
         font, ink = theme.font("small"), theme.colour("accentText")
         if not marks:
             tertiary = theme.colour("textTertiary")
-            paint.words(painter, box.adjusted(FLAG_SIZE, 0, 0, 0), _("Press B to add one"), font, tertiary)
+            paint.text_line(
+                painter, box.adjusted(FLAG_SIZE, 0, 0, 0), _("Press B to add one"), font, tertiary
+            )
         made, free = [], box.left() - 1.0
         for mark in marks:
             x = self._x_of(mark.at_ns)
@@ -109,7 +113,7 @@ class EventLanes:
             if x >= free and mark.name:
                 wide = min(paint.width_of(font, mark.name), theme.scaled(MAX_NAME_WIDTH))
                 place = QRectF(x + 12, box.top(), wide, box.height())
-                paint.words(painter, place, mark.name, font, theme.colour("text"))
+                paint.text_line(painter, place, mark.name, font, theme.colour("text"))
                 free = x + 16 + wide
             pressed = QRectF(x - GAP, box.top(), FLAG_SIZE + 2 * GAP + wide, box.height())
             made.append(LaneMark(pressed, mark.at_ns, mark.name or _("Bookmark"), mark))
@@ -122,10 +126,10 @@ class EventLanes:
         left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
         return QRectF(left, top + 3, max(MIN_MARK_WIDTH, right - left), high - 6)
 
-    def _run(self, span: RecordedSpan, box: QRectF, start_ns: int) -> LaneMark:
+    def _paint_run_mark(self, span: RecordedSpan, box: QRectF, start_ns: int) -> LaneMark:
         bar = self.bar(span, box.top(), box.height())
         self.paint_run(span, bar, "sunken", "controlBorder")
-        return LaneMark(bar, span.start_ns, run_words(span, start_ns))
+        return LaneMark(bar, span.start_ns, run_text(span, start_ns))
 
     def paint_run(self, span: RecordedSpan, bar: QRectF, fill: str, edge: str) -> None:
         """Paint a run with its name at the left and its result at the right, as far as they fit."""
@@ -136,29 +140,29 @@ class EventLanes:
         if inside.width() < theme.scaled(MIN_TEXT_WIDTH):
             return
         font, side = theme.font("small"), theme.scaled(ICON_SIZE)
-        self._icon("blocks", inside.left(), inside, "textTertiary")
+        self._paint_icon("blocks", inside.left(), inside, "textTertiary")
         inside.adjust(side + GAP, 0, 0, 0)
         icon, role, result = RESULTS.get(span.result, ("", "", ""))
-        words = span.words or (_(result) if result else "")
+        words = span.details or (_(result) if result else "")
         wide = side + GAP + paint.width_of(font, words)
         name = min(paint.width_of(font, span.name), theme.scaled(MAX_NAME_WIDTH))
         if icon and name + 2 * GAP + wide <= inside.width():
-            self._icon(icon, inside.right() - wide, inside, role)
-            paint.words(painter, inside, words, font, theme.colour(role), paint.RIGHT)
+            self._paint_icon(icon, inside.right() - wide, inside, role)
+            paint.text_line(painter, inside, words, font, theme.colour(role), paint.RIGHT)
             inside.adjust(0, 0, -wide - GAP, 0)
         elif icon and name + 2 * GAP + side <= inside.width():
-            self._icon(icon, inside.right() - side, inside, role)
+            self._paint_icon(icon, inside.right() - side, inside, role)
             inside.adjust(0, 0, -side - GAP, 0)
-        paint.words(painter, inside, span.name, font, theme.colour("text"))
+        paint.text_line(painter, inside, span.name, font, theme.colour("text"))
 
-    def _icon(self, name: str, left: float, row: QRectF, role: str) -> None:
+    def _paint_icon(self, name: str, left: float, row: QRectF, role: str) -> None:
         side = self._theme.scaled(ICON_SIZE)
         square = QRectF(left, row.center().y() - side / 2, side, side)
         paint_icon(self._painter, square, name, self._theme.colour(role))
 
     # -- alarms -------------------------------------------------------------------------------------------
 
-    def _alarms(self, spans: list[RecordedSpan], box: QRectF, start_ns: int) -> list[LaneMark]:
+    def _paint_alarms(self, spans: list[RecordedSpan], box: QRectF, start_ns: int) -> list[LaneMark]:
         # Each bar has its text at the right, up to the next bar.
         made, theme = [], self._theme
         font, side = theme.font("small"), theme.scaled(ICON_SIZE)
@@ -167,22 +171,22 @@ class EventLanes:
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
             bar = QRectF(left, box.top() + 5, max(MIN_MARK_WIDTH, right - left), box.height() - 10)
             paint.box(self._painter, bar, 1.5, theme.colour(role))
-            words = alarm_words(span)
+            words = alarm_text(span)
             until = self._x_of(spans[place + 1].start_ns) if place + 1 < len(spans) else box.right()
             begin = max(bar.right(), box.left()) + 5
             room = min(until, box.right()) - begin - side - GAP
             pressed = bar.adjusted(-3, -3, 3, 3)
             if room >= theme.scaled(MIN_TEXT_WIDTH):
                 wide = min(room, paint.width_of(font, words) + 1)
-                self._icon("circle-x" if span.is_error else "triangle-alert", begin, box, role)
+                self._paint_icon("circle-x" if span.is_error else "triangle-alert", begin, box, role)
                 text = QRectF(begin + side + GAP, box.top(), wide, box.height())
-                paint.words(self._painter, text, words, font, theme.colour(role))
+                paint.text_line(self._painter, text, words, font, theme.colour(role))
                 pressed = pressed.united(text)
-            made.append(LaneMark(pressed, span.start_ns, _told(words, span, start_ns)))
+            made.append(LaneMark(pressed, span.start_ns, _with_times(words, span, start_ns)))
         return made
 
 
-def alarm_words(span: RecordedSpan) -> str:
+def alarm_text(span: RecordedSpan) -> str:
     """Describe an alarm, with its duration if known: "/distance: range is 0.36, below 0.4, 1.2 s"."""
     name = span.name.rstrip(".")
     name = f"{name[:1].upper()}{name[1:]}"
@@ -192,15 +196,15 @@ def alarm_words(span: RecordedSpan) -> str:
     return _("{alarm}, {seconds} s").format(alarm=name, seconds=f"{seconds:.1f}")
 
 
-def run_words(span: RecordedSpan, start_ns: int) -> str:
+def run_text(span: RecordedSpan, start_ns: int) -> str:
     """Describe a run: behaviour, result and times."""
     known = RESULTS.get(span.result)
-    words = span.words or (_(known[2]) if known is not None else "")
-    return _told(f"{span.name}: {words}" if words else span.name, span, start_ns)
+    words = span.details or (_(known[2]) if known is not None else "")
+    return _with_times(f"{span.name}: {words}" if words else span.name, span, start_ns)
 
 
-def _told(words: str, span: RecordedSpan, start_ns: int) -> str:
-    begin, end = (span_words(each - start_ns, digits=1) for each in (span.start_ns, span.end_ns))
+def _with_times(words: str, span: RecordedSpan, start_ns: int) -> str:
+    begin, end = (duration_text(each - start_ns, digits=1) for each in (span.start_ns, span.end_ns))
     if not span.is_over:
         return _("{what}\nsince {begin}").format(what=words, begin=begin)
     return _("{what}\n{begin} to {end}").format(what=words, begin=begin, end=end)

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
 from app.core.recording.replay.replay import STEP_NS, Replay
 from app.ui.panels.armed_strip import ArmedMinutes
 from app.ui.panels.base import PanelContext, PanelWidget
-from app.ui.panels.row_actions import RowAction, filled
+from app.ui.panels.row_actions import RowAction, fill_menu
 from app.ui.panels.timeline.canvas import TimelineCanvas
 from app.ui.panels.timeline.sending import ReplayStrip, SendChooser
 from app.ui.panels.timeline.transport import TransportRow
@@ -61,18 +61,18 @@ class TimelinePanel(PanelWidget):
         column.addWidget(Separator(theme))
         column.addWidget(self.strip)
         column.addWidget(self._below, 1)
-        self.pages = self.show_one_of(self.empty, body)
+        self.pages = self.make_page_stack(self.empty, body)
         self.setFocusProxy(self.canvas)
-        self.ruler.changed.connect(self._choose_ruler)
-        self.canvas.chosen.connect(self._choose)
+        self.ruler.changed.connect(self._set_ruler)
+        self.canvas.selected.connect(self._select_topic)
         self.canvas.opened.connect(self.context.open_topic)
-        self.canvas.rename_wanted.connect(self.rename_bookmark)
-        self.canvas.menu_wanted.connect(self._show_menu)
-        self.transport.bookmark_wanted.connect(self._bookmark)
-        self.transport.arm_wanted.connect(self.choose_sent)
-        self.strip.change_wanted.connect(self.choose_sent)
-        self.chooser.left.connect(self._leave_chooser)
-        self.chooser.refused.connect(self.context.toast)
+        self.canvas.rename_requested.connect(self.rename_bookmark)
+        self.canvas.menu_requested.connect(self._show_menu)
+        self.transport.bookmark_requested.connect(self._bookmark)
+        self.transport.arm_requested.connect(self.show_send_chooser)
+        self.strip.change_requested.connect(self.show_send_chooser)
+        self.chooser.exited.connect(self._close_chooser)
+        self.chooser.arming_failed.connect(self.context.toast)
         self._update_text()
 
     # -- display ------------------------------------------------------------------------------------------
@@ -95,10 +95,10 @@ class TimelinePanel(PanelWidget):
         state = (replay.chosen, tuple(replay.bookmarks))
         if is_new or state != self._state:
             self._state = state
-            self.canvas.fit()
+            self.canvas.update_scroll_range()
         self.transport.show_replay(replay, player)
         self.strip.refresh()
-        self.transport.show_armed(is_armed=self.strip.isVisibleTo(self))
+        self.transport.set_armed(is_armed=self.strip.isVisibleTo(self))
         if self._below.currentWidget() is self.chooser:
             self.chooser.refresh()
         self.canvas.move_to(player.position_ns, player.loop if player.is_looping else None)
@@ -113,7 +113,7 @@ class TimelinePanel(PanelWidget):
         elif status.stage == "failed":
             words = (
                 _("{name} can't be played.").format(name=replay.name),
-                f"{status.sentence[:1].upper()}{status.sentence[1:]}.",
+                f"{status.message[:1].upper()}{status.message[1:]}.",
                 True,
             )
         else:
@@ -126,7 +126,7 @@ class TimelinePanel(PanelWidget):
         title, sentence, offers = words
         self.empty.set_texts(str(title), str(sentence), "film")
         action = EmptyAction(
-            _("Open a recording"), lambda: self.context.run("replay.open"), "folder-open", primary=True
+            _("Open a recording"), lambda: self.context.run("replay.open"), "folder-open", is_primary=True
         )
         self.empty.set_actions([action] if offers else [])
         self.pages.setCurrentIndex(0)
@@ -140,22 +140,22 @@ class TimelinePanel(PanelWidget):
         self._below.setCurrentWidget(self.canvas)
 
     def theme_changed(self) -> None:
-        self.canvas.renew()
+        self.canvas.refresh_lanes()
 
     # -- user actions -------------------------------------------------------------------------------------
 
     def show_topic(self, name: str) -> None:
         """Select a topic, through whose messages the replay then steps."""
-        self._choose(name)
+        self._select_topic(name)
         self.canvas.show_topic(name)
 
-    def _choose(self, topic: str) -> None:
+    def _select_topic(self, topic: str) -> None:
         if self._shown is not None:
-            self._shown.choose(topic)
+            self._shown.select_topic(topic)
 
-    def _choose_ruler(self, which: str) -> None:
+    def _set_ruler(self, which: str) -> None:
         self.canvas.by_clock = which == BY_CLOCK
-        self.canvas.renew()
+        self.canvas.refresh_lanes()
 
     def _bookmark(self) -> None:
         self.context.run("replay.bookmark")
@@ -167,17 +167,17 @@ class TimelinePanel(PanelWidget):
                 event.accept()
                 return True
             if event.type() == QEvent.Type.KeyPress and self._shown is not None:
-                self._of_bookmark_here(
+                self._run_on_current_bookmark(
                     self.rename_bookmark if event.key() == Qt.Key.Key_F2 else self.delete_bookmark
                 )
                 return True
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if self._shown is None or not self._key(event, self._shown):
+        if self._shown is None or not self._handle_key(event, self._shown):
             super().keyPressEvent(event)
 
-    def _key(self, event: QKeyEvent, replay: Replay) -> bool:
+    def _handle_key(self, event: QKeyEvent, replay: Replay) -> bool:
         held = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
         does: dict[tuple[Qt.KeyboardModifier, int], Callable[[], object]] = {
             (NONE, Qt.Key.Key_Space): replay.toggle,
@@ -197,8 +197,8 @@ class TimelinePanel(PanelWidget):
             (SHIFT, Qt.Key.Key_Plus): lambda: self.canvas.zoom(1 / ZOOM_FACTOR),
             (NONE, Qt.Key.Key_Minus): lambda: self.canvas.zoom(ZOOM_FACTOR),
             (NONE, Qt.Key.Key_0): self.canvas.show_all,
-            (NONE, Qt.Key.Key_Up): lambda: self._next_topic(-1),
-            (NONE, Qt.Key.Key_Down): lambda: self._next_topic(1),
+            (NONE, Qt.Key.Key_Up): lambda: self._select_neighbour(-1),
+            (NONE, Qt.Key.Key_Down): lambda: self._select_neighbour(1),
         }
         wanted = does.get((held, event.key()))
         if wanted is None and event.text() in {"[", "]"}:  # typed with AltGr on many keyboard layouts
@@ -208,24 +208,24 @@ class TimelinePanel(PanelWidget):
         wanted()
         return True
 
-    def _next_topic(self, by: int) -> None:
+    def _select_neighbour(self, by: int) -> None:
         # Selects the next topic above or below.
         replay = self._shown
-        if replay is not None and (topics := list(replay.recorded)):
+        if replay is not None and (topics := list(replay.recorded_topics)):
             place = topics.index(replay.chosen) if replay.chosen in topics else 0
             self.show_topic(topics[max(0, min(len(topics) - 1, place + by))])
 
     # -- sending ------------------------------------------------------------------------------------------
 
-    def choose_sent(self) -> None:
+    def show_send_chooser(self) -> None:
         """Show the page to choose topics to send to the live network."""
         replay = self._shown
         if replay is not None and replay.sending is not None:
-            counts = {name: topic.message_count for name, topic in replay.recorded.items()}
+            counts = {name: topic.message_count for name, topic in replay.recorded_topics.items()}
             self._below.setCurrentWidget(self.chooser)
             self.chooser.open(replay.sending, counts, replay.chosen)
 
-    def _leave_chooser(self) -> None:
+    def _close_chooser(self) -> None:
         self._below.setCurrentWidget(self.canvas)
         self.refresh()
         place = self.strip.switch if self.strip.isVisibleTo(self) else self.transport.armed
@@ -237,8 +237,8 @@ class TimelinePanel(PanelWidget):
 
     # -- bookmarks ----------------------------------------------------------------------------------------
 
-    def _of_bookmark_here(self, do: Callable[[Bookmark], object]) -> None:
-        mark = self._shown.bookmark_here() if self._shown is not None else None
+    def _run_on_current_bookmark(self, do: Callable[[Bookmark], object]) -> None:
+        mark = self._shown.current_bookmark() if self._shown is not None else None
         if mark is not None:
             do(mark)
         else:
@@ -252,12 +252,12 @@ class TimelinePanel(PanelWidget):
             RowAction(_("Rename"), "pencil", lambda: self.rename_bookmark(mark)),
             RowAction(_("Delete"), "trash-2", lambda: self.delete_bookmark(mark)),
         )
-        filled(menu, self.theme, actions).popup(place)
+        fill_menu(menu, self.theme, actions).popup(place)
 
     def rename_bookmark(self, mark: Bookmark) -> None:
         """Rename a bookmark in place."""
         replay = self._shown
-        if replay is not None and not self._is_note(mark):
+        if replay is not None and not self._rejects_note(mark):
             self.canvas.rename(
                 mark, lambda name: self._try(lambda: replay.rename_bookmark(mark, name.strip()))
             )
@@ -265,16 +265,16 @@ class TimelinePanel(PanelWidget):
     def delete_bookmark(self, mark: Bookmark) -> None:
         """Delete a bookmark; the toast offers to undo it."""
         replay = self._shown
-        if replay is None or self._is_note(mark) or not self._try(lambda: replay.remove_bookmark(mark)):
+        if replay is None or self._rejects_note(mark) or not self._try(lambda: replay.remove_bookmark(mark)):
             return
         words = _("Deleted the bookmark “{name}”").format(name=mark.name) if mark.name else ""
         self.context.toast(
             words or _("Deleted the bookmark"),
             _("Undo"),
-            lambda: self._try(lambda: replay.put_back_bookmark(mark)),
+            lambda: self._try(lambda: replay.restore_bookmark(mark)),
         )
 
-    def _is_note(self, mark: Bookmark) -> bool:
+    def _rejects_note(self, mark: Bookmark) -> bool:
         if mark.is_note:
             self.context.toast(_("Notes made while recording are part of the file and can't be changed"))
         return mark.is_note
@@ -302,12 +302,12 @@ class TimelinePanel(PanelWidget):
             action = QAction(self.theme.icon(icon), words, self)
             action.triggered.connect(lambda _on=False, command=command: self.context.run(command))
             made.append(action)
-        for old in self._listed:
+        for old in self._menu_actions:
             old.deleteLater()
-        self._listed = made
+        self._menu_actions = made
         return [*made, self._minutes.entry()] if path else made
 
-    _listed: Sequence[QAction] = ()
+    _menu_actions: Sequence[QAction] = ()
 
 
 BOOKMARK_KEYS = {Qt.Key.Key_F2, Qt.Key.Key_Delete}

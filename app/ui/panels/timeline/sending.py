@@ -8,12 +8,12 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 
-from app.core.recording.replay.sending import ReplaySending, late_words
+from app.core.recording.replay.sending import ReplaySending, late_text
 from app.core.run.acting.arming import Target
 from app.ui.panels.armed_strip import ArmedStrip
 from app.ui.panels.base import PanelContext
 from app.ui.text import plain
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label
 from app.ui.widgets.flow_layout import Flow
@@ -34,14 +34,14 @@ class ReplayStrip(ArmedStrip):
     """
 
     for_replay = True
-    change_wanted = Signal()
+    change_requested = Signal()
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context)
         self.change = Button(context.theme, _("Topics"), "plus", kind="ghost", size="small")
         self.change.setAccessibleName(_("Choose which topics are sent"))
         self.change.setToolTip(plain.tip(self.change.accessibleName()))
-        self.change.clicked.connect(self.change_wanted)
+        self.change.clicked.connect(self.change_requested)
         self._flow.addWidget(self.change)
 
     @property
@@ -54,18 +54,18 @@ class ReplayStrip(ArmedStrip):
         super().refresh()
         self.setVisible(self.sending is not None and (self._is_on or self.acting.question is not None))
 
-    def more_words(self) -> str:
-        going = self.sending.outbox.going if self.sending is not None else ()
+    def summary_text(self) -> str:
+        going = self.sending.outbox.active_topics if self.sending is not None else ()
         if not going:
             return ""
         count, skipped = sum(each.count for each in going), sum(each.skipped for each in going)
         heard = max(each.subscriber_count for each in going)
-        sent = ngettext("{count} sent", "{count} sent", count).format(count=grouped(count))
-        late = [late_words(skipped)] if skipped else []
+        sent = ngettext("{count} sent", "{count} sent", count).format(count=group_digits(count))
+        late = [late_text(skipped)] if skipped else []
         ears = ngettext("received by {count}", "received by {count}", heard).format(count=heard)
         return ", ".join((sent, *late, ears if heard else _("no subscribers")))
 
-    def token_words(self, target: Target) -> str:
+    def token_text(self, target: Target) -> str:
         routes = self.sending.routes if self.sending is not None else {}
         recorded = [topic for topic, name in routes.items() if name == target.name != topic]
         if not recorded:
@@ -77,9 +77,9 @@ class SendRow(NamedTuple):
     """Row of a recorded topic; `name` is the name under which it is sent, or None if it is not sent."""
 
     topic: str
-    messages: int
+    message_count: int
     name: str | None
-    moves: bool
+    moves_robot: bool
 
 
 class SendChooser(QWidget):
@@ -88,8 +88,8 @@ class SendChooser(QWidget):
     `left` is emitted when the user is done.
     """
 
-    left = Signal()
-    refused = Signal(str)
+    exited = Signal()
+    arming_failed = Signal(str)
     """Emitted with the reason if the topics could not be armed."""
 
     def __init__(self, theme: Theme) -> None:
@@ -117,10 +117,10 @@ class SendChooser(QWidget):
         self.table.opened.connect(self._toggle)
         self.table.order_changed.connect(self._show_rows)
         self.table.selectionModel().currentRowChanged.connect(self._show_name)
-        self.name.textEdited.connect(self._type)
+        self.name.textEdited.connect(self._name_edited)
         self.name.returnPressed.connect(self._arm)
         self.arm.clicked.connect(self._arm)
-        self.cancel.clicked.connect(self.left)
+        self.cancel.clicked.connect(self.exited)
         self._arrange()
 
     def _arrange(self) -> None:
@@ -143,10 +143,10 @@ class SendChooser(QWidget):
     def open(self, sending: ReplaySending, counts: dict[str, int], chosen: str) -> None:
         """Show the topics of a recording with their message counts."""
         self._sending, self._counts, self._seen = sending, counts, None
-        sending.learn()
+        sending.analyze()
         self.problem.setText("")
         self.refresh()
-        self.table.choose(chosen)
+        self.table.select_key(chosen)
         self._show_name()
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -160,9 +160,9 @@ class SendChooser(QWidget):
         said = _("While armed, these topics are also sent to the live network during playback.")
         moving = _("Topics that move a robot are marked and need confirmation.")
         reading = _("Checking which topics move robots.")
-        self.words.setText(f"{said} {moving if sending.is_known else reading}")
+        self.words.setText(f"{said} {moving if sending.is_analyzed else reading}")
         self.problem.setVisible(bool(self.problem.text()))
-        self.arm.setEnabled(bool(sending.routes) and sending.is_known)
+        self.arm.setEnabled(bool(sending.routes) and sending.is_analyzed)
 
     def _show_rows(self) -> None:
         sending = self._sending
@@ -171,29 +171,29 @@ class SendChooser(QWidget):
         rows = []
         for topic, count in self._counts.items():
             name = sending.routes.get(topic)
-            rows.append(SendRow(topic, count, name, sending.moves(topic, name or topic)))
+            rows.append(SendRow(topic, count, name, sending.moves_robot(topic, name or topic)))
         self.model.set_rows(self.table.order.sort(rows))
         self.table.viewport().update()
 
     def _toggle(self, topic: str) -> None:
         sending = self._sending
         if sending is not None:
-            self._set_problem(sending.choose(topic, None if topic in sending.routes else ""))
+            self._set_problem(sending.select(topic, None if topic in sending.routes else ""))
             self._show_name()
 
     def _show_name(self) -> None:
         # The text field for the name edits the selected row.
-        topic = self.table.chosen_key() or ""
+        topic = self.table.selected_key() or ""
         routes = self._sending.routes if self._sending is not None else {}
         name = routes.get(topic, "")
         self.name.setEnabled(bool(topic))
         self.name.setPlaceholderText(topic)
         self.name.setText(name if name != topic else "")
 
-    def _type(self, text: str) -> None:
-        topic = self.table.chosen_key()
+    def _name_edited(self, text: str) -> None:
+        topic = self.table.selected_key()
         if topic and self._sending is not None:
-            self._set_problem(self._sending.choose(topic, text))
+            self._set_problem(self._sending.select(topic, text))
 
     def _set_problem(self, problem: str) -> None:
         self.problem.setText(problem)
@@ -207,34 +207,38 @@ class SendChooser(QWidget):
             return
         why_not = self._sending.arm()
         if why_not:
-            self.refused.emit(why_not)
+            self.arming_failed.emit(why_not)
         else:
-            self.left.emit()
+            self.exited.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
-            self.left.emit()
+            self.exited.emit()
         elif event.key() not in {Qt.Key.Key_Tab, Qt.Key.Key_Backtab}:
             event.accept()  # keys must not reach the panel while the lanes are hidden
 
 
 def _columns() -> tuple[Column[SendRow], ...]:
-    def is_sent(row: SendRow) -> Cell:
+    def sent_cell(row: SendRow) -> Cell:
         if row.name is not None:
-            return Cell(icon="check", role="accentText", said=_("sent"))
-        return Cell(icon="minus", role="textTertiary", said=_("not sent"))
+            return Cell(icon="check", role="accentText", accessible_text=_("sent"))
+        return Cell(icon="minus", role="textTertiary", accessible_text=_("not sent"))
 
-    def moves(row: SendRow) -> Cell:
-        return Cell(icon="triangle-alert", role="warn", said=_("moves a robot")) if row.moves else Cell()
+    def moves_cell(row: SendRow) -> Cell:
+        return (
+            Cell(icon="triangle-alert", role="warn", accessible_text=_("moves a robot"))
+            if row.moves_robot
+            else Cell()
+        )
 
     return (
-        Column("sent", "", 40, is_sent, words=lazy("Is sent")),
+        Column("sent", "", 40, sent_cell, label=lazy("Is sent")),
         Column("topic", lazy("Topic"), 170, lambda row: Cell(row.topic, mono=True),
                key=lambda row: row.topic, stretch=True, tip=lambda row: row.topic),
-        Column("moves", "", 40, moves, words=lazy("Moves a robot"),
-               tip=lambda row: _("Moves a robot; needs confirmation.") if row.moves else ""),
+        Column("moves", "", 40, moves_cell, label=lazy("Moves a robot"),
+               tip=lambda row: _("Moves a robot; needs confirmation.") if row.moves_robot else ""),
         Column("as", lazy("Sent as"), 190, lambda row: Cell(row.name or "", mono=True, role="accentText"),
                tip=lambda row: row.name or ""),
-        Column("messages", lazy("Messages"), 90, lambda row: Cell(grouped(row.messages)),
-               key=lambda row: row.messages, figures=True, yields=1),
+        Column("messages", lazy("Messages"), 90, lambda row: Cell(group_digits(row.message_count)),
+               key=lambda row: row.message_count, is_numeric=True, hide_order=1),
     )  # fmt: skip

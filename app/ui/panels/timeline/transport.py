@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
 from app.core.recording.replay.replay import Replay
-from app.core.recording.replay.scale import clock_words, date_words, span_words
+from app.core.recording.replay.scale import clock_text, date_text, duration_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, Switch, ToggleButton, label
 from app.ui.widgets.flow_layout import Flow
@@ -26,8 +26,8 @@ SLOW_RATIO = 0.97
 class TransportRow(QWidget):
     """Row of controls that shows and changes the state of a replay."""
 
-    bookmark_wanted = Signal()
-    arm_wanted = Signal()
+    bookmark_requested = Signal()
+    arm_requested = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -67,30 +67,30 @@ class TransportRow(QWidget):
         flow.addWidget(self.armed)
         flow.addWidget(self.nothing)
 
-    def show_armed(self, *, is_armed: bool) -> None:
+    def set_armed(self, *, is_armed: bool) -> None:
         """Hide the switch while sending is armed, because the strip below has a switch too."""
         self.armed.setVisible(not is_armed)
         self.nothing.setVisible(not is_armed)
 
-    def _ask_arming(self) -> None:
+    def _request_arming(self) -> None:
         self.armed.setChecked(False)  # becomes checked once topics are chosen
-        self.arm_wanted.emit()
+        self.arm_requested.emit()
 
     def _connect(self) -> None:
-        self.armed.clicked.connect(self._ask_arming)
-        self.previous.clicked.connect(lambda: self._do(lambda replay: replay.skip(forward=False)))
-        self.next.clicked.connect(lambda: self._do(lambda replay: replay.skip(forward=True)))
-        self.back.clicked.connect(lambda: self._do(lambda replay: replay.step(forward=False)))
-        self.on.clicked.connect(lambda: self._do(lambda replay: replay.step(forward=True)))
-        self.play.clicked.connect(lambda: self._do(Replay.toggle))
-        self.loop.clicked.connect(lambda: self._do(Replay.toggle_loop))
-        self.bookmark.clicked.connect(self.bookmark_wanted)
+        self.armed.clicked.connect(self._request_arming)
+        self.previous.clicked.connect(lambda: self._with_replay(lambda replay: replay.skip(forward=False)))
+        self.next.clicked.connect(lambda: self._with_replay(lambda replay: replay.skip(forward=True)))
+        self.back.clicked.connect(lambda: self._with_replay(lambda replay: replay.step(forward=False)))
+        self.on.clicked.connect(lambda: self._with_replay(lambda replay: replay.step(forward=True)))
+        self.play.clicked.connect(lambda: self._with_replay(Replay.toggle))
+        self.loop.clicked.connect(lambda: self._with_replay(Replay.toggle_loop))
+        self.bookmark.clicked.connect(self.bookmark_requested)
         self.speed.valueChanged.connect(
-            lambda step: self._do(lambda replay: replay.set_speed(speed_of(step)))
+            lambda step: self._with_replay(lambda replay: replay.set_speed(speed_of(step)))
         )
         self.speed.reset.connect(lambda: self.speed.setValue(SPEED_STEPS // 2))
 
-    def _do(self, what: Callable[[Replay], object]) -> None:
+    def _with_replay(self, what: Callable[[Replay], object]) -> None:
         if self._replay is not None:
             what(self._replay)
 
@@ -101,26 +101,26 @@ class TransportRow(QWidget):
             self.speed.blockSignals(True)
             self.speed.setValue(step_of(player.speed))
             self.speed.blockSignals(False)
-        self.time.setText(span_words(player.position_ns - replay.start_ns))
+        self.time.setText(duration_text(player.position_ns - replay.start_ns))
         self.length.setText(
-            _("of {length}").format(length=span_words(replay.end_ns - replay.start_ns, digits=0))
+            _("of {length}").format(length=duration_text(replay.end_ns - replay.start_ns, digits=0))
         )
         at_ns = player.position_ns
-        self.date.setText(f"{date_words(at_ns)}, {clock_words(at_ns)}")
+        self.date.setText(f"{date_text(at_ns)}, {clock_text(at_ns)}")
         word, icon = (_("Pause"), "pause") if player.is_playing else (_("Play"), "play")
-        self.play.set_word(word, icon)
+        self.play.set_label(word, icon)
         self.play.set_kind("plain" if player.is_playing else "primary")
         self.loop.setChecked(player.is_looping)
-        self.loop.set_word(self._loop_words(replay, player))
-        self._say_speed(player)
+        self.loop.set_label(self._loop_text(replay, player))
+        self._update_speed(player)
 
-    def _loop_words(self, replay: Replay, player: PlayerStatus) -> str:
+    def _loop_text(self, replay: Replay, player: PlayerStatus) -> str:
         if player.loop is None or not player.is_looping:
             return _("Loop")
-        begin, end = (span_words(each - replay.start_ns, digits=0) for each in player.loop)
+        begin, end = (duration_text(each - replay.start_ns, digits=0) for each in player.loop)
         return _("Loop {begin} to {end}").format(begin=begin, end=end)
 
-    def _say_speed(self, player: PlayerStatus) -> None:
+    def _update_speed(self, player: PlayerStatus) -> None:
         asked, true = player.speed, player.true_speed
         is_slow = player.is_playing and true is not None and true < SLOW_RATIO * asked
         if is_slow:

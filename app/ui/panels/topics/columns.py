@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from app.core.network.topic_tree import TopicFolder, TreeRow, parts_of_name
-from app.core.networks.kinds import NetworkKind, kind_named
-from app.ui.text.numbers import age_words, bandwidth_words, grouped, rate_words
+from app.core.networks.kinds import NetworkKind, find_kind
+from app.ui.text.numbers import age_text, bandwidth_text, group_digits, rate_text
 from app.ui.widgets.table.model import Cell, Column
 from nep.i18n import _, lazy, ngettext, number, pgettext
 
@@ -18,87 +18,89 @@ if TYPE_CHECKING:
 ICONS = {"image": "image", "json": "braces", "string": "type", "bytes": "binary", "msgpack": "braces"}
 
 
-def _ink(topic: Topic, role: str) -> str:
-    return role if topic.gone_s is None and not topic.stale else "textDisabled"
+def _text_role(topic: Topic, role: str) -> str:
+    return role if topic.gone_s is None and not topic.is_stale else "textDisabled"
 
 
-def untold(topic: Topic) -> NetworkKind | None:
+def network_without_stats(topic: Topic) -> NetworkKind | None:
     """Return the topic's network if it does not report statistics, else None."""
-    kind = kind_named(topic.network)
-    return kind if kind is not None and not kind.tells_figures else None
+    kind = find_kind(topic.network)
+    return kind if kind is not None and not kind.reports_stats else None
 
 
 def name_cell(topic: Topic) -> Cell:
     """Return the cell with the name: bold with a chip while new, struck through when gone."""
     gone = topic.gone_s is not None
-    chip = pgettext("topic", "new") if topic.new and not gone else None
-    return Cell(topic.name, role=_ink(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip)
+    chip = pgettext("topic", "new") if topic.is_new and not gone else None
+    return Cell(
+        topic.name, role=_text_role(topic, "text"), mono=True, bold=bool(chip), struck=gone, chip=chip
+    )
 
 
 def network_cell(topic: Topic) -> Cell:
     """Return the cell of the Network column."""
-    kind = kind_named(topic.network)
+    kind = find_kind(topic.network)
     if kind is None:
-        return Cell("NEP", role=_ink(topic, "textTertiary"))
-    return Cell(kind.words, "waypoints", _ink(topic, "textSecondary"))
+        return Cell("NEP", role=_text_role(topic, "textTertiary"))
+    return Cell(kind.product_name, "waypoints", _text_role(topic, "textSecondary"))
 
 
 def type_cell(topic: Topic) -> Cell:
     """Return the cell with icon and last part of the type; the tooltip has the full type."""
     icon = ICONS.get(topic.codec) or ICONS.get(topic.msg_type, "box")
-    return Cell(topic.msg_type.rpartition("/")[2], icon, _ink(topic, "textTertiary"))
+    return Cell(topic.msg_type.rpartition("/")[2], icon, _text_role(topic, "textTertiary"))
 
 
 def publishers_cell(topic: Topic) -> Cell:
     """Return the cell with the number of publishers."""
-    return Cell(str(topic.publishers), role=_ink(topic, "text"))
+    return Cell(str(topic.publishers), role=_text_role(topic, "text"))
 
 
 def subscribers_cell(topic: Topic) -> Cell:
     """Return the cell with the number of subscribers."""
-    return Cell(str(topic.subscribers) if topic.gone_s is None else "", role=_ink(topic, "text"))
+    return Cell(str(topic.subscribers) if topic.gone_s is None else "", role=_text_role(topic, "text"))
 
 
 def nodes_cell(topic: Topic) -> Cell:
     """Return the cell with the names of the publishing nodes."""
-    return Cell(", ".join(topic.publisher_nodes), role=_ink(topic, "textSecondary"))
+    return Cell(", ".join(topic.publisher_nodes), role=_text_role(topic, "textSecondary"))
 
 
 def curve_cell(topic: Topic) -> Cell:
     """Return the cell with the curve of the rate in the last 30 s."""
-    if topic.rate_hz is None and untold(topic) is not None:
+    if topic.rate_hz is None and network_without_stats(topic) is not None:
         return Cell()  # a recorded topic has only the rates measured while it was open
-    return Cell(role=_ink(topic, "textSecondary"), curve=tuple(topic.rates))
+    return Cell(role=_text_role(topic, "textSecondary"), curve=tuple(topic.rates))
 
 
 def rate_cell(topic: Topic) -> Cell:
     """Return the cell with the rate in messages per second."""
-    return Cell(rate_words(topic.rate_hz), role=_ink(topic, "text"))
+    return Cell(rate_text(topic.rate_hz), role=_text_role(topic, "text"))
 
 
 def bandwidth_cell(topic: Topic) -> Cell:
     """Return the cell with the bandwidth, which is unknown without subscribers."""
-    if _is_unheard(topic):
-        return Cell(bandwidth_words(None), role=_ink(topic, "textDisabled"))
-    return Cell(bandwidth_words(topic.bandwidth_Bps), role=_ink(topic, "text"))
+    if _is_size_unknown(topic):
+        return Cell(bandwidth_text(None), role=_text_role(topic, "textDisabled"))
+    return Cell(bandwidth_text(topic.bandwidth_Bps), role=_text_role(topic, "text"))
 
 
-def _is_unheard(topic: Topic) -> bool:
+def _is_size_unknown(topic: Topic) -> bool:
     # Without subscribers messages are not encoded, so their size is unknown.
     return bool(topic.rate_hz) and not topic.bandwidth_Bps and not topic.subscribers
 
 
 def _bandwidth_tip(topic: Topic) -> str:
-    if _is_unheard(topic):
+    if _is_size_unknown(topic):
         return _("No subscribers: messages are counted, their size is unknown")
-    return _not_told(topic)
+    return _unreported_tip(topic)
 
 
 def age_cell(topic: Topic) -> Cell:
     """Return the cell with the age of the newest message, or the time since the topic disappeared."""
     if topic.gone_s is not None:
         return Cell(_("gone for {seconds} s").format(seconds=int(topic.gone_s)), role="textDisabled")
-    return Cell(age_words(topic.age_s), role=_ink(topic, "text"))
+    return Cell(age_text(topic.age_s), role=_text_role(topic, "text"))
 
 
 def loss_cell(topic: Topic) -> Cell:
@@ -106,13 +108,13 @@ def loss_cell(topic: Topic) -> Cell:
 
     For networks that report no statistics, a note replaces all values.
     """
-    kind = untold(topic)
+    kind = network_without_stats(topic)
     if kind is not None and topic.gone_s is None and (topic.rate_hz, topic.age_s, topic.lost) == (None,) * 3:
-        return Cell(kind.not_known, role=_ink(topic, "textTertiary"), spills=True)
+        return Cell(kind.unknown_text, role=_text_role(topic, "textTertiary"), overflows_left=True)
     if topic.lost is None or topic.gone_s is not None:
         return Cell()
     if topic.lost == 0:
-        return Cell("0", role=_ink(topic, "text"))
+        return Cell("0", role=_text_role(topic, "text"))
     share = topic.loss_ratio
     return Cell(
         str(topic.lost)
@@ -131,55 +133,63 @@ def _publishers_tip(topic: Topic) -> str:
 
 def _curve_tip(topic: Topic) -> str:
     if len(topic.rates) < 2:
-        if untold(topic) is not None:
-            return _not_told(topic)
+        if network_without_stats(topic) is not None:
+            return _unreported_tip(topic)
         return _("No rate reported yet")
     said = _("Recent rate: {least} to {most} /s")
-    return said.format(least=rate_words(min(topic.rates)), most=rate_words(max(topic.rates)))
+    return said.format(least=rate_text(min(topic.rates)), most=rate_text(max(topic.rates)))
 
 
-def _shown_tip(topic: Topic) -> str:
+def _displayed_tip(topic: Topic) -> str:
     # Shown only if messages were dropped before they reached the panels.
     if not (topic.dropped or topic.missed):
         return ""
-    shown, sent = topic.shown_of
-    return _("{shown} of {sent} messages shown").format(shown=grouped(shown), sent=grouped(sent))
+    shown, sent = topic.displayed_and_sent
+    return _("{shown} of {sent} messages shown").format(shown=group_digits(shown), sent=group_digits(sent))
 
 
 def _network_tip(topic: Topic) -> str:
-    kind = kind_named(topic.network)
+    kind = find_kind(topic.network)
     if kind is None:
         return _("Studio's own network")
-    if topic.stale:
-        return _("{network} does not respond; these are its last known values").format(network=kind.words)
-    return _("On {network}, separate from Studio's own network").format(network=kind.words)
+    if topic.is_stale:
+        return _("{network} does not respond; these are its last known values").format(
+            network=kind.product_name
+        )
+    return _("On {network}, separate from Studio's own network").format(network=kind.product_name)
 
 
-def _not_told(topic: Topic) -> str:
+def _unreported_tip(topic: Topic) -> str:
     # Empty for networks whose publishers report the value.
-    kind = untold(topic)
+    kind = network_without_stats(topic)
     if kind is None:
         return ""
-    if topic.counted is not None:
+    if topic.measured_rates is not None:
         return _("{network} doesn't report this; Studio measures it while the topic is open").format(
-            network=kind.words
+            network=kind.product_name
         )
-    return _("{network} doesn't report this. Studio measures the topics you open").format(network=kind.words)
+    return _("{network} doesn't report this. Studio measures the topics you open").format(
+        network=kind.product_name
+    )
 
 
 def _rate_tip(topic: Topic) -> str:
-    return _not_told(topic) or _shown_tip(topic) or _("Messages per second, as reported by the publishers")
+    return (
+        _unreported_tip(topic)
+        or _displayed_tip(topic)
+        or _("Messages per second, as reported by the publishers")
+    )
 
 
 def _loss_tip(topic: Topic) -> str:
-    shown, kind = _shown_tip(topic), untold(topic)
+    shown, kind = _displayed_tip(topic), network_without_stats(topic)
     if topic.lost is None and kind is not None:
-        lost = _("{network} doesn't count lost messages").format(network=kind.words)
+        lost = _("{network} doesn't count lost messages").format(network=kind.product_name)
     elif topic.lost is None:
         lost = _("No subscriber reports losses")
     else:
         lost = ngettext("{count} message lost", "{count} messages lost", topic.lost)
-        lost = lost.format(count=grouped(topic.lost))
+        lost = lost.format(count=group_digits(topic.lost))
     return _("{lost}. {shown}").format(lost=lost, shown=shown) if shown else lost
 
 
@@ -200,9 +210,9 @@ COLUMNS: tuple[Column[Topic], ...] = (
         72,
         publishers_cell,
         lambda t: t.publishers,
-        figures=True,
+        is_numeric=True,
         tip=_publishers_tip,
-        yields=4,
+        hide_order=4,
     ),
     Column(
         "subscribers",
@@ -210,25 +220,43 @@ COLUMNS: tuple[Column[Topic], ...] = (
         82,
         subscribers_cell,
         lambda t: t.subscribers,
-        figures=True,
-        off=True,
+        is_numeric=True,
+        is_hidden_by_default=True,
     ),
-    Column("nodes", lazy("Published by"), 120, nodes_cell, lambda t: t.publisher_nodes, off=True),
-    Column("curve", "", 50, curve_cell, yields=5, words=lazy("Rate over time"), tip=_curve_tip),
-    Column("rate", lazy("Rate /s"), 56, rate_cell, lambda t: t.rate_hz, figures=True, tip=_rate_tip),
+    Column(
+        "nodes", lazy("Published by"), 120, nodes_cell, lambda t: t.publisher_nodes, is_hidden_by_default=True
+    ),
+    Column("curve", "", 50, curve_cell, hide_order=5, label=lazy("Rate over time"), tip=_curve_tip),
+    Column("rate", lazy("Rate /s"), 56, rate_cell, lambda t: t.rate_hz, is_numeric=True, tip=_rate_tip),
     Column(
         "bandwidth",
         lazy("Bandwidth"),
         75,
         bandwidth_cell,
         lambda t: t.bandwidth_Bps,
-        figures=True,
+        is_numeric=True,
         tip=_bandwidth_tip,
-        yields=3,
+        hide_order=3,
     ),
-    Column("age", lazy("Age"), 58, age_cell, lambda t: t.age_s, figures=True, tip=_not_told, yields=2),
     Column(
-        "loss", lazy("Loss"), 74, loss_cell, lambda t: t.loss_ratio, figures=True, tip=_loss_tip, yields=1
+        "age",
+        lazy("Age"),
+        58,
+        age_cell,
+        lambda t: t.age_s,
+        is_numeric=True,
+        tip=_unreported_tip,
+        hide_order=2,
+    ),
+    Column(
+        "loss",
+        lazy("Loss"),
+        74,
+        loss_cell,
+        lambda t: t.loss_ratio,
+        is_numeric=True,
+        tip=_loss_tip,
+        hide_order=1,
     ),
 )
 
@@ -240,28 +268,28 @@ INDENT, CHEVRON = 14, 19
 
 def _folder_name(folder: TopicFolder) -> Cell:
     icon = "chevron-down" if folder.is_open else "chevron-right"
-    return Cell(f"{folder.name}/", icon, mono=True, indent=folder.deep * INDENT)
+    return Cell(f"{folder.name}/", icon, mono=True, indent=folder.depth * INDENT)
 
 
 def _folder_type(folder: TopicFolder) -> Cell:
     count = len(folder.topics)
-    words = ngettext("{count} topic", "{count} topics", count).format(count=grouped(count))
+    words = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
     return Cell(words, role="textTertiary")
 
 
 def _folder_loss(folder: TopicFolder) -> Cell:
-    lost = folder.figures.lost
+    lost = folder.stats.lost
     if not lost:
         return Cell() if lost is None else Cell("0")
-    return Cell(grouped(lost), "triangle-alert", "warn")
+    return Cell(group_digits(lost), "triangle-alert", "warn")
 
 
 def _folder_loss_tip(folder: TopicFolder) -> str:
-    lost = folder.figures.lost
+    lost = folder.stats.lost
     if lost is None:
         return _("No subscriber reports losses")
     said = ngettext("{count} message lost in {folder}", "{count} messages lost in {folder}", lost)
-    return said.format(count=grouped(lost), folder=folder.path)
+    return said.format(count=group_digits(lost), folder=folder.path)
 
 
 def _sum_tip(folder: TopicFolder) -> str:
@@ -277,13 +305,13 @@ FOLDERS: dict[str, FolderColumn] = {
         lambda f: network_cell(f.topics[0]), lambda f: f.network, lambda f: _network_tip(f.topics[0])
     ),
     "type": (_folder_type, lambda _f: "", None),
-    "rate": (lambda f: Cell(rate_words(f.figures.rate_hz)), lambda f: f.figures.rate_hz, _sum_tip),
+    "rate": (lambda f: Cell(rate_text(f.stats.rate_hz)), lambda f: f.stats.rate_hz, _sum_tip),
     "bandwidth": (
-        lambda f: Cell(bandwidth_words(f.figures.bandwidth_Bps)), lambda f: f.figures.bandwidth_Bps, _sum_tip
+        lambda f: Cell(bandwidth_text(f.stats.bandwidth_Bps)), lambda f: f.stats.bandwidth_Bps, _sum_tip
     ),
     "age": (
-        lambda f: Cell(age_words(f.figures.age_s)),
-        lambda f: f.figures.age_s,
+        lambda f: Cell(age_text(f.stats.age_s)),
+        lambda f: f.stats.age_s,
         lambda f: _("Newest message in {folder}").format(folder=f.path),
     ),
     "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
@@ -299,7 +327,7 @@ def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[Tree
     cell, key, tip = of_folder
     of_topic, topic_key, topic_tip = column.cell, column.key, column.tip
 
-    def told(row: TreeRow) -> str:
+    def row_tip(row: TreeRow) -> str:
         if isinstance(row, TopicFolder):
             return tip(row) if tip is not None else ""
         return topic_tip(row) if topic_tip is not None else ""
@@ -310,17 +338,17 @@ def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[Tree
         column.width,
         lambda row: cell(row) if isinstance(row, TopicFolder) else of_topic(row),
         (lambda row: key(row) if isinstance(row, TopicFolder) else topic_key(row)) if topic_key else None,
-        figures=column.figures,
+        is_numeric=column.is_numeric,
         stretch=column.stretch,
-        tip=told if topic_tip is not None else None,
-        yields=column.yields,
-        off=column.off,
-        words=column.words,
-        when=column.when,
+        tip=row_tip if topic_tip is not None else None,
+        hide_order=column.hide_order,
+        is_hidden_by_default=column.is_hidden_by_default,
+        label=column.label,
+        is_available=column.is_available,
     )
 
 
-OTHERS = tuple(_with_folders(column, FOLDERS.get(column.name, BLANK)) for column in COLUMNS[1:])
+COMMON_COLUMNS = tuple(_with_folders(column, FOLDERS.get(column.name, BLANK)) for column in COLUMNS[1:])
 """Columns that are the same in every panel."""
 
 
@@ -335,7 +363,7 @@ def columns(
         as_tree: Returns True to show only the last part of names, below their folders.
     """
 
-    def named(topic: Topic) -> Cell:
+    def topic_name_cell(topic: Topic) -> Cell:
         cell = name_cell(topic)
         if cell.chip and own(topic):
             cell = replace(cell, bold=False, chip=None)
@@ -344,13 +372,15 @@ def columns(
         parts = parts_of_name(topic.name)
         return replace(cell, text=parts[-1], indent=(len(parts) - 1) * INDENT + CHEVRON)
 
-    def folder_named(folder: TopicFolder) -> Cell:
+    def folder_name_cell(folder: TopicFolder) -> Cell:
         cell = _folder_name(folder)
         fresh = not folder.is_open and any(
-            topic.new and topic.gone_s is None and not own(topic) for topic in folder.topics
+            topic.is_new and topic.gone_s is None and not own(topic) for topic in folder.topics
         )
         return replace(cell, chip=pgettext("topic", "new")) if fresh else cell
 
-    first = _with_folders(replace(COLUMNS[0], cell=named), (folder_named, *FOLDERS["topic"][1:]))
-    network = _with_folders(replace(NETWORK, when=several), FOLDERS["network"])
-    return (first, network, *OTHERS)
+    first = _with_folders(
+        replace(COLUMNS[0], cell=topic_name_cell), (folder_name_cell, *FOLDERS["topic"][1:])
+    )
+    network = _with_folders(replace(NETWORK, is_available=several), FOLDERS["network"])
+    return (first, network, *COMMON_COLUMNS)

@@ -9,20 +9,20 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout
 
 from app.core.network.source import NODE_NAME
-from app.core.network.topic_tree import TopicFolder, TopicTree, TreeRow, fits, folders_above
+from app.core.network.topic_tree import TopicFolder, TopicTree, TreeRow, folders_above, topic_filter
 from app.core.network.topics import split_key
-from app.core.networks.networks import network_words
+from app.core.networks.networks import network_label
 from app.ui.panels.base import Panel, PanelContext
-from app.ui.panels.network_table import NetworkTable, own_everywhere
-from app.ui.panels.row_actions import RowAction, copies, show_messages, topic_actions
-from app.ui.panels.table_panel import TableWords
+from app.ui.panels.network_table import NetworkTable, are_own_nodes
+from app.ui.panels.row_actions import RowAction, copy_action, show_messages, topic_actions
+from app.ui.panels.table_panel import TableTexts
 from app.ui.panels.topics.columns import columns
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.widgets import ElidedLabel, EmptyAction, IconButton
 from app.ui.widgets.keyboard import is_plain
 from app.ui.widgets.table.model import TableModel
 from app.ui.widgets.table.view import TableView
-from nep.i18n import _, lazy, listed, ngettext
+from nep.i18n import _, format_list, lazy, ngettext
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -36,14 +36,14 @@ FOOT_OF_NETWORKS = lazy(
     "measures the topics you open there"
 )
 RECORDED_FOOT = lazy("Recorded values; ages are relative to the playhead")
-WORDS = TableWords(
+TABLE_TEXTS = TableTexts(
     title=lazy("Topics"),
     filter=lazy("Filter topics"),
-    nothing_fits=lazy("No matching topics"),
-    clear_the_filter=lazy("Clear the filter to see all topics."),
+    no_matches=lazy("No matching topics"),
+    clear_filter_hint=lazy("Clear the filter to see all topics."),
     not_recorded=lazy("The recording has no topics yet"),
 )
-FIGURES_TICKS = 6  # refreshes at 30 Hz; faster changes would be illegible
+STATS_UPDATE_TICKS = 6  # refreshes at 30 Hz; faster changes would be illegible
 SORT_TICKS = 30
 CHANGING_COLUMNS = frozenset({"rate", "bandwidth", "age", "loss"})
 MAX_CLOSED = 1000
@@ -56,15 +56,15 @@ class TopicsTable(TableView[TreeRow]):
     `fold_wanted` carries the key of a row, and True to expand or False to collapse it.
     """
 
-    fold_wanted = Signal(str, bool)
-    folds = False
+    expand_requested = Signal(str, bool)
+    shows_folders = False
     """True while folders are shown. Otherwise Left and Right have their usual meaning."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key = self.chosen_key() if self.folds and is_plain(event) else None
+        key = self.selected_key() if self.shows_folders and is_plain(event) else None
         if event.key() in {Qt.Key.Key_Left, Qt.Key.Key_Right} and key is not None:
             self.keyboard = True
-            self.fold_wanted.emit(key, event.key() == Qt.Key.Key_Right)
+            self.expand_requested.emit(key, event.key() == Qt.Key.Key_Right)
         else:
             super().keyPressEvent(event)
 
@@ -75,7 +75,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def __init__(self, context: PanelContext) -> None:
         self._closed: set[str] = set()
         self._tree: TopicTree | None = None
-        super().__init__(context, WORDS, "radio-tower")
+        super().__init__(context, TABLE_TEXTS, "radio-tower")
         self.as_tree = IconButton(
             self.theme, "list-tree", _("Group by the slashes in topic names"), checkable=True, size=26
         )
@@ -95,35 +95,35 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._wanted = ""
 
     def make_model(self) -> TableModel[TreeRow]:
-        every = columns(self._own, self.has_several, lambda: self._tree is not None)
+        every = columns(self._is_own, self.has_other_networks, lambda: self._tree is not None)
         return TableModel(every, lambda row: row.key)
 
     def make_table(self, model: TableModel[TreeRow]) -> TableView[TreeRow]:
         self.topics_table = TopicsTable(self.theme, model, "topic")
-        self.topics_table.fold_wanted.connect(self._fold)
+        self.topics_table.expand_requested.connect(self._set_expanded)
         return self.topics_table
 
-    def _own(self, topic: Topic) -> bool:
+    def _is_own(self, topic: Topic) -> bool:
         # True for topics published by Studio or by virtual robots that it started.
         if topic.network:
-            return own_everywhere(topic.publisher_nodes)
+            return are_own_nodes(topic.publisher_nodes)
         if not topic.publisher_nodes:
             return topic.name.startswith(tuple(f"/{robot}/" for robot in self._ours))
         return {*self._ours, NODE_NAME}.issuperset(topic.publisher_nodes)
 
     def refresh(self) -> None:
         self._ticks += 1
-        facts = self._facts()
+        facts = self._snapshot()
         order = self.table.order.column
         lively = order is not None and order.name in CHANGING_COLUMNS
         if facts != self._seen or (lively and self._ticks % SORT_TICKS == 0):
             self.rebuild()
-        if self._ticks % FIGURES_TICKS == 0 and self.model.rowCount():
+        if self._ticks % STATS_UPDATE_TICKS == 0 and self.model.rowCount():
             if self._tree is not None:
-                self._tree.renew()
-            self.table.tell_visible_changed()
+                self._tree.invalidate_stats()
+            self.table.refresh_visible()
 
-    def _facts(self) -> tuple[object, ...]:
+    def _snapshot(self) -> tuple[object, ...]:
         topics, networks = self.session.topics, self.session.networks
         return topics.revision, len(topics), networks.revision, self.session.master.kind
 
@@ -131,20 +131,20 @@ class TopicsPanel(NetworkTable[TreeRow]):
         self._seen = ()
 
     def rebuild(self) -> None:
-        self._seen = self._facts()
+        self._seen = self._snapshot()
         topics = [*self.session.topics, *self.session.networks.topics]
         self._ours = self.session.launcher.virtual_robots
         words = self.filter_words()
-        fit = fits(words)
+        fit = topic_filter(words)
         rows = [topic for topic in topics if fit(topic.name, _haystack(topic))] if words else topics
         self._show_rows(rows, filtered=bool(words))
         if self._wanted:
             self.show_topic(self._wanted)
-        self._say_counts(len(topics), len(rows) if words else None)
+        self._update_counts(len(topics), len(rows) if words else None)
         self.show_table(bool(rows), bool(words))
         self.show_networks()
         recorded = self.session.replay is not None
-        kinds = [network.kind for network in self.session.networks.chosen]
+        kinds = [network.kind for network in self.session.networks.selected]
         self.foot.setText(_(RECORDED_FOOT) if recorded else _foot(kinds))
         self.foot.setVisible(bool(rows))
         self.line.setVisible(bool(rows))
@@ -152,7 +152,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
     def _show_rows(self, topics: list[Topic], *, filtered: bool) -> None:
         # Folders are never collapsed while a filter is active.
         was_tree = self._tree is not None
-        self.topics_table.folds = self.as_tree.isChecked()
+        self.topics_table.shows_folders = self.as_tree.isChecked()
         if self.as_tree.isChecked():
             self._tree = TopicTree(topics, () if filtered else self._closed)
             self.model.set_rows(self._tree.rows(self.table.order.sort))
@@ -160,9 +160,9 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self._tree = None
             self.model.set_rows(self.table.order.sort([*topics]))
         if was_tree or self._tree is not None:
-            self.table.tell_visible_changed()  # names of topics are formatted differently in a tree
+            self.table.refresh_visible()  # names of topics are formatted differently in a tree
 
-    def _say_counts(self, known: int, found: int | None) -> None:
+    def _update_counts(self, known: int, found: int | None) -> None:
         nodes = len(self.session.networks.nodes)
         if self.session.graph is not None:
             nodes += len(self.session.graph.nodes)
@@ -170,14 +170,14 @@ class TopicsPanel(NetworkTable[TreeRow]):
             words = ngettext("{count} topic", "{count} topics", known)
         else:
             words = ngettext("{found} of {count} topic", "{found} of {count} topics", known)
-        words = words.format(count=grouped(known), found=found)
+        words = words.format(count=group_digits(known), found=found)
         if nodes:
-            there = ngettext("{count} node", "{count} nodes", nodes).format(count=grouped(nodes))
+            there = ngettext("{count} node", "{count} nodes", nodes).format(count=group_digits(nodes))
             words = _("{topics}, {nodes}").format(topics=words, nodes=there)
         self.count.setText(words if known else "")
         self.filter.setVisible(known > 0)
 
-    def say_empty(self) -> None:
+    def update_empty_state(self) -> None:
         if self.session.master.kind == "searching":
             said = _("Address: {address}").format(address=self.session.master.address)
             self.empty.set_texts(_("Searching for a master"), said, "radio-tower")
@@ -187,26 +187,26 @@ class TopicsPanel(NetworkTable[TreeRow]):
                 _("No topics yet"), _("Topics appear as soon as a program publishes."), "list"
             )
             self.empty.set_actions(
-                [EmptyAction(_("Use the virtual robot"), self._use_virtual, "bot", primary=True)]
+                [EmptyAction(_("Use the virtual robot"), self._start_virtual_robot, "bot", is_primary=True)]
             )
 
-    def missed_topic(self) -> str:
+    def missing_topic(self) -> str:
         words = self.filter.text().strip()
         return words if words.startswith("/") and len(words.split()) == 1 else ""
 
-    def _use_virtual(self) -> None:
+    def _start_virtual_robot(self) -> None:
         self.context.run("robots.virtual")
 
     def open_row(self, key: str) -> None:
         if self._folder(key) is not None:
-            self._fold(key, None)
+            self._set_expanded(key, None)
         else:
             show_messages(self.context, key)
 
     def _folder(self, key: str) -> TopicFolder | None:
         return self._tree[key] if self._tree is not None and key in self._tree else None
 
-    def _fold(self, key: str, is_open: bool | None) -> None:
+    def _set_expanded(self, key: str, is_open: bool | None) -> None:
         # None toggles the folder. Left on a topic or a collapsed folder selects the parent folder.
         folder = self._folder(key)
         if folder is None or (is_open is False and not folder.is_open):
@@ -220,15 +220,15 @@ class TopicsPanel(NetworkTable[TreeRow]):
         elif len(self._closed) < MAX_CLOSED and not self.filter_words():
             self._closed.add(key)
         self.rebuild()
-        self.table.choose(key)
+        self.table.select_key(key)
 
     def _go_up(self, key: str) -> None:
         network, name = split_key(key)
         above = folders_above(name.removesuffix("/*"), network)
         if self._tree is not None and above:
-            self.table.choose(above[-1])
+            self.table.select_key(above[-1])
 
-    def _fold_all(self, *, is_open: bool) -> None:
+    def _set_all_expanded(self, *, is_open: bool) -> None:
         self._closed.clear()
         if not is_open and self._tree is not None:
             self._closed.update(folder.key for folder in list(self._tree)[:MAX_CLOSED])
@@ -243,9 +243,9 @@ class TopicsPanel(NetworkTable[TreeRow]):
             RowAction(
                 fold, "chevron-right" if folder.is_open else "chevron-down", lambda: self.open_row(key)
             ),
-            RowAction(_("Expand all folders"), "list-tree", lambda: self._fold_all(is_open=True)),
-            RowAction(_("Collapse all folders"), "list", lambda: self._fold_all(is_open=False)),
-            copies(self.context, split_key(key)[1]),
+            RowAction(_("Expand all folders"), "list-tree", lambda: self._set_all_expanded(is_open=True)),
+            RowAction(_("Collapse all folders"), "list", lambda: self._set_all_expanded(is_open=False)),
+            copy_action(self.context, split_key(key)[1]),
         )
 
     def show_topic(self, name: str) -> None:
@@ -256,7 +256,7 @@ class TopicsPanel(NetworkTable[TreeRow]):
             self._wanted = ""
             self.rebuild()
         self._wanted = "" if self.model.index_of(name).isValid() else name  # selected when its row appears
-        self.table.choose(name)
+        self.table.select_key(name)
 
     def save_state(self) -> dict[str, object]:
         return {**super().save_state(), "tree": self.as_tree.isChecked(), "closed": sorted(self._closed)}
@@ -271,15 +271,15 @@ class TopicsPanel(NetworkTable[TreeRow]):
 
 def _foot(kinds: Sequence[NetworkKind]) -> str:
     # Note about the source of the statistics.
-    untold = [kind.words for kind in kinds if not kind.tells_figures]
+    untold = [kind.product_name for kind in kinds if not kind.reports_stats]
     if not untold:
         return _(FOOT)
-    return _(FOOT_OF_NETWORKS).format(networks=listed(untold))
+    return _(FOOT_OF_NETWORKS).format(networks=format_list(untold))
 
 
 def _haystack(topic: Topic) -> str:
-    words = (network_words(topic.network), topic.name, topic.msg_type, *topic.publisher_nodes)
+    words = (network_label(topic.network), topic.name, topic.msg_type, *topic.publisher_nodes)
     return " ".join(words)
 
 
-PANEL = Panel("topics", WORDS.title, "list", (), TopicsPanel)
+PANEL = Panel("topics", TABLE_TEXTS.title, "list", (), TopicsPanel)

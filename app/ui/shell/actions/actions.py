@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QAbstractButton, QMenuBar, QWidget
 from app.ui.shell.actions.command import Command, UnknownCommandError
 from app.ui.theme.theme import Theme
 from app.ui.widgets import name_command
-from app.ui.widgets.letters import marked
+from app.ui.widgets.letters import with_mnemonics
 from app.ui.widgets.menus import Menu
 from nep.i18n import _
 
@@ -43,18 +43,18 @@ class Actions:
         for command in commands:
             action = self._actions[command.id] = self._make(command, window)
             action.triggered.connect(lambda _on=False, run=command.run: run(do))
-            self._why_not[command.id] = partial(command.why_not, do)
+            self._why_not[command.id] = partial(command.disabled_reason, do)
 
     def _make(self, command: Command[Any], window: QWidget) -> QAction:
-        action = QAction("\t".join(filter(None, (command.words, command.shows))), window)
+        action = QAction("\t".join(filter(None, (command.label, command.displayed_key))), window)
         action.setObjectName(command.id)
         if command.icon is not None and not command.group:
             action.setIcon(self._theme.icon(command.icon))
-        action.setShortcuts([QKeySequence(key) for key in command.keys_at_first()])
+        action.setShortcuts([QKeySequence(key) for key in command.default_keys()])
         action.setMenuRole(ROLES.get(command.id, QAction.MenuRole.NoRole))
-        if command.everywhere:
+        if command.in_all_windows:
             action.setShortcutContext(Qt.ShortcutContext.ApplicationShortcut)
-        action.setCheckable(bool(command.group) or command.check)
+        action.setCheckable(bool(command.group) or command.is_checkable)
         if command.group:
             if command.group not in self._groups:
                 self._groups[command.group] = QActionGroup(window)
@@ -81,7 +81,7 @@ class Actions:
         for name, action in self._actions.items():
             action.setShortcuts([QKeySequence(key) for key in keys_of(name)])
 
-    def why_not(self, name: str) -> str:
+    def disabled_reason(self, name: str) -> str:
         """Return the reason why a command is unavailable, or "" if it is available.
 
         The reason is a short phrase without a full stop.
@@ -89,10 +89,10 @@ class Actions:
         self[name]
         return self._why_not[name]()
 
-    def disable(self) -> None:
+    def disable_unavailable(self) -> None:
         """Disable the actions of commands that are unavailable. Stop is always enabled."""
         for name, action in self._actions.items():
-            action.setEnabled(name == STOP or not self.why_not(name))
+            action.setEnabled(name == STOP or not self.disabled_reason(name))
 
     def enable_all(self) -> None:
         """Enable all actions, because shortcuts of disabled actions don't work.
@@ -114,7 +114,7 @@ class Actions:
         action.trigger()
         return True
 
-    def choose(self, name: str) -> None:
+    def select(self, name: str) -> None:
         """Check the action of a choice in an exclusive group without running its command."""
         self[name].setChecked(True)
 
@@ -123,7 +123,7 @@ class Actions:
 
         A mnemonic (Alt with a letter of its title) opens each menu. Names of submenus are like "View/Look".
         """
-        titles = marked([_(name) for name in menus])
+        titles = with_mnemonics([_(name) for name in menus])
         made = {name: Menu(self._theme, bar, title) for name, title in zip(menus, titles, strict=True)}
         for menu in made.values():
             bar.addMenu(menu)
@@ -131,12 +131,12 @@ class Actions:
             if not command.menu:
                 continue
             place = command.menu
-            if command.under:
-                place = f"{command.menu}/{command.under}"
+            if command.submenu:
+                place = f"{command.menu}/{command.submenu}"
                 if place not in made:
-                    made[place] = Menu(self._theme, made[command.menu], _(command.under))
+                    made[place] = Menu(self._theme, made[command.menu], _(command.submenu))
                     made[command.menu].addMenu(made[place])
-            if command.above:
+            if command.separator_above:
                 made[place].addSeparator()
             made[place].addAction(self._actions[command.id])
         return made

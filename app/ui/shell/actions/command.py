@@ -20,7 +20,7 @@ class UnknownCommandError(LookupError):
         self.name = name
 
 
-def _always(_do: object) -> str:
+def _always_available(_do: object) -> str:
     return ""
 
 
@@ -54,26 +54,26 @@ class Command(Generic[T]):
     keys: tuple[str, ...] = ()
     icon: str | None = None
     tip: str = ""
-    under: str = ""
+    submenu: str = ""
     group: str = ""
-    above: bool = False
-    everywhere: bool = False
-    check: bool = False
-    mac: tuple[str, ...] = ()
+    separator_above: bool = False
+    in_all_windows: bool = False
+    is_checkable: bool = False
+    mac_keys: tuple[str, ...] = ()
     in_palette: bool = True
     in_shortcuts: bool = True
-    why_not: Callable[[T], str] = _always
+    disabled_reason: Callable[[T], str] = _always_available
     number: int | None = None
-    shows: str = ""
+    displayed_key: str = ""
 
     @property
-    def words(self) -> str:
+    def label(self) -> str:
         """Translated text of the command."""
         return _(self.text).format(number=self.number)
 
-    def keys_at_first(self, platform: str = sys.platform) -> tuple[str, ...]:
+    def default_keys(self, platform: str = sys.platform) -> tuple[str, ...]:
         """Return the default keys on a platform. The first one is shown in menus."""
-        return self.mac if platform == "darwin" and self.mac else self.keys
+        return self.mac_keys if platform == "darwin" and self.mac_keys else self.keys
 
 
 @dataclass(frozen=True)

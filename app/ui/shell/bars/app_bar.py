@@ -10,13 +10,13 @@ from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QWidget
 
 from app.core.robots.robot_link import CONNECTING, RobotLink
-from app.core.run.view import connected_words
+from app.core.run.view import connected_text
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.logo import Logo
 from app.ui.shell.bars.menu_bar import MenuBar
 from app.ui.shell.docking.layouts import Layout
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import shortcut_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Chip, IconButton, Segments, StopButton, paint
@@ -25,9 +25,9 @@ from nep.i18n import _, lazy, ngettext
 
 FIELD_WIDTH, FIELD_HEIGHT, LEFT, ICON, GAP = 248, 28, 10, 14, 9
 EDGE = 12
-DIRECT = Qt.FindChildOption.FindDirectChildrenOnly
+DIRECT_CHILDREN = Qt.FindChildOption.FindDirectChildrenOnly
 MIN_TEXT_WIDTH = 44  # minimum text width of the palette field in px; below it only icon and key are shown
-CHIP_WORDS = {
+CHIP_TEXTS = {
     "ready": lazy("{robot} ready"),
     "busy": lazy("{robot} moving"),
     "away": lazy("{robot} not running"),
@@ -41,7 +41,7 @@ CHIP_WORDS = {
 class AppBar(QWidget):
     """Bar with the menus at the left, the layout switch in the middle and the robots at the right."""
 
-    layout_chosen = Signal(str)
+    layout_selected = Signal(str)
 
     def __init__(self, theme: Theme, layouts: Sequence[Layout], platform: str = sys.platform) -> None:
         # `platform` is a value of `sys.platform`.
@@ -57,7 +57,7 @@ class AppBar(QWidget):
         self.switch = Segments(
             theme, [(layout.name, _(layout.title), layout.icon) for layout in layouts], name=_("Layout")
         )
-        self.switch.changed.connect(self.layout_chosen)
+        self.switch.changed.connect(self.layout_selected)
         self.home = IconButton(theme, "house", _("Start page"))
         self.back = IconButton(theme, "arrow-left", _("Back to your work"), "Esc")
         self.search = PaletteField(theme)
@@ -108,28 +108,30 @@ class AppBar(QWidget):
     def _fit(self) -> None:
         # Shrinks in this order if the menus lack room: texts of the switch, the chip, the key of the field.
         for bare in range(4):
-            self.switch.set_bare(bare > 0)
-            self.chip.set_bare(bare > 1)
-            self.search.set_bare(bare > 2)
-            if self._needed() <= self.width():
+            self.switch.set_icon_only(bare > 0)
+            self.chip.set_icon_only(bare > 1)
+            self.search.set_icon_only(bare > 2)
+            if self._needed_width() <= self.width():
                 break
         taken = 0 if self.switch.isHidden() else self.switch.sizeHint().width() + EDGE
         half = (self.width() - 2 * EDGE - taken - EDGE) / 2
         self._grid.setColumnStretch(2, int(self._halves[1].sizeHint().width() <= half))
 
-    def _needed(self) -> int:
-        parts = [part for half in self._halves for part in half.findChildren(QWidget, options=DIRECT)]
-        wide = sum(self._least(part) + GAP for part in (self.switch, *parts) if not part.isHidden())
+    def _needed_width(self) -> int:
+        parts = [
+            part for half in self._halves for part in half.findChildren(QWidget, options=DIRECT_CHILDREN)
+        ]
+        wide = sum(self._min_width(part) + GAP for part in (self.switch, *parts) if not part.isHidden())
         return wide + 2 * EDGE
 
-    def _least(self, part: QWidget) -> int:
+    def _min_width(self, part: QWidget) -> int:
         if part is self.menus:
             return 0 if self.native else part.sizeHint().width()
         if part is self.switch:
             return part.sizeHint().width()
         return max(part.minimumSizeHint().width(), part.minimumWidth())
 
-    def use(self, actions: Actions) -> None:
+    def set_actions(self, actions: Actions) -> None:
         """Connect the buttons to the actions."""
         actions.bind(self.home, "file.start_page")
         self.back.clicked.connect(actions["start_page.leave"].trigger)
@@ -177,7 +179,7 @@ class PaletteField(PaintedButton):
         self._bare = False
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
-    def set_bare(self, bare: bool) -> None:
+    def set_icon_only(self, bare: bool) -> None:
         """Show only the icon (and key), or the text too where it fits."""
         if bare != self._bare:
             self._bare = bare
@@ -186,7 +188,7 @@ class PaletteField(PaintedButton):
 
     def show_key(self, key: str) -> None:
         """Show the key that opens the palette; "" for none."""
-        self._key = spoken_key(key)
+        self._key = shortcut_text(key)
         self.updateGeometry()
         self.update()
 
@@ -219,7 +221,7 @@ class PaletteField(PaintedButton):
         if room >= self._theme.scaled(MIN_TEXT_WIDTH):
             area = QRectF(left, 0, room, rect.height())
             whole = paint.width_of(font, self.text()) <= room
-            paint.words(
+            paint.text_line(
                 painter, area, self.text() if whole else _("Find"), font, theme.colour("textSecondary")
             )
         if self._key and not self._bare:
@@ -230,15 +232,15 @@ def robots_chip(session: Session) -> tuple[str, str]:
     """Return text and status of the robot chip, such as "Pepper ready", "2 robots" or "No robot"."""
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
-        coming = session.coming
-        return (connected_words((), coming), "running") if coming else (_("No robot"), "off")
+        coming = session.starting_robots
+        return (connected_text((), coming), "running") if coming else (_("No robot"), "off")
     moving = [link for link in links if link.state == "not stopped"]
     if moving:
         first, others = moving[0], len(moving) - 1
         words = _("{robot}: {state}")
         if others:
             words = ngettext("{robot} and {count} more: {state}", "{robot} and {count} more: {state}", others)
-        return words.format(robot=first.name, count=others, state=first.state_words), "error"
+        return words.format(robot=first.name, count=others, state=first.state_label), "error"
     stopping = [link for link in links if link.state == "stopping"]
     if stopping:
         if len(stopping) == 1:
@@ -257,11 +259,11 @@ def robots_chip(session: Session) -> tuple[str, str]:
     status = "off" if any(link.state == CONNECTING for link in links) else "ok"
     if len(links) > 1:
         return ngettext("{count} robot", "{count} robots", len(links)).format(count=len(links)), status
-    return _doing(session, links[0]), status
+    return _robot_text(session, links[0]), status
 
 
-def _doing(session: Session, link: RobotLink) -> str:
+def _robot_text(session: Session, link: RobotLink) -> str:
     state: str = link.state
     if session.runs.active:
         state = "paused" if session.runs.view().state == "paused" else "running"
-    return _(CHIP_WORDS[state]).format(robot=link.name)
+    return _(CHIP_TEXTS[state]).format(robot=link.name)

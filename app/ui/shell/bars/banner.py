@@ -22,10 +22,10 @@ from app.ui.widgets.buttons import Button, IconButton, Size
 from app.ui.widgets.cards import AlertBox
 from nep.i18n import _, ngettext
 
-FIGURES = re.compile(r"\d+")
+DIGITS = re.compile(r"\d+")
 MIN_WIDTH = 140  # px at 100 % text; below it only the status bar shows alerts
 MIN_TEXT_WIDTH = 160  # px at 100 % text; below it the next step is only an icon
-FONTS = ("bodyLarge", "body", "small")
+TEXT_KINDS = ("bodyLarge", "body", "small")
 MIN_TALL_HEIGHT = 44  # px at 100 % text; lower banners have small buttons
 STEP_ICONS = {
     "help.doctor": "stethoscope",
@@ -34,7 +34,7 @@ STEP_ICONS = {
     "file.open": "folder-open",
 }
 NEXT_ICON = "arrow-right"
-FRESH_S = 0.5
+CLICK_GUARD_S = 0.5
 """Time in s for which a banner that appears under the mouse passes clicks on to the widget below."""
 
 
@@ -66,7 +66,7 @@ class AlertLike(Protocol):
         """Name of the action for the next step."""
 
 
-class BannerWords(QWidget):
+class BannerText(QWidget):
     """Title in bold and detail, wrapped to the available lines; the tooltip has the full text."""
 
     def __init__(self, theme: Theme) -> None:
@@ -76,7 +76,7 @@ class BannerWords(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         theme.changed.connect(self.update)
 
-    def show_words(self, title: str, detail: str) -> None:
+    def show_text(self, title: str, detail: str) -> None:
         """Set title and detail."""
         if (title, detail) != (self._title, self._detail):
             self._title, self._detail = title, detail
@@ -92,14 +92,14 @@ class BannerWords(QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
         # the largest font in which the full text fits, else the smallest one
-        kind = next((each for each in FONTS if self.lines(each)[1]), FONTS[-1])
+        kind = next((each for each in TEXT_KINDS if self.lines(each)[1]), TEXT_KINDS[-1])
         lines, high = self.lines(kind)[0], paint.height_of(self._theme.font(kind))
         top = (self.height() - high * len(lines)) / 2
         for line in lines:
             left = 0.0
             for text, font, role in line:
                 area = QRectF(left, top, self.width() - left, high)
-                paint.words(painter, area, text, font, self._theme.colour(role))
+                paint.text_line(painter, area, text, font, self._theme.colour(role))
                 left += paint.width_of(font, text + " ")
             top += high
         painter.end()
@@ -120,7 +120,7 @@ class BannerWords(QWidget):
         ):
             rest = sentence.split()
             while rest:
-                fitting = _fitting(font, rest, self.width() - left)
+                fitting = _fitting_word_count(font, rest, self.width() - left)
                 if fitting < len(rest) and len(lines) == rows:
                     lines[-1].append((" ".join(rest), font, role))
                     return lines, False
@@ -137,7 +137,7 @@ class BannerWords(QWidget):
         return lines, True
 
 
-def _fitting(font: QFont, words: Sequence[str], width: float) -> int:
+def _fitting_word_count(font: QFont, words: Sequence[str], width: float) -> int:
     count = len(words)
     while count and paint.width_of(font, " ".join(words[:count])) > width:
         count -= 1
@@ -161,12 +161,12 @@ class Banner(AlertBox):
         self._step = ""
         self._icon: str | None = None
         self._announced = ""
-        self.words = BannerWords(theme)
+        self.words = BannerText(theme)
         self.more = Button(theme, "", kind="ghost", size="small")
         self.button = Button(theme, "", size="form")
         self.second = Button(theme, "", size="form")
         for button in (self.button, self.second):
-            button.let_shrink()
+            button.allow_shrinking()
         self.close_button = IconButton(theme, "x", _("Dismiss"), size=26)
         self.text_column.addWidget(self.words)
         for widget in (self.more, self.second, self.button, self.close_button):
@@ -176,7 +176,7 @@ class Banner(AlertBox):
         self.more.clicked.connect(self.more_pressed)
         self.close_button.clicked.connect(self.closed)
 
-    def show_words(
+    def show_text(
         self,
         status: str,
         title: str,
@@ -190,15 +190,15 @@ class Banner(AlertBox):
         """Set the contents; ``others`` is the number of further alerts."""
         self._icon = self.button.icon_name = icon
         self.set_status(status)
-        self.words.show_words(title, detail)
+        self.words.show_text(title, detail)
         spoken = f"{title} {detail}".strip()
         self.setAccessibleName(spoken)
-        news = FIGURES.sub("", spoken)
+        news = DIGITS.sub("", spoken)
         if news != self._announced:  # changes of numbers alone aren't announced again
             self._announced = news
             paint.announce(self, spoken)
         self._step, self._others = button or "", others
-        self.second.set_word(second or "")
+        self.second.set_label(second or "")
         for widget, shown in ((self.button, button), (self.second, second), (self.more, others)):
             paint.show_when(widget, bool(shown))
         self._fit()
@@ -222,9 +222,9 @@ class Banner(AlertBox):
         taken = sum(width + self.gap for button, width in beside if not button.isHidden())
         room = self.width() - self.left - self.close_button.sizeHint().width() - self.gap - taken
         is_narrow = room < scaled(MIN_TEXT_WIDTH)
-        self.more.set_word(f"+{self._others}" if is_narrow else count, name=count)
+        self.more.set_label(f"+{self._others}" if is_narrow else count, name=count)
         self.button.icon_name = NEXT_ICON if is_narrow and self._icon is None else self._icon
-        self.button.set_word("" if is_narrow else self._step, name=self._step)
+        self.button.set_label("" if is_narrow else self._step, name=self._step)
         self.button.setToolTip(plain.tip(self._step if is_narrow else ""))
 
     def icon_top(self) -> float:
@@ -260,7 +260,7 @@ class AlertBanner(QWidget):
         row.addWidget(self.banner)
         self.banner.pressed.connect(self._next_step)
         self.banner.second_pressed.connect(lambda: self._answer(1))
-        self.banner.more_pressed.connect(self._more)
+        self.banner.more_pressed.connect(self._show_more)
         self.banner.closed.connect(self._close)
         self.banner.mouse_left.connect(lambda: self.show_alerts(self._alerts))
         self.hide()
@@ -278,7 +278,7 @@ class AlertBanner(QWidget):
         return self._alert
 
     @property
-    def offers(self) -> bool:
+    def has_offer(self) -> bool:
         """True while an offer waits for a choice."""
         return self._offer is not None
 
@@ -291,7 +291,7 @@ class AlertBanner(QWidget):
     ) -> None:
         """Show an offer with two buttons. Alerts are shown after one of them was chosen."""
         self._offer = (yes[1], no[1])
-        self.banner.show_words("info", title, detail, yes[0], second=no[0])
+        self.banner.show_text("info", title, detail, yes[0], second=no[0])
         self.show()
 
     def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
@@ -299,17 +299,17 @@ class AlertBanner(QWidget):
         self._alerts = alerts
         if self._offer is not None:
             return
-        first = self._first(alerts)
+        first = self._alert_to_show(alerts)
         self._alert = first
         if first is None:
             self.hide()
             return
         others = len(alerts) - 1
         icon = STEP_ICONS.get(first.action or "")
-        self.banner.show_words(first.severity, first.title, first.detail, first.button, others, icon=icon)
+        self.banner.show_text(first.severity, first.title, first.detail, first.button, others, icon=icon)
         self.show()
 
-    def _first(self, alerts: Sequence[AlertLike]) -> AlertLike | None:
+    def _alert_to_show(self, alerts: Sequence[AlertLike]) -> AlertLike | None:
         # Keeps the current alert while the mouse is over the banner, so that the button under it doesn't
         # change.
         shown = self._alert
@@ -341,10 +341,10 @@ class AlertBanner(QWidget):
             self.show_alerts([alert for alert in self._alerts if alert.id != closed])
             self.on_dismiss(closed)
 
-    def _more(self) -> None:
+    def _show_more(self) -> None:
         self.on_more()
 
-    def follow(self, area: QRect) -> None:
+    def move_to(self, area: QRect) -> None:
         """Move to an area of the parent. Called on every tick, because the bars change their layout.
 
         A banner that appears under the mouse ignores clicks for `FRESH_S`.
@@ -357,7 +357,7 @@ class AlertBanner(QWidget):
             self._placed = self.identity
             self.setGeometry(area)
             self.raise_()
-            self._fresh_until = self.clock() + FRESH_S if self._is_under_mouse() else 0.0
+            self._fresh_until = self.clock() + CLICK_GUARD_S if self._is_under_mouse() else 0.0
         fresh = self.clock() < self._fresh_until
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents, fresh)
 

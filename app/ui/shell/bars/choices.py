@@ -13,14 +13,14 @@ from app.ui.text import plain
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.buttons import PaintedButton
-from app.ui.widgets.keyboard import is_plain, is_pressed_key
+from app.ui.widgets.keyboard import is_activation_key, is_plain
 
 GAP = 8
 PADDING = 14
 MIN_HEIGHT = 52
 MAX_COLUMNS = 3
 NUMBER_KEYS = 9
-_WRAPPED = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+_WRAP_FLAGS = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
 
 
 class ChoiceButton(PaintedButton):
@@ -30,23 +30,23 @@ class ChoiceButton(PaintedButton):
         # `key` is "" for choices beyond the number keys.
         super().__init__(theme, words, radius="large")
         self.key = key
-        self._shown = plain.breakable(words)
+        self._shown = plain.make_breakable(words)
         self.setProperty("ownFocus", True)
 
     def _font(self) -> QFont:
         return self._theme.font("button")
 
-    def _before_words(self) -> float:
+    def _text_left(self) -> float:
         return PADDING + (paint.key_width(self._theme, self.key) + 10 if self.key else 0)
 
     def one_line_width(self) -> int:
         """Return the width in px with the text on one line."""
-        return math.ceil(self._before_words() + paint.width_of(self._font(), self.text()) + PADDING) + 1
+        return math.ceil(self._text_left() + paint.width_of(self._font(), self.text()) + PADDING) + 1
 
     def height_for(self, width: int) -> int:
         """Return the height in px that is needed for a width."""
-        room = QRectF(0, 0, max(1.0, width - self._before_words() - PADDING), 1e6)
-        needed = QFontMetricsF(self._font()).boundingRect(room, _WRAPPED, self._shown).height()
+        room = QRectF(0, 0, max(1.0, width - self._text_left() - PADDING), 1e6)
+        needed = QFontMetricsF(self._font()).boundingRect(room, _WRAP_FLAGS, self._shown).height()
         return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(needed) + 2 * PADDING)
 
     def sizeHint(self) -> QSize:
@@ -58,7 +58,7 @@ class ChoiceButton(PaintedButton):
 
         Other keys, including those that Qt's buttons handle, are left to `Choices`.
         """
-        if is_pressed_key(event.key()):
+        if is_activation_key(event.key()):
             super().keyPressEvent(event)
         else:
             event.ignore()
@@ -77,14 +77,14 @@ class ChoiceButton(PaintedButton):
             paint.key_cap(painter, theme, right, rect.center().y(), self.key)
         painter.setFont(self._font())
         painter.setPen(role("text" if self.isEnabled() else "textDisabled"))
-        painter.drawText(rect.adjusted(self._before_words(), 0, -PADDING, 0), _WRAPPED, self._shown)
+        painter.drawText(rect.adjusted(self._text_left(), 0, -PADDING, 0), _WRAP_FLAGS, self._shown)
 
 
 class Choices(QWidget):
     """Buttons for the choices of one question, in as many columns as fit with each text on one line."""
 
-    chosen = Signal(str)
-    reached = Signal(QWidget)
+    selected = Signal(str)
+    focus_moved = Signal(QWidget)
     """Emitted when an arrow key moved the focus to a button, which may have to be scrolled into view."""
 
     def __init__(self, theme: Theme) -> None:
@@ -103,19 +103,19 @@ class Choices(QWidget):
         self.buttons = []
         for number, words in enumerate(choices, 1):
             button = ChoiceButton(self._theme, words, str(number) if number <= NUMBER_KEYS else "")
-            button.clicked.connect(lambda _on=False, words=words: self.chosen.emit(words))
+            button.clicked.connect(lambda _on=False, words=words: self.selected.emit(words))
             button.setParent(self)
             button.show()
             self.buttons.append(button)
         self._arrange()
         self.updateGeometry()
 
-    def take_keyboard(self) -> None:
+    def take_focus(self) -> None:
         """Focus the first choice."""
         if self.buttons:
             self.buttons[0].setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def hold(self, *, held: bool) -> None:
+    def set_paused(self, *, held: bool) -> None:
         """Disable or enable all choices."""
         for button in self.buttons:
             button.setEnabled(not held)
@@ -126,7 +126,7 @@ class Choices(QWidget):
         fitting = (width - GAP) // (widest + GAP)
         return max(1, min(MAX_COLUMNS, len(self.buttons), fitting))
 
-    def places(self, width: int) -> list[QRect]:
+    def button_rects(self, width: int) -> list[QRect]:
         """Return the rectangles of the buttons for a width. The buttons of a row have equal heights."""
         columns = self.columns(width)
         wide = (width - GAP) // columns - GAP
@@ -140,7 +140,7 @@ class Choices(QWidget):
         return found
 
     def heightForWidth(self, width: int) -> int:
-        places = self.places(width)
+        places = self.button_rects(width)
         return places[-1].bottom() + 1 if places else 0
 
     def hasHeightForWidth(self) -> bool:
@@ -158,10 +158,10 @@ class Choices(QWidget):
         self._arrange()
 
     def _arrange(self) -> None:
-        for button, place in zip(self.buttons, self.places(max(60, self.width())), strict=True):
+        for button, place in zip(self.buttons, self.button_rects(max(60, self.width())), strict=True):
             button.setGeometry(place)
 
-    def press(self, event: QKeyEvent) -> bool:
+    def handle_key(self, event: QKeyEvent) -> bool:
         """Move the focus by an arrow key, or choose by a number key. Return True if the key was handled."""
         key = event.key()
         number = key - Qt.Key.Key_1
@@ -180,9 +180,9 @@ class Choices(QWidget):
         here = next((place for place, each in enumerate(self.buttons) if each.hasFocus()), 0)
         there = min(max(here + steps[Qt.Key(key)], 0), len(self.buttons) - 1)
         self.buttons[there].setFocus(Qt.FocusReason.OtherFocusReason)
-        self.reached.emit(self.buttons[there])
+        self.focus_moved.emit(self.buttons[there])
         return True
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if not self.press(event):
+        if not self.handle_key(event):
             super().keyPressEvent(event)

@@ -6,18 +6,18 @@ from PySide6.QtCore import QEvent, QObject, QSize
 from PySide6.QtGui import QColor
 
 from app.core.recording.recordings import SessionRecordings
-from app.core.recording.replay.scale import span_words
+from app.core.recording.replay.scale import duration_text
 from app.core.session import Session
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.bars.run_bar import ToolBar
 from app.ui.shell.commands.commands import Commands
-from app.ui.shell.commands.freeze import all_frozen, freezable
+from app.ui.shell.commands.freeze import all_frozen, freeze_buttons
 from app.ui.shell.commands.shell import Shell
 from app.ui.text import plain
-from app.ui.text.numbers import length_words, size_words
+from app.ui.text.numbers import length_text, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, MenuButton, Separator, ToggleButton, name_command, paint
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
 FREEZE, RECORD, KEEP = "view.freeze", "recording.toggle", "recording.keep"
@@ -25,7 +25,7 @@ REFRESH_HALF_TICKS = 8  # refresh interval in half ticks
 RECORD_PX = 146  # fixed width of the record button, so that nothing moves when a recording starts
 KEEP_ROOM_PX = 1340  # width of the whole bar at 100 % text
 ROOM_PX = 940  # width without Keep, which has a shortcut
-WORDS_ROOM_PX = 680  # below this the record button shows only its dot
+RECORD_TEXT_ROOM_PX = 680  # below this the record button shows only its dot
 FREEZE_ROOM_PX = 548
 RECORD_ROOM_PX = 520  # below this the result of a stop would be cut
 SOURCE_ROOM_PX = 1120  # width with the source switch, which is also in the File menu
@@ -40,27 +40,27 @@ class RecordButton(Button):
         self.icon_role = "error"
         self._is_on = self._is_bare = False
 
-    def set_bare(self, bare: bool) -> None:
+    def set_icon_only(self, bare: bool) -> None:
         """Show only the dot if `bare`, else the text too."""
         if bare != self._is_bare:
             self._is_bare = bare
             self.updateGeometry()
             self.update()
 
-    def shown_word(self) -> str:
+    def displayed_text(self) -> str:
         return "" if self._is_bare else self.text()
 
     def show_recording(self, recordings: SessionRecordings) -> None:
         """Show the state of the current recording."""
         self._is_on = recordings.is_recording
         if not self._is_on:
-            self.set_word(_("Record"))
+            self.set_label(_("Record"))
             return
-        length = length_words(recordings.elapsed_s)
-        size = size_words(recordings.client.state.size_bytes)
+        length = length_text(recordings.elapsed_s)
+        size = size_text(recordings.client.state.size_bytes)
         words = _("{length}, {size}").format(length=length, size=size)
         if words != self.text():
-            self.set_word(words)
+            self.set_label(words)
             self.setAccessibleName(_("Recording"))
 
     def sizeHint(self) -> QSize:
@@ -87,9 +87,9 @@ class SourceSwitch(MenuButton):
         self._is_recording = False
         self.back = Button(theme, _("Back to live"), LIVE_ICON, size="small")
         for button in (self, self.back):
-            button.let_shrink()
+            button.allow_shrinking()
         actions.bind(self.back, "replay.live")
-        self.clicked.connect(self._drop)
+        self.clicked.connect(self._open_menu)
 
     @property
     def is_recording(self) -> bool:
@@ -101,16 +101,16 @@ class SourceSwitch(MenuButton):
         replay = self._session.replay
         self._is_recording = replay is not None
         if replay is None:
-            self.set_word(_("Live network"), LIVE_ICON)
+            self.set_label(_("Live network"), LIVE_ICON)
             return
         there = replay.opened is not None
-        length = span_words(replay.end_ns - replay.start_ns, digits=0) if there else ""
-        self.set_word(f"{replay.name}  {length}".strip(), RECORDING_ICON)
+        length = duration_text(replay.end_ns - replay.start_ns, digits=0) if there else ""
+        self.set_label(f"{replay.name}  {length}".strip(), RECORDING_ICON)
 
-    def _drop(self) -> None:
+    def _open_menu(self) -> None:
         menu = Menu(self._theme, self)
         menu.addActions([self._actions["replay.open"], self._actions["replay.live"]])
-        drop_below(menu, self)
+        open_below(menu, self)
 
     def _colours(self) -> tuple[QColor | None, QColor | None, QColor]:
         if self._is_recording and self.isEnabled():
@@ -131,7 +131,7 @@ class DeveloperTools(QObject):
         self.record = RecordButton(theme)
         self.keep = Button(theme, "", "history", size="small")
         name_command(self.record, RECORD)
-        self.record.clicked.connect(commands.recording.press)
+        self.record.clicked.connect(commands.recording.start_and_open_sheet)
         self._actions.bind(self.keep, KEEP)
         self.freeze = ToggleButton(theme, _("Freeze"), "snowflake")
         self.layout = MenuButton(theme, _("Developer"), "panel-left", size="small")
@@ -139,14 +139,14 @@ class DeveloperTools(QObject):
         self.panels.setToolTip(plain.tip(_("Opens and closes panels")))
         self._actions.bind(self.freeze, FREEZE)
         self._actions[FREEZE].triggered.connect(self.refresh)
-        self.layout.clicked.connect(lambda: menus.drop_layouts(self.layout))
-        self.panels.clicked.connect(lambda: menus.drop_panels(self.panels))
+        self.layout.clicked.connect(lambda: menus.open_layout_menu(self.layout))
+        self.panels.clicked.connect(lambda: menus.open_panel_menu(self.panels))
         self._wide_only = (Separator(theme, upright=True, length=24), self.layout, self.panels)
         tools = (self.record, self.keep, self.freeze, *self._wide_only)
         for place, tool in enumerate(tools):
             bar.add_tool(tool, place)
         for button in (self.record, self.keep, self.freeze, self.layout, self.panels):
-            button.let_shrink()
+            button.allow_shrinking()
         self.source = SourceSwitch(theme, commands.session, self._actions)
         for place, tool in enumerate((self.source, self.source.back), tools.index(self.freeze) + 1):
             bar.add_tool(tool, place)
@@ -162,12 +162,12 @@ class DeveloperTools(QObject):
         shell, frozen = self._shell, all_frozen(self._shell.bench)
         self._actions[FREEZE].setChecked(frozen)
         self.freeze.setChecked(frozen)
-        self.freeze.setEnabled(bool(freezable(shell.bench)))
+        self.freeze.setEnabled(bool(freeze_buttons(shell.bench)))
         self.record.show_recording(self._recordings)
-        self.keep.set_word(_("Save last {count} s").format(count=self._recordings.wish.seconds))
-        own = shell.saved_layouts.own("developer")
+        self.keep.set_label(_("Save last {count} s").format(count=self._recordings.wish.seconds))
+        own = shell.saved_layouts.custom_name("developer")
         name = own or _("Developer")
-        self.layout.set_word(name)
+        self.layout.set_label(name)
         self.layout.setAccessibleName(_("Layout {name}").format(name=name))
 
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
@@ -184,11 +184,11 @@ class DeveloperTools(QObject):
         for tool in self._wide_only:
             paint.show_when(tool, width >= scaled(RECORDING_ROOM_PX if recording else ROOM_PX))
         paint.show_when(self.keep, width >= scaled(KEEP_ROOM_PX) and not recording)
-        self.record.set_bare(width < scaled(WORDS_ROOM_PX))
+        self.record.set_icon_only(width < scaled(RECORD_TEXT_ROOM_PX))
         paint.show_when(self.freeze, width >= scaled(FREEZE_ROOM_PX))
         paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))
 
-    def follow(self) -> None:
+    def on_half_tick(self) -> None:
         """Refresh the tools every few half ticks while the bar is visible."""
         self._ticks += 1
         if self._ticks % REFRESH_HALF_TICKS == 0 and self._bar.isVisible():

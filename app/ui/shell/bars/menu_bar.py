@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QMenuBar, QWidget
 
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
-from app.ui.widgets.letters import plain_words
+from app.ui.widgets.letters import strip_mnemonic
 
 
 class _Alt(QObject):
@@ -36,10 +36,10 @@ class MenuBar(QMenuBar):
         self._theme = theme
         self._shows_letters = False
         self._alt = _Alt(self)
-        self._alt.held.connect(self._show_letters)
+        self._alt.held.connect(self._show_mnemonics)
 
     @property
-    def shows_letters(self) -> bool:
+    def shows_mnemonics(self) -> bool:
         """True while the mnemonics are underlined."""
         return self._shows_letters
 
@@ -51,7 +51,7 @@ class MenuBar(QMenuBar):
             window.removeEventFilter(self._alt)
             window.installEventFilter(self._alt)
 
-    def _show_letters(self, shown: bool) -> None:
+    def _show_mnemonics(self, shown: bool) -> None:
         if shown != self._shows_letters:
             self._shows_letters = shown
             self.update()
@@ -65,7 +65,7 @@ class MenuBar(QMenuBar):
         painter.end()
 
     def _paint_entry(self, painter: QPainter, place: QRectF, action: QAction) -> None:
-        theme, font, said = self._theme, self.font(), plain_words(action.text())
+        theme, font, said = self._theme, self.font(), strip_mnemonic(action.text())
         chosen, menu = action is self.activeAction(), action.menu()
         if chosen:
             is_open = isinstance(menu, QWidget) and menu.isVisible()
@@ -74,7 +74,7 @@ class MenuBar(QMenuBar):
         ink = theme.colour("text" if chosen else "textSecondary")
         wide, metrics = paint.width_of(font, said), QFontMetricsF(font)
         left = place.center().x() - wide / 2
-        paint.words(painter, QRectF(left, place.top(), wide + 1, place.height()), said, font, ink)
+        paint.text_line(painter, QRectF(left, place.top(), wide + 1, place.height()), said, font, ink)
         letter = action.text().find("&")
         if letter >= 0 and (self._shows_letters or self.hasFocus()):
             start = left + paint.width_of(font, said[:letter])

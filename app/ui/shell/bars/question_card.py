@@ -19,10 +19,10 @@ from shiboken6 import isValid
 from app.core.run.asking import AskedQuestion
 from app.ui.shell.bars.choices import GAP, Choices
 from app.ui.shell.bars.floating_card import FloatingCard
-from app.ui.shell.dialogs.overlay import stops_in
+from app.ui.shell.dialogs.overlay import stop_buttons_in
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
-from app.ui.widgets.lists.scroll_areas import Scrolled
+from app.ui.widgets.lists.scroll_areas import ContentScrollArea
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
@@ -51,11 +51,11 @@ class QuestionCard(FloatingCard):
         self.field.setProperty("focusRadius", theme.radius("control"))
         EditMenu(theme, self.field)
         self.button = Button(theme, _("Answer"), kind="primary", size="form")
-        self.button.clicked.connect(self._done)
+        self.button.clicked.connect(self._submit)
         self.choices = Choices(theme)
-        self.choices.chosen.connect(self._send)
-        self._offered = Scrolled(self.choices)
-        self.choices.reached.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
+        self.choices.selected.connect(self._send)
+        self._offered = ContentScrollArea(self.choices)
+        self.choices.focus_moved.connect(lambda button: self._offered.ensureWidgetVisible(button, 0, GAP))
         self._hint = label(_("Press Resume first"), "small", role="textSecondary")
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # receives the keys while the card is disabled
         row = QHBoxLayout()
@@ -83,14 +83,14 @@ class QuestionCard(FloatingCard):
         if question != self._question:
             self._question = question
             if question is None:
-                self._leave()
+                self._close()
             else:
                 self._open(question)
         if question is not None and held != self._held:
-            self._hold(held=held)
+            self._set_paused(held=held)
 
     def _open(self, question: AskedQuestion) -> None:
-        words = question.words.strip() or _("The behaviour has a question")
+        words = question.text.strip() or _("The behaviour has a question")
         self.words.setText(words)
         self.setAccessibleName(words)
         self.field.setAccessibleName(words)
@@ -104,43 +104,43 @@ class QuestionCard(FloatingCard):
         self._offered.setVisible(not typed)
         if not self.isVisible():
             self._before = QApplication.focusWidget()
-        self._hold(held=False)
+        self._set_paused(held=False)
         self.show()
         self.place()
         self.raise_()
-        self.take_keyboard()
+        self.take_focus()
         paint.announce(self, ", ".join((words, *question.choices)))
 
-    def take_keyboard(self) -> None:
+    def take_focus(self) -> None:
         """Take the focus if there is a question and the card is enabled."""
         if self._question is None or self._held:
             return
         if self.choices.buttons:
-            self.choices.take_keyboard()
+            self.choices.take_focus()
         else:
             self.field.setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def _leave(self) -> None:
-        inside = self._has_keyboard()
+    def _close(self) -> None:
+        inside = self._has_focus()
         before, self._before = self._before, None
         if inside and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
         self.hide()
 
-    def _has_keyboard(self) -> bool:
+    def _has_focus(self) -> bool:
         focus = QApplication.focusWidget()
         return focus is not None and (focus is self or self.isAncestorOf(focus))
 
-    def _hold(self, *, held: bool) -> None:
-        had = self._has_keyboard()
+    def _set_paused(self, *, held: bool) -> None:
+        had = self._has_focus()
         self._held = held
         if had and held and self.choices.buttons:
             # Otherwise Qt would move the focus from the disabled widget to the next one in the window.
             self.setFocus(Qt.FocusReason.OtherFocusReason)
-        self.choices.hold(held=held)
+        self.choices.set_paused(held=held)
         self._hint.setVisible(held and bool(self.choices.buttons))
         if had and not held and self.hasFocus():
-            self.choices.take_keyboard()
+            self.choices.take_focus()
         self.field.setReadOnly(held)
         self.field.setPlaceholderText(_("Press Resume first") if held else "")
         self.button.setEnabled(not held)
@@ -155,16 +155,16 @@ class QuestionCard(FloatingCard):
         wanted = WIDTH_WITH_CHOICES if self.choices.buttons else WIDTH
         wide = min(window.width() - 2 * MARGIN, round(self._theme.scaled(wanted)))
         left = (window.width() - wide) // 2
-        top, lowest = self._free(window, left, wide)
+        top, lowest = self._free_range(window, left, wide)
         needed = max(layout.totalHeightForWidth(wide), layout.minimumSize().height())
         bottom = min(lowest, max(round(window.height() * BOTTOM_SHARE), top + needed))
         high = min(needed, bottom - top)
         self.setGeometry(left, bottom - high, wide, high)
 
-    def _free(self, window: QWidget, left: int, wide: int) -> tuple[int, int]:
+    def _free_range(self, window: QWidget, left: int, wide: int) -> tuple[int, int]:
         # Vertical range between the Stop buttons above and below the card.
         middle, top, bottom = window.height() // 2, MARGIN, window.height() - MARGIN
-        for each in stops_in(window):
+        for each in stop_buttons_in(window):
             stop = QRect(each.mapTo(window, QPoint()), each.size())
             if stop.right() < left or stop.left() > left + wide:
                 continue
@@ -175,16 +175,16 @@ class QuestionCard(FloatingCard):
         return top, bottom
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if self.choices.press(event):
+        if self.choices.handle_key(event):
             return
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and not self.choices.buttons:
-            self._done()
+            self._submit()
         elif event.key() == Qt.Key.Key_Escape:
             self._send("")
         else:
             super().keyPressEvent(event)
 
-    def _done(self) -> None:
+    def _submit(self) -> None:
         self._send(self.field.text())
 
     def _send(self, words: str) -> None:

@@ -15,16 +15,16 @@ from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, IconButton, RunButton, Separator, StopButton, label, paint
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
 PACES = ("run.full_speed", "run.slow", "run.very_slow")
 ROOM_PX = 960  # width of the bar at 100 % text
 SENTENCE_PX, RESULT_PX = 190, 230  # at 100 % text: room for the state and for a result
 MIN_RESULT_PX = 110  # minimum width of a successful result; it is elided to this
-EDGES_PX = 150  # speed button, mark and the gaps between all items
+FIXED_ITEMS_PX = 150  # speed button, mark and the gaps between all items
 MIN_TEXT_WIDTH_PX = 600  # below this even Run is an icon, so that the result of a stop isn't cut
-MIN_SENTENCE_PX = 30  # px at 100 % text
+MIN_STATE_TEXT_PX = 30  # px at 100 % text
 WIDE_SENTENCE_PX, SENTENCE_SHARE = 300, 0.2  # at 100 % text, and share of the bar: state next to an alert
 BANNER_PX = 300  # at 100 % text; with less room an alert also covers the state of the tool bar
 BANNER_EDGE, GAP = 3, 8
@@ -87,7 +87,7 @@ class Mark(QWidget):
         painter.end()
 
 
-class Sentence(QWidget):
+class StateText(QWidget):
     """Text of the current state, with a title and a detail."""
 
     def __init__(self, theme: Theme) -> None:
@@ -98,7 +98,7 @@ class Sentence(QWidget):
         self._shared_px: float | None = None
         theme.changed.connect(self.updateGeometry)
 
-    def keep_to(self, width: float | None) -> None:
+    def limit_width(self, width: float | None) -> None:
         """Limit the text to a width, because an alert covers the rest. None removes the limit."""
         if width != self._shared_px:
             self._shared_px = width
@@ -109,7 +109,7 @@ class Sentence(QWidget):
         """Colour role of the title: the error colour if the user has to act."""
         return self._theme.status("error").colour if self._is_alarm else "text"
 
-    def show_words(self, title: str, detail: str, *, is_alarm: bool = False) -> None:
+    def show_text(self, title: str, detail: str, *, is_alarm: bool = False) -> None:
         """Set title and detail. With ``is_alarm`` the title is red because the user has to act."""
         if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
             self._title, self._detail, self._is_alarm = title, detail, is_alarm
@@ -137,14 +137,14 @@ class Sentence(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         width = self.width() if self._shared_px is None else min(self.width(), self._shared_px)
-        if width < self._theme.scaled(MIN_SENTENCE_PX):
+        if width < self._theme.scaled(MIN_STATE_TEXT_PX):
             return  # too narrow to be readable; the tooltip and screen readers have the full text
         painter = QPainter(self)
         lines = self.lines(width)
         top = (self.height() - sum(paint.height_of(font) for _text, font, _role in lines)) / 2
         for text, font, role in lines:
             high = paint.height_of(font)
-            paint.words(painter, QRectF(0, top, width, high), text, font, self._theme.colour(role))
+            paint.text_line(painter, QRectF(0, top, width, high), text, font, self._theme.colour(role))
             top += high
         painter.end()
 
@@ -164,7 +164,7 @@ class Sentence(QWidget):
         return [*title, *((line, small, quiet) for line in paint.two_lines(small, self._detail, width))]
 
 
-class Result(QWidget):
+class StopResult(QWidget):
     """Result of the last Stop: confirmed, pending or unanswered; during a run, a reminder of it."""
 
     def __init__(self, theme: Theme, *, compact: bool = False) -> None:
@@ -182,7 +182,7 @@ class Result(QWidget):
         return self._text
 
     @property
-    def look(self) -> str:
+    def appearance(self) -> str:
         """Style: "ok", "off", "error", "counting", "reminder" or ""."""
         return self._look
 
@@ -242,7 +242,7 @@ class Result(QWidget):
         rect = QRectF(self.rect())
         if self._look == "counting":
             area, ink = rect.adjusted(0, 0, -8, 0), theme.colour("textSecondary")
-            paint.words(painter, area, self._text, self._font(), ink, paint.RIGHT)
+            paint.text_line(painter, area, self._text, self._font(), ink, paint.RIGHT)
         elif self._look == "reminder":
             self._paint_reminder(painter, rect)
         else:
@@ -256,7 +256,7 @@ class Result(QWidget):
         theme = self._theme
         high = paint.height_of(theme.font("body"))
         upper = QRectF(rect.left(), rect.center().y() - high - 1, rect.width(), high)
-        paint.words(
+        paint.text_line(
             painter, upper, _("Last stop"), theme.font("body"), theme.colour("textSecondary"), paint.RIGHT
         )
         self._paint_line(painter, QRectF(rect.left(), rect.center().y() + 1, rect.width(), high))
@@ -268,7 +268,7 @@ class Result(QWidget):
         square = QRectF(rect.left(), rect.center().y() - side / 2, side, side)
         paint_icon(painter, square, status.icon, theme.colour(status.colour))
         left = side + (6 if self._compact or self._look == "reminder" else 10)
-        paint.words(
+        paint.text_line(
             painter, rect.adjusted(left, 0, 0, 0), self._text, self._font(), theme.colour(status.colour)
         )
 
@@ -308,18 +308,18 @@ class RunBar(Bar):
         self.pace = IconButton(theme, "gauge", _("Speed"), checkable=True, size=36)
         self._paces = Menu(theme, self, _("Speed"))
         self.mark = Mark(theme)
-        self.sentence = Sentence(theme)
-        self.result = Result(theme)
+        self.sentence = StateText(theme)
+        self.result = StopResult(theme)
         self.confirm = Button(theme, "", size="large")
         self.confirm.hide()
-        self.confirm.let_shrink(96)
+        self.confirm.allow_shrinking(96)
         self.restart = Button(theme, _("Restart"), "rotate-ccw", size="large")
         self.restart.hide()
-        self.restart.let_shrink(96)
+        self.restart.allow_shrinking(96)
         self.stop = StopButton(theme)
         self._fitted: RunView | None = None
         self._build(theme)
-        self.pace.clicked.connect(lambda: drop_below(self._paces, self.pace))
+        self.pace.clicked.connect(lambda: open_below(self._paces, self.pace))
         theme.changed.connect(self._fit)
 
     def _build(self, theme: Theme) -> None:
@@ -341,9 +341,9 @@ class RunBar(Bar):
         row.addSpacing(-4)
         row.addWidget(self.stop)
 
-    def use(self, actions: Actions) -> None:
+    def set_actions(self, actions: Actions) -> None:
         """Connect the buttons to the actions and fill the menu of speeds."""
-        bind(self, actions)
+        bind_run_buttons(self, actions)
         self._paces.addActions([actions[name] for name in PACES])
 
     def banner_area(self) -> QRect:
@@ -351,19 +351,19 @@ class RunBar(Bar):
 
         The area may include the reminder of the last Stop, but no buttons and no result of Stop.
         """
-        left = self.sentence.x() + self._sentence_px() + GAP
+        left = self.sentence.x() + self._state_text_px() + GAP
         beside: list[QWidget] = [
             each for each in (self.restart, self.confirm, self.stop) if not each.isHidden()
         ]
-        if not self.result.isHidden() and self.result.look != "reminder":
+        if not self.result.isHidden() and self.result.appearance != "reminder":
             beside.append(self.result)
         return free_area(self, round(left), beside)
 
-    def share(self, *, has_banner: bool) -> None:
+    def reserve_banner_room(self, *, has_banner: bool) -> None:
         """Leave room for an alert next to the state if there is a banner."""
-        self.sentence.keep_to(self._sentence_px() if has_banner else None)
+        self.sentence.limit_width(self._state_text_px() if has_banner else None)
 
-    def _sentence_px(self) -> float:
+    def _state_text_px(self) -> float:
         # Independent of the current text, so that the alert doesn't move.
         if self.mark.state == "unanswered":
             return self.sentence.full_width()
@@ -379,36 +379,40 @@ class RunBar(Bar):
         # which may be an error.
         scaled, buttons = self._theme.scaled, (self.run, self.pause, self.step)
         words = sum(each.full_width() for each in buttons)
-        needed = words + self.stop.sizeHint().width() + EDGES_PX + scaled(SENTENCE_PX) + scaled(RESULT_PX)
+        needed = (
+            words + self.stop.sizeHint().width() + FIXED_ITEMS_PX + scaled(SENTENCE_PX) + scaled(RESULT_PX)
+        )
         bare = self.width() < max(scaled(ROOM_PX), needed)
-        self.run.set_bare(self.width() < self._theme.scaled(MIN_TEXT_WIDTH_PX))
-        self.pause.set_bare(bare)
-        self.step.set_bare(bare)
+        self.run.set_icon_only(self.width() < self._theme.scaled(MIN_TEXT_WIDTH_PX))
+        self.pause.set_icon_only(bare)
+        self.step.set_icon_only(bare)
         shown = (
             *buttons,
             self.stop,
             *(each for each in (self.restart, self.confirm) if each.isVisibleTo(self)),
         )
-        rest = self.width() - EDGES_PX - sum(each.sizeHint().width() for each in shown)
+        rest = self.width() - FIXED_ITEMS_PX - sum(each.sizeHint().width() for each in shown)
         left = max(scaled(MIN_RESULT_PX), rest - min(self.sentence.full_width(), scaled(SENTENCE_PX)))
-        self.result.setMaximumWidth(round(left) if self.result.look in {"ok", "off"} else QWIDGETSIZE_MAX)
+        self.result.setMaximumWidth(
+            round(left) if self.result.appearance in {"ok", "off"} else QWIDGETSIZE_MAX
+        )
 
     def show_view(self, view: RunView) -> None:
         """Show one of the six states. During a run, Restart replaces Run; while paused, Run is Resume."""
         restarts = view.can_restart and not view.can_run
-        self.run.set_word(_(view.run_word), "rotate-ccw" if view.run_word == RESTART else "play")
-        self.run.set_filled(view.can_run or (restarts and view.edited))
+        self.run.set_label(_(view.run_label), "rotate-ccw" if view.run_label == RESTART else "play")
+        self.run.set_filled(view.can_run or (restarts and view.is_edited))
         self.run.setEnabled(view.can_run or restarts)
-        paint.show_when(self.restart, view.edited and not restarts)
+        paint.show_when(self.restart, view.is_edited and not restarts)
         self.pause.setEnabled(view.can_pause)
         self.step.setEnabled(view.can_step)
-        self.pace.setChecked(view.slow)
+        self.pace.setChecked(view.is_slow)
         self.mark.show_state(view.state)
-        self.sentence.show_words(view.title, view.detail, is_alarm=view.state == "unanswered")
+        self.sentence.show_text(view.title, view.detail, is_alarm=view.state == "unanswered")
         self.result.show_view(view)
-        self.confirm.set_word(view.confirm or "")
-        paint.show_when(self.confirm, view.confirm is not None)
-        self.stop.show_state(_(view.stop_word), ring=view.state == "stopping")
+        self.confirm.set_label(view.confirm_label or "")
+        paint.show_when(self.confirm, view.confirm_label is not None)
+        self.stop.show_state(_(view.stop_label), ring=view.state == "stopping")
         if view != self._fitted:  # because this method is called on every tick
             self._fitted = view
             self._fit()
@@ -422,10 +426,10 @@ class ToolBar(Bar):
         self.setAccessibleName(_("Tools, run and stop"))
         self.mark = Mark(theme)
         self.words = label("", "body", role="textSecondary")
-        self.result = Result(theme, compact=True)
+        self.result = StopResult(theme, compact=True)
         self.confirm = Button(theme, "", size="small")
         self.confirm.hide()
-        self.confirm.let_shrink(96)
+        self.confirm.allow_shrinking(96)
         self.run = Button(theme, _("Run"), "play", kind="run", size="small")
         self.run.fill_icon = True
         self.pause = IconButton(theme, "pause", _("Pause"))
@@ -465,9 +469,9 @@ class ToolBar(Bar):
         items = (self.tools.itemAt(place) for place in range(self.tools.count()))
         return [tool for item in items if item is not None and (tool := item.widget()) is not None]
 
-    def use(self, actions: Actions) -> None:
+    def set_actions(self, actions: Actions) -> None:
         """Connect the buttons to the actions."""
-        bind(self, actions)
+        bind_run_buttons(self, actions)
 
     def add_tool(self, tool: QWidget, place: int = -1) -> None:
         """Insert a button at the left end, after the existing ones unless `place` is given."""
@@ -481,17 +485,17 @@ class ToolBar(Bar):
         self.mark.setVisible(not spoken)
         self.words.setText(view.compact)
         self.words.setVisible(not spoken)
-        self.run.set_word(_(view.run_word))
+        self.run.set_label(_(view.run_label))
         self.run.setVisible(view.can_run)
         self.restart.setVisible(view.can_restart)
         self.pause.setVisible(view.can_pause)
         self.step.setVisible(view.can_step and view.state in {"running", "paused"})
-        self.confirm.set_word(view.confirm or "")
-        paint.show_when(self.confirm, view.confirm is not None)
-        self.stop.show_state(_(view.stop_word), ring=view.state == "stopping")
+        self.confirm.set_label(view.confirm_label or "")
+        paint.show_when(self.confirm, view.confirm_label is not None)
+        self.stop.show_state(_(view.stop_label), ring=view.state == "stopping")
 
 
-def bind(bar: RunBar | ToolBar, actions: Actions) -> None:
+def bind_run_buttons(bar: RunBar | ToolBar, actions: Actions) -> None:
     """Connect the run buttons of a bar to their commands."""
     actions.bind(bar.run, "run.run")
     actions.bind(bar.restart, "run.restart")

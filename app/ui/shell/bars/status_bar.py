@@ -10,25 +10,25 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QWidget
 
-from app.core.network.remote_access import access_words
-from app.core.network.web_words import host_words, web_status
-from app.core.recording.replay.scale import clock_words, date_words
-from app.core.robots.health_facts import facts_of, has_told
+from app.core.network.remote_access import access_status
+from app.core.network.web_words import host_text, web_status
+from app.core.recording.replay.scale import clock_text, date_text
+from app.core.robots.health_facts import facts_of, has_reported
 from app.core.robots.robot_link import STOPPING
-from app.core.run.view import connected_words
+from app.core.run.view import connected_text
 from app.core.session import Session
-from app.ui.text.numbers import age_words, grouped, length_words, size_words
+from app.ui.text.numbers import age_text, group_digits, length_text, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, StatusItem, paint
 from nep.i18n import _, ngettext
 
 Fact = tuple[str, str, str | None]  # icon, text, status
-NOTHING: Fact = ("", "", None)
+NO_FACT: Fact = ("", "", None)
 TICK_MS = 33
 FIGURE_SPACE = "\u2007"
 
 
-def _worst(found: Iterable[str]) -> tuple[str, str]:
+def _worst_status(found: Iterable[str]) -> tuple[str, str]:
     return ("circle-x", "error") if "error" in found else ("triangle-alert", "warn")
 
 
@@ -43,10 +43,10 @@ class StatusFacts:
 
     def alerts(self, *, for_developers: bool = False) -> Fact:
         """Return the number of alerts."""
-        alerts = self._session.alerts.to_tell(for_developers=for_developers)
+        alerts = self._session.alerts.errors_and_warnings(for_developers=for_developers)
         if not alerts:
-            return NOTHING
-        icon, status = _worst(alert.severity for alert in alerts)
+            return NO_FACT
+        icon, status = _worst_status(alert.severity for alert in alerts)
         words = ngettext("{count} alert", "{count} alerts", len(alerts))
         return icon, words.format(count=len(alerts)), status
 
@@ -56,20 +56,20 @@ class StatusFacts:
         A robot that hasn't reported its state yet is only described as "connected".
         """
         alerts = self.alerts()
-        if alerts != NOTHING:
+        if alerts != NO_FACT:
             return alerts
         known = self._session.fleet.links
         links = [
             link for link in known if link.state != "away"
         ] or known  # Health also shows robots that have left
         if not links:
-            coming = self._session.coming
-            return "circle-dashed", connected_words((), coming) if coming else _("No robot"), "off"
+            coming = self._session.starting_robots
+            return "circle-dashed", connected_text((), coming) if coming else _("No robot"), "off"
         topics, now = self._session.live.topics, time.monotonic()
-        found = [(link, facts_of(link, topics, now, age_words)) for link in links]
-        wrong = [fact.status for _link, facts in found for fact in facts if fact.to_look_at]
+        found = [(link, facts_of(link, topics, now, age_text)) for link in links]
+        wrong = [fact.status for _link, facts in found for fact in facts if fact.needs_attention]
         if wrong:
-            icon, status = _worst(wrong)
+            icon, status = _worst_status(wrong)
             words = _("{robot}: needs attention ({count})")
             if len(links) > 1:
                 words = ngettext(
@@ -79,7 +79,7 @@ class StatusFacts:
         if any(link.state == STOPPING for link in links):
             return "circle-dashed", _("Waiting for Stop to be confirmed"), "off"
         name, count = links[0].name, len(links)
-        if all(has_told(link, facts) for link, facts in found):
+        if all(has_reported(link, facts) for link, facts in found):
             words = ngettext("{count} robot: no problems", "{count} robots: no problems", count)
             words = words if count > 1 else _("{robot}: no problems")
             return "circle-check", words.format(robot=name, count=count), "ok"
@@ -87,7 +87,7 @@ class StatusFacts:
         words = words if count > 1 else _("{robot} is connected")
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
-    def saved(self) -> Fact:
+    def save_state(self) -> Fact:
         """Return when the behaviour was saved, or that it has unsaved changes and if they are backed up."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
@@ -96,7 +96,7 @@ class StatusFacts:
             words = _("Not saved · backed up") if document.path is None else _("Unsaved changes · backed up")
             return "save", words, None
         if document.saved_at is None:
-            return NOTHING
+            return NO_FACT
         then = self._clock(document.saved_at)
         return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
 
@@ -107,9 +107,9 @@ class StatusFacts:
 
     def remote_access(self) -> Fact:
         """Return which computers can connect to this master."""
-        return access_words(self._session.remote_access)
+        return access_status(self._session.remote_access)
 
-    def remote_access_quietly(self) -> Fact:
+    def remote_access_plain(self) -> Fact:
         """Return the same as `remote_access`, without an icon for the default setting."""
         icon, words, status = self.remote_access()
         return ("" if status is None else icon), words, status
@@ -118,7 +118,7 @@ class StatusFacts:
         """Return the network of the web server and the number of connected pages; empty while it is off."""
         web = self._session.web_pages
         if web.host != self._web_host:  # resolving the computer's addresses is slow
-            self._web_host, self._web_network = web.host, host_words(web)
+            self._web_host, self._web_network = web.host, host_text(web)
         return web_status(web, self._web_network)
 
     def master(self) -> Fact:
@@ -135,7 +135,7 @@ class StatusFacts:
         """Return the numbers of nodes and topics and the message rate."""
         graph = self._session.live.graph
         if graph is None:
-            return NOTHING
+            return NO_FACT
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         nodes, rate = len(graph.nodes), self._session.traffic.messages_per_s
         facts = [
@@ -143,43 +143,45 @@ class StatusFacts:
             ngettext("{count} topic", "{count} topics", live).format(count=live),
         ]
         if rate is not None:
-            facts.append(_("{count} messages/s").format(count=grouped(round(rate))))
+            facts.append(_("{count} messages/s").format(count=group_digits(round(rate))))
         return "", ", ".join(facts), None
 
     def lost(self) -> Fact:
         """Return the number of messages lost in 30 s; empty for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
-            return NOTHING
+            return NO_FACT
         words = ngettext("{count} lost in 30 s", "{count} lost in 30 s", lost)
-        return "triangle-alert", words.format(count=grouped(lost)), "warn"
+        return "triangle-alert", words.format(count=group_digits(lost)), "warn"
 
     def recording(self) -> Fact:
         """Return length, size and losses of the current recording; empty without one."""
         recordings = self._session.recordings
         state = recordings.client.state
         if not recordings.is_recording:
-            return NOTHING
+            return NO_FACT
         if state.phase == "starting":
             return "circle-dot", _("Starting to record"), "recording"
-        lost = state.lost + state.unkept
-        losses = ngettext("{count} lost", "{count} lost", lost).format(count=grouped(lost))
+        lost = state.lost + state.unwritten
+        losses = ngettext("{count} lost", "{count} lost", lost).format(count=group_digits(lost))
         words = _("Recording {time}, {size}, {losses}").format(
-            time=length_words(recordings.elapsed_s),
-            size=size_words(state.size_bytes),
+            time=length_text(recordings.elapsed_s),
+            size=size_text(state.size_bytes),
             losses=losses if lost else _("none lost"),
         )
-        return ("triangle-alert", words, "warn") if state.unkept else ("circle-dot", words, "recording")
+        return ("triangle-alert", words, "warn") if state.unwritten else ("circle-dot", words, "recording")
 
-    def armed(self) -> Fact:
+    def arming(self) -> Fact:
         """Return the remaining arming time and the topics being sent; empty while disarmed."""
         acting = self._session.acting
         if not acting.arming.is_on:
-            return NOTHING
-        left = length_words(math.ceil(acting.arming.left_s))
+            return NO_FACT
+        left = length_text(math.ceil(acting.arming.remaining_s))
         going = acting.outbox.all_repeated
         replay = self._session.replay
-        played = replay.sending.outbox.going if replay is not None and replay.sending is not None else ()
+        played = (
+            replay.sending.outbox.active_topics if replay is not None and replay.sending is not None else ()
+        )
         if played:
             said = ngettext("Sending {count} topic of the recording, armed {time}",
                             "Sending {count} topics of the recording, armed {time}", len(played))  # fmt: skip
@@ -194,29 +196,29 @@ class StatusFacts:
             words = _("Armed {time}").format(time=left)
         return "triangle-alert", words, "warn"
 
-    def ring(self) -> Fact:
+    def flight_recorder(self) -> Fact:
         """Return the number of seconds in the flight recorder; empty while it is off."""
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
-            return NOTHING
+            return NO_FACT
         return "history", _("last {count} s available").format(count=round(seconds)), None
 
-    def replayed(self) -> tuple[Fact, ...]:
+    def replayed_recording(self) -> tuple[Fact, ...]:
         """Return name, time range, contents and losses of the recording that is shown."""
         replay = self._session.replay
         if replay is None or replay.opened is None:
             return ()
         recorded = replay.opened.recording
-        name = _("{name}, {size}").format(name=replay.name, size=size_words(recorded.size_bytes))
-        begin, end = (clock_words(each, digits=0) for each in (replay.start_ns, replay.end_ns))
-        when = _("{date}, {begin} to {end}").format(date=date_words(replay.start_ns), begin=begin, end=end)
+        name = _("{name}, {size}").format(name=replay.name, size=size_text(recorded.size_bytes))
+        begin, end = (clock_text(each, digits=0) for each in (replay.start_ns, replay.end_ns))
+        when = _("{date}, {begin} to {end}").format(date=date_text(replay.start_ns), begin=begin, end=end)
         count, messages = len(recorded.topics), recorded.message_count
-        topics = ngettext("{count} topic", "{count} topics", count).format(count=grouped(count))
-        said = ngettext("{count} message", "{count} messages", messages).format(count=grouped(messages))
-        lost: Fact = NOTHING
+        topics = ngettext("{count} topic", "{count} topics", count).format(count=group_digits(count))
+        said = ngettext("{count} message", "{count} messages", messages).format(count=group_digits(messages))
+        lost: Fact = NO_FACT
         if replay.lost:
             words = ngettext("{count} lost while recording", "{count} lost while recording", replay.lost)
-            lost = ("triangle-alert", words.format(count=grouped(replay.lost)), "warn")
+            lost = ("triangle-alert", words.format(count=group_digits(replay.lost)), "warn")
         return (
             ("history", name, None),
             ("", when, None),
@@ -224,17 +226,21 @@ class StatusFacts:
             lost,
         )
 
-    def live_goes_on(self) -> Fact:
+    def live_network_note(self) -> Fact:
         """Return the note that robots, Stop and alarms still use the live network."""
         return "radio-tower", _("The live network keeps running"), None
 
-    def shown(self) -> Fact:
+    def displayed_messages(self) -> Fact:
         """Return the number of displayed messages of watched topics; empty if all were displayed."""
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
-            return NOTHING
+            return NO_FACT
         words = _("{shown} of {sent} shown in 30 s")
-        return "", words.format(shown=grouped(traffic.shown_30s), sent=grouped(traffic.sent_30s)), None
+        return (
+            "",
+            words.format(shown=group_digits(traffic.shown_30s), sent=group_digits(traffic.sent_30s)),
+            None,
+        )
 
     def window(self) -> Fact:
         """Return the duration of the last refresh of the window."""
@@ -263,7 +269,7 @@ class StatusBar(QWidget):
         self._right: list[tuple[StatusItem, Separator]] = []
         self._row.addStretch(1)
 
-    def _grow(self, items: list[tuple[StatusItem, Separator]], count: int, *, right: bool) -> None:
+    def _add_items(self, items: list[tuple[StatusItem, Separator]], count: int, *, right: bool) -> None:
         while len(items) < count:
             item, line = StatusItem(self._theme), Separator(self._theme, upright=True)
             item.pressed.connect(self.pressed)
@@ -281,9 +287,9 @@ class StatusBar(QWidget):
         """Show the facts that have a text."""
         for facts, items, at_right in ((left, self._left, False), (right, self._right, True)):
             shown = [fact for fact in facts if fact[1]]
-            self._grow(items, len(shown), right=at_right)
+            self._add_items(items, len(shown), right=at_right)
             for index, (item, line) in enumerate(items):
-                fact = shown[index] if index < len(shown) else NOTHING
+                fact = shown[index] if index < len(shown) else NO_FACT
                 item.set(*fact)
                 item.set_command(self.commands.get(fact[1], ""))
                 holder = item.parentWidget()
@@ -296,7 +302,7 @@ class StatusBar(QWidget):
         """Return the items that show a fact, from left to right."""
         return [item for item, _line in (*self._left, *self._right) if item.text]
 
-    def words(self) -> list[str]:
+    def texts(self) -> list[str]:
         """Return the texts of all facts, from left to right."""
         return [item.text for item in self.items()]
 

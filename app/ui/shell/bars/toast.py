@@ -43,7 +43,7 @@ class Toast(FloatingCard):
         self.setGraphicsEffect(shadow)
         self._timer = QTimer(self)
         self._timer.setSingleShot(True)
-        self._timer.timeout.connect(self._time_is_up)
+        self._timer.timeout.connect(self._on_timeout)
 
     @property
     def text(self) -> str:
@@ -71,7 +71,7 @@ class Toast(FloatingCard):
         self.setAccessibleName(words)
         paint.announce(self, words)
         self._run = run
-        self.button.set_word(button)
+        self.button.set_label(button)
         paint.show_when(self.button, bool(button and run))
         self.show()
         self.place()
@@ -89,7 +89,9 @@ class Toast(FloatingCard):
         window = self.parentWidget()
         if window is not None:
             self._fit(window.width() - 2 * MARGIN)
-            sheets = [each for each in window.findChildren(Overlay) if each.docks_right and each.isVisible()]
+            sheets = [
+                each for each in window.findChildren(Overlay) if each.is_docked_right and each.isVisible()
+            ]
             right = min((each.x() for each in sheets), default=window.width())
             if right - self.width() < 2 * MARGIN:
                 right = window.width()
@@ -112,7 +114,7 @@ class Toast(FloatingCard):
         self._timer.start(self._theme.duration("toastShown"))
         super().leaveEvent(event)
 
-    def _time_is_up(self) -> None:
+    def _on_timeout(self) -> None:
         if self.button.hasFocus() or self.underMouse():
             self._timer.start(CHECK_AGAIN_MS)
         else:

@@ -13,7 +13,7 @@ from nep.i18n import _
 class SupportsActing(Protocol):
     """Panel that sends messages or calls services."""
 
-    def begin(self, name: str) -> None:
+    def open_for(self, name: str) -> None:
         """Select a topic or service; "" selects none."""
 
 
@@ -28,18 +28,18 @@ class ActingCommands:
         if split_key(key)[0]:
             self._shell.show_toast(_("Only topics of Studio's own network can be published to"))
             return False
-        return self._begin("publish", key)
+        return self._open("publish", key)
 
     def call(self, service: str) -> bool:
         """Show the request form of a service, or all services for ""."""
-        return self._begin("services", service)
+        return self._open("services", service)
 
-    def _begin(self, panel: str, name: str) -> bool:
+    def _open(self, panel: str, name: str) -> bool:
         if self._shell.bench is None:
             self._shell.show_layout("developer")
         dock = self._shell.open_panel(panel)
         if dock is None or not isinstance(dock.panel, SupportsActing):
             return False
         if name or panel == "publish":
-            dock.panel.begin(name)
+            dock.panel.open_for(name)
         return True

@@ -11,12 +11,12 @@ from PySide6.QtCore import QUrl
 
 from app.blocks.compiler.stack import Stack
 from app.core.documents.document import Document
-from app.core.documents.journal import Unsaved
+from app.core.documents.journal import UnsavedWork
 from app.core.session import Session
 from app.core.storage import deep_json
 from app.core.storage.settings import RecentFile
 from app.errors import SettingsError
-from app.ui.other_programs import open_outside
+from app.ui.other_programs import open_externally
 from app.ui.shell.commands.printing import Printing
 from app.ui.shell.commands.program_pictures import ProgramPictures
 from app.ui.shell.commands.shell import Shell
@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 else:
     version_history = lazy_module("app.ui.shell.dialogs.version_history")
 
-Answer = tuple[str, Callable[[], object]]
+OfferButton = tuple[str, Callable[[], object]]
 
 
 class OfferChoice(Protocol):
     """Function that shows an offer with two buttons, each with a text and a callback."""
 
-    def __call__(self, title: str, detail: str, yes: Answer, no: Answer) -> None: ...
+    def __call__(self, title: str, detail: str, yes: OfferButton, no: OfferButton) -> None: ...
 
 
 @runtime_checkable
@@ -83,14 +83,14 @@ class SupportsPointAt(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class TabPlace:
+class TabPosition:
     """New position, counted from 0, for the tab of a document."""
 
     key: str
-    place: int
+    position: int
 
     @classmethod
-    def parse(cls, text: str) -> TabPlace:
+    def parse(cls, text: str) -> TabPosition:
         """Parse ``KEY:2``.
 
         Raises:
@@ -146,21 +146,26 @@ class BehaviourCommands:
         self.pictures = ProgramPictures(shell, session, asks)
         self.printing = Printing(shell, session, asks)
 
-    def run_or_go_on(self) -> None:
+    def run_or_resume(self) -> None:
         """Resume a paused program, or run (again) the behaviour with the editor's newest edit."""
         runs = self._session.runs
         if runs.view().state == "paused":
-            runs.go_on()
+            runs.resume()
         else:
-            self._files.with_newest(partial(self._instead_of_what_runs, runs.run))
+            self._files.after_flush(partial(self._replace_run, runs.run))
 
-    def _instead_of_what_runs(self, begin: Callable[[], object]) -> None:
+    def _replace_run(self, begin: Callable[[], object]) -> None:
         # Shows a toast with the name of the behaviour that was stopped by this run.
         session = self._session
         runs, shown, running = session.runs, session.document, session.runs.document
         was_active = runs.active
         begin()
-        if was_active and running is not None and running is not shown and not runs.concerns(running):
+        if (
+            was_active
+            and running is not None
+            and running is not shown
+            and not runs.is_running_or_pending(running)
+        ):
             self._shell.show_toast(
                 _("Stopped “{stopped}” to run “{name}”").format(
                     stopped=session.documents.title(running), name=session.documents.title(shown)
@@ -184,32 +189,32 @@ class BehaviourCommands:
                 return _("no behaviour has this name")
             self._files.open(path)
 
-        def begin() -> None:
+        def start() -> None:
             if session.documents.title(session.document) == name:
                 session.runs.run()
 
-        self._files.with_newest(begin)
+        self._files.after_flush(start)
         return ""
 
     def try_stack(self, stack: Stack) -> None:
         """Run a single script with the editor's newest edit."""
         try_it = partial(self._session.runs.try_stack, stack)
-        self._files.with_newest(partial(self._instead_of_what_runs, try_it))
+        self._files.after_flush(partial(self._replace_run, try_it))
 
     def restart(self) -> None:
         """Restart the running behaviour with the editor's newest edit."""
-        self._files.with_newest(self._session.runs.restart)
+        self._files.after_flush(self._session.runs.restart)
 
     def run_step(self) -> None:
         """Run one block with the editor's newest edit."""
-        self._files.with_newest(self._session.runs.step)
+        self._files.after_flush(self._session.runs.step)
 
-    def demo(self) -> None:
+    def start_demo(self) -> None:
         """Start the virtual Pepper and open the first example, as a demonstration."""
         self._session.launcher.start_virtual_robot()
         self._shell.show_layout("behaviour")
         if self._shell.examples:
-            self._files.example(self._shell.examples[0].path)
+            self._files.open_example(self._shell.examples[0].path)
 
     def next_tab(self, step: int) -> None:
         """Show the tab that is ``step`` positions to the right, wrapping around."""
@@ -222,16 +227,16 @@ class BehaviourCommands:
 
     def show_tab(self, key: str) -> bool:
         """Show the tab with this key. Return False if there is none; so do the following methods."""
-        return self._with(key, self._files.show)
+        return self._with_document(key, self._files.show)
 
     def close_tab(self, key: str) -> bool:
         """Close a tab."""
-        return self._with(key, self._files.close)
+        return self._with_document(key, self._files.close)
 
     def close_other_tabs(self, key: str) -> bool:
         """Close all tabs except the one with this key."""
         documents = self._session.documents
-        return self._with(
+        return self._with_document(
             key, lambda document: self._files.close(*(other for other in documents if other is not document))
         )
 
@@ -242,7 +247,7 @@ class BehaviourCommands:
             self._files.show(document)
             self._files.save_as()
 
-        return self._with(key, save_as)
+        return self._with_document(key, save_as)
 
     def rename_current(self) -> None:
         """Start to edit the name of the current tab."""
@@ -253,11 +258,11 @@ class BehaviourCommands:
 
     def rename_tab(self, to: TabName) -> bool:
         """Rename a behaviour."""
-        return self._with(to.key, lambda document: self._files.rename(document, to.name))
+        return self._with_document(to.key, lambda document: self._files.rename(document, to.name))
 
     def duplicate_tab(self, key: str) -> bool:
         """Open a copy of a behaviour as a new one."""
-        return self._with(key, self._files.duplicate)
+        return self._with_document(key, self._files.duplicate)
 
     def save_tab(self, key: str) -> bool:
         """Show the tab and save its behaviour."""
@@ -266,7 +271,7 @@ class BehaviourCommands:
             self._files.show(document)
             self._files.save()
 
-        return self._with(key, save)
+        return self._with_document(key, save)
 
     def show_folder(self, key: str) -> bool:
         """Open the folder of a behaviour's file in the file manager."""
@@ -275,17 +280,17 @@ class BehaviourCommands:
             if document.path is None:
                 return
             folder = document.path.parent
-            if not open_outside(QUrl.fromLocalFile(str(folder))):
+            if not open_externally(QUrl.fromLocalFile(str(folder))):
                 self._shell.show_toast(_("The file is in {folder}").format(folder=folder))
 
-        return self._with(key, show)
+        return self._with_document(key, show)
 
-    def move_tab(self, to: TabPlace) -> bool:
+    def move_tab(self, to: TabPosition) -> bool:
         """Move a tab to another position."""
-        return self._with(to.key, lambda document: self._files.move(document, to.place))
+        return self._with_document(to.key, lambda document: self._files.move(document, to.position))
 
-    def _with(self, key: str, act: Callable[[Document], object]) -> bool:
-        document = self._session.documents.with_key(key)
+    def _with_document(self, key: str, act: Callable[[Document], object]) -> bool:
+        document = self._session.documents.find_by_key(key)
         if document is not None:
             act(document)
         return document is not None
@@ -305,7 +310,7 @@ class BehaviourCommands:
     def edit_blocks(self, what: str) -> None:
         """Run "copy", "cut", "paste" or "duplicate" on the blocks, wherever the focus is in the layout."""
         editor = self._shell.editor()
-        if self._shell.showing == "behaviour" and isinstance(editor, SupportsBlockEdits):
+        if self._shell.current_layout == "behaviour" and isinstance(editor, SupportsBlockEdits):
             editor.edit_blocks(what)
 
     def show_block(self, block: str) -> None:
@@ -332,9 +337,9 @@ class BehaviourCommands:
         if isinstance(editor, SupportsFindBlocks):
             editor.find_blocks(to_add=to_add)
 
-    def earlier_versions(self) -> None:
+    def show_earlier_versions(self) -> None:
         """Show earlier versions of the file, after the newest edit was saved to it."""
-        self._files.with_newest(self._show_versions)
+        self._files.after_flush(self._show_versions)
 
     def _show_versions(self) -> None:
         if self._versions is None:
@@ -345,9 +350,9 @@ class BehaviourCommands:
         title = self._session.documents.title(document)
         self._versions.show_for(document.name, document.path, document.workspace, title=title)
 
-    def forget_recent(self) -> None:
+    def clear_recent(self) -> None:
         """Clear the list of recent files; the toast offers to undo it."""
-        before: list[RecentFile] = self._session.settings.recent_known
+        before: list[RecentFile] = self._session.settings.all_recent
         words = _("Recent files cleared")
         if not self._set_recent([]):
             words = _("Can't save this change: the recent files will return at the next start")
@@ -358,30 +363,30 @@ class BehaviourCommands:
         try:
             self._session.settings.set_recent(files)
         except SettingsError as error:
-            self._shell.complain(str(error))
+            self._shell.log_problem(str(error))
             kept = False
         self._shell.show_recent()
         return kept
 
-    def come_back(self, left: Sequence[Unsaved], offer: OfferChoice) -> None:
+    def restore_tabs(self, left: Sequence[UnsavedWork], offer: OfferChoice) -> None:
         """Restore the tabs of the last session, and offer to recover changes that were left by a crash."""
-        rest = self._session.tabs.come_back(left)
+        rest = self._session.tabs.restore(left)
         if not rest:
             return
 
-        def throw_away() -> None:
+        def discard() -> None:
             for unsaved in rest:
                 unsaved.journal.unlink(missing_ok=True)
 
         offer(
             _("Restore unsaved work?"),
-            unsaved_words(rest),
+            unsaved_text(rest),
             (_("Restore"), lambda: self._files.recover(rest)),
-            (_("Discard"), throw_away),
+            (_("Discard"), discard),
         )
 
 
-def unsaved_words(left: Sequence[Unsaved]) -> str:
+def unsaved_text(left: Sequence[UnsavedWork]) -> str:
     """Return a sentence with the names of the unsaved behaviours."""
     if len(left) == 1:
         return _("“{name}” wasn't saved before Studio closed.").format(name=left[0].name)

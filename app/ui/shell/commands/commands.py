@@ -11,7 +11,7 @@ from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.acting import ActingCommands
 from app.ui.shell.commands.behaviours import BehaviourCommands, bring_into_view
 from app.ui.shell.commands.editing import EditCommands
-from app.ui.shell.commands.menus import MenuLists
+from app.ui.shell.commands.menus import DynamicMenus
 from app.ui.shell.commands.palette_entries import PaletteEntries
 from app.ui.shell.commands.recording import RecordCommands
 from app.ui.shell.commands.replay import ReplayCommands
@@ -25,14 +25,14 @@ from app.ui.shell.documents import DocumentController
 from app.ui.shell.stop_keys import StopKeys
 from app.ui.widgets.file_dialogs import FileDialogs
 
-_ABOUT = {command.id: command for command in ARGUMENT_COMMANDS}
+_ARGUMENT_COMMANDS_BY_ID = {command.id: command for command in ARGUMENT_COMMANDS}
 
 
 class Commands:
     """Creates the menus and shortcuts of a window, and runs commands by id."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
-        keys = Shortcuts(session.settings, shell.complain, COMMANDS)
+        keys = Shortcuts(session.settings, shell.log_problem, COMMANDS)
         self.session = session
         self.files = DocumentController(
             session, asks, shell.show_toast, partial(bring_into_view, shell), shell.editor
@@ -62,13 +62,13 @@ class Commands:
             ActingCommands(shell),
         )
         self.actions = Actions(shell.surface, shell.theme, COMMANDS, self._do)
-        self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.why_not, keys)
+        self.entries = PaletteEntries(shell, session, COMMANDS, self.actions.disabled_reason, keys)
         menus = self.actions.fill(shell.menu_bar, MENUS)
-        self.menus = MenuLists(shell, session, self.actions, menus, self.view, self.files.open)
-        self.view.use(self.actions, self.entries)
-        self.actions.choose("run.full_speed")
-        self.actions["run.from_start"].setChecked(session.fleet.begins_at_start)
-        self.stop_keys = StopKeys(shell.surface, lambda: keys.of(STOP), self.actions[STOP].trigger)
+        self.menus = DynamicMenus(shell, session, self.actions, menus, self.view, self.files.open)
+        self.view.set_actions(self.actions, self.entries)
+        self.actions.select("run.full_speed")
+        self.actions["run.from_start"].setChecked(session.fleet.resets_at_start)
+        self.stop_keys = StopKeys(shell.surface, lambda: keys.keys_of(STOP), self.actions[STOP].trigger)
 
     def run(self, name: str) -> bool:
         """Run a command by its id or ``id:argument``; return False if it is unavailable.
@@ -81,7 +81,7 @@ class Commands:
         id, colon, argument = name.partition(":")
         if not colon:
             return self.actions.run(id)
-        command = _ABOUT.get(id)
+        command = _ARGUMENT_COMMANDS_BY_ID.get(id)
         if command is None:
             raise UnknownCommandError(id)
         return command.run(self._do, argument)

@@ -13,7 +13,7 @@ from nep.i18n import _
 Edit = Literal["cut", "copy", "paste", "selectAll"]
 Field = QLineEdit | QPlainTextEdit | QTextEdit
 FIELDS = (QLineEdit, QPlainTextEdit, QTextEdit)
-CHANGES = frozenset({"cut", "paste"})
+MODIFYING_EDITS = frozenset({"cut", "paste"})
 
 
 @runtime_checkable
@@ -35,29 +35,29 @@ class EditCommands:
         self._had: QWidget | None = None
         application = QApplication.instance()
         if isinstance(application, QApplication):
-            application.focusChanged.connect(self._changed)
+            application.focusChanged.connect(self._on_focus_changed)
 
-    def _changed(self, _old: QWidget | None, now: QWidget | None) -> None:
+    def _on_focus_changed(self, _old: QWidget | None, now: QWidget | None) -> None:
         # The menu bar takes the focus when it is opened by Alt: remember the widget that had it before.
         if now is not None and not isinstance(now, (QMenu, QMenuBar)):
             self._had = now
 
-    def do(self, what: Edit) -> None:
+    def run(self, what: Edit) -> None:
         """Run cut, copy, paste or select all."""
         field = self._field()
         if field is not None:
             getattr(field, what)()
             return
         editor = self._shell.editor()
-        if self._shell.showing == "behaviour" and isinstance(editor, SupportsEditMenu):
+        if self._shell.current_layout == "behaviour" and isinstance(editor, SupportsEditMenu):
             editor.edit_from_menu(what)
 
-    def why_not(self, what: Edit) -> str:
+    def disabled_reason(self, what: Edit) -> str:
         """Return the reason why an edit command is unavailable, or ""."""
         field = self._field()
         if field is not None:
-            return _("This text can't be changed") if what in CHANGES and field.isReadOnly() else ""
-        return "" if self._shell.showing == "behaviour" else _("Only for blocks and text fields")
+            return _("This text can't be changed") if what in MODIFYING_EDITS and field.isReadOnly() else ""
+        return "" if self._shell.current_layout == "behaviour" else _("Only for blocks and text fields")
 
     def _field(self) -> Field | None:
         had = self._had if self._had is not None and isValid(self._had) else None

@@ -16,7 +16,7 @@ class SupportsFreeze(Protocol):
     freeze: QAbstractButton
 
 
-def freezable(bench: Workbench | None) -> list[QAbstractButton]:
+def freeze_buttons(bench: Workbench | None) -> list[QAbstractButton]:
     """Return the freeze buttons of open panels with live contents."""
     panels = [bench.docks[name].panel for name in bench.open_names()] if bench is not None else []
     buttons = [panel.freeze for panel in panels if isinstance(panel, SupportsFreeze)]
@@ -25,12 +25,12 @@ def freezable(bench: Workbench | None) -> list[QAbstractButton]:
 
 def all_frozen(bench: Workbench | None) -> bool:
     """Return True if there are panels with live contents and all of them are frozen."""
-    found = freezable(bench)
+    found = freeze_buttons(bench)
     return bool(found) and all(button.isChecked() for button in found)
 
 
-def freeze_or_go_on(bench: Workbench | None) -> None:
+def toggle_freeze(bench: Workbench | None) -> None:
     """Freeze all panels, or unfreeze them if all are frozen."""
     on = not all_frozen(bench)
-    for button in freezable(bench):
+    for button in freeze_buttons(bench):
         button.setChecked(on)

@@ -9,20 +9,20 @@ from PySide6.QtWidgets import QWidget
 
 from app.core.documents.titles import recent_titles
 from app.core.session import Session
-from app.ui.panels.base import Panel, numbered
+from app.ui.panels.base import Panel, numbered_title
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.commands.view import ViewCommands
-from app.ui.shell.docking.dock import kind_of
+from app.ui.shell.docking.dock import parse_key
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.text import plain
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
-ARRANGING = ("layout.keep", "layout.rename", "layout.delete", "layout.export", "layout.open")
+LAYOUT_COMMANDS = ("layout.keep", "layout.rename", "layout.delete", "layout.export", "layout.open")
 
 
-class MenuLists:
+class DynamicMenus:
     """Updates the dynamic menus when they open."""
 
     def __init__(
@@ -50,20 +50,20 @@ class MenuLists:
         self._arranging = Menu(theme, surface, _("Layouts"))
         self._arranging.aboutToHide.connect(actions.enable_all)
 
-    def drop_layouts(self, anchor: QWidget) -> None:
+    def open_layout_menu(self, anchor: QWidget) -> None:
         """Show a menu with layouts and layout commands below a button."""
-        self.actions.disable()
+        self.actions.disable_unavailable()
         self._list_layouts(self._arranging)
         self._arranging.addAction(self.actions["layout.reset"])
-        drop_below(self._arranging, anchor)
+        open_below(self._arranging, anchor)
 
-    def drop_panels(self, anchor: QWidget) -> None:
+    def open_panel_menu(self, anchor: QWidget) -> None:
         """Show a menu with panels below a button."""
         self._list_panels()
-        drop_below(self._panels, anchor)
+        open_below(self._panels, anchor)
 
     def _refresh(self, menu: str) -> None:
-        self.actions.disable()
+        self.actions.disable_unavailable()
         if menu == "File":
             self._list_recent()
         elif menu == "View":
@@ -72,37 +72,37 @@ class MenuLists:
 
     def _list_recent(self) -> None:
         self._recent.clear()
-        recent = recent_titles(self._session.settings.recent_known)
+        recent = recent_titles(self._session.settings.all_recent)
         self._recent.menuAction().setVisible(bool(recent))
         for file in recent:
             words = file.name
-            if not file.there:
+            if not file.exists:
                 words = _("{file} (missing)").format(file=file.name)
-            entry = self._recent.addAction(plain.entry(words))
+            entry = self._recent.addAction(plain.escape_menu_text(words))
             entry.setToolTip(plain.tip(str(file.path)))
-            entry.setEnabled(file.there)
+            entry.setEnabled(file.exists)
             entry.triggered.connect(lambda _on=False, path=file.path: self._open_file(path))
         self._recent.addSeparator()
         self._recent.addAction(self.actions["file.forget_recent"])
 
     def _list_layouts(self, menu: Menu) -> None:
         menu.clear()
-        arrangements, shown = self._shell.saved_layouts, self._shell.showing
+        arrangements, shown = self._shell.saved_layouts, self._shell.current_layout
         for layout in LAYOUTS:
             entry = menu.addAction(self._shell.theme.icon(layout.icon), _(layout.title))
             entry.setCheckable(True)
-            entry.setChecked(shown == layout.name and not arrangements.own(layout.name))
+            entry.setChecked(shown == layout.name and not arrangements.custom_name(layout.name))
             entry.triggered.connect(lambda _on=False, name=layout.name: self._view.show_built_in_layout(name))
         own = arrangements.all()
         if own:
             menu.addSeparator()
         for each in own:
-            entry = menu.addAction(plain.entry(each.name))
+            entry = menu.addAction(plain.escape_menu_text(each.name))
             entry.setCheckable(True)
-            entry.setChecked(shown == each.base and arrangements.own(each.base) == each.name)
+            entry.setChecked(shown == each.base and arrangements.custom_name(each.base) == each.name)
             entry.triggered.connect(lambda _on=False, name=each.name: self._view.show_own_layout(name))
         menu.addSeparator()
-        for name in ARRANGING:
+        for name in LAYOUT_COMMANDS:
             menu.addAction(self.actions[name])
 
     def _list_panels(self) -> None:
@@ -111,22 +111,22 @@ class MenuLists:
         self._panels.menuAction().setVisible(shell.bench is not None)
         if shell.bench is None:
             return
-        self.actions.choose(f"layout.{shell.showing}")
+        self.actions.select(f"layout.{shell.current_layout}")
         opened = shell.bench.open_names()
         for panel in sorted(shell.panels.values(), key=lambda panel: _(panel.title)):
-            if panel.name == "behaviour" and shell.showing != "behaviour":
+            if panel.name == "behaviour" and shell.current_layout != "behaviour":
                 continue
             entry = self._panels.addAction(shell.theme.icon(panel.icon), _(panel.title))
             entry.setCheckable(True)
             entry.setChecked(panel.name in opened)
             entry.triggered.connect(lambda on=False, name=panel.name: self._toggle(name, on))
             for key in opened:
-                name, number = kind_of(key)
+                name, number = parse_key(key)
                 if name == panel.name and number > 1:
-                    self._list_one_more(panel, key, number)
+                    self._add_extra_panel(panel, key, number)
 
-    def _list_one_more(self, panel: Panel, key: str, number: int) -> None:
-        words = numbered(_(panel.title), number)
+    def _add_extra_panel(self, panel: Panel, key: str, number: int) -> None:
+        words = numbered_title(_(panel.title), number)
         entry = self._panels.addAction(self._shell.theme.icon(panel.icon), words)
         entry.setCheckable(True)
         entry.setChecked(True)

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from app.core.documents.titles import recent_titles
-from app.core.networks.networks import topic_words
+from app.core.networks.networks import topic_label
 from app.core.session import Session
 from app.ui.shell.actions.command import Command
 from app.ui.shell.actions.shortcuts import Shortcuts
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.docking.layouts import layout_named
-from app.ui.text.dates import day_words
+from app.ui.text.dates import relative_day_text
 from app.ui.widgets.lists.fuzzy import Entry
 from nep.i18n import _
 
@@ -47,7 +47,7 @@ class PaletteEntries:
             *self._layouts(),
             *self._files(),
             *self._examples(),
-            *self._of_topics(),
+            *self._topic_entries(),
         ]
 
     def _commands(self) -> list[Entry]:
@@ -55,7 +55,7 @@ class PaletteEntries:
         for each in self._shown:
             key, reason = self._shortcuts.first(each.id), self._why_not(each.id)
             icon = each.icon or "chevrons-right"
-            made.append(Entry(f"command:{each.id}", each.words, icon, _(each.menu), key, reason))
+            made.append(Entry(f"command:{each.id}", each.label, icon, _(each.menu), key, reason))
         return made
 
     def _panels(self) -> list[Entry]:
@@ -66,14 +66,14 @@ class PaletteEntries:
             place = opened.index(panel.name) + 1 if panel.name in opened else 0
             key = self._shortcuts.first(f"panel.{place}") if 0 < place < 10 else ""
             made.append(Entry(f"panel:{panel.name}", _(panel.title), panel.icon, "", key))
-            if panel.several and panel.name in opened:
+            if panel.allows_multiple and panel.name in opened:
                 words = _("Another panel: {panel}").format(panel=_(panel.title))
                 made.append(Entry(f"another:{panel.name}", words, "plus"))
         return made
 
     def _robots(self) -> list[Entry]:
         links = self._session.fleet.links
-        return [Entry(f"robot:{link.name}", link.name, "bot", link.chip) for link in links]
+        return [Entry(f"robot:{link.name}", link.name, "bot", link.chip_text) for link in links]
 
     def _layouts(self) -> list[Entry]:
         own = self._shell.saved_layouts.all()
@@ -85,10 +85,10 @@ class PaletteEntries:
     def _files(self) -> list[Entry]:
         now = dt.datetime.now().astimezone()
         made = []
-        for file in recent_titles(self._session.settings.recent_known):
-            when = day_words(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
+        for file in recent_titles(self._session.settings.all_recent):
+            when = relative_day_text(dt.datetime.fromtimestamp(file.opened_s).astimezone(), now)
             reason = ""
-            if not file.there:
+            if not file.exists:
                 reason = _("No longer in {folder}").format(folder=file.path.parent.name)
             made.append(Entry(f"file:{file.path}", file.name, "file", when, reason=reason))
         return made
@@ -97,15 +97,18 @@ class PaletteEntries:
         examples = self._shell.examples
         return [Entry(f"example:{each.path}", each.name, "blocks", each.text) for each in examples]
 
-    def _of_topics(self) -> list[Entry]:
+    def _topic_entries(self) -> list[Entry]:
         topics, networks = self._session.topics, self._session.networks
         if (topics.revision, networks.revision) != self._topics_seen:
             self._topics_seen = topics.revision, networks.revision
-            there = [*topics.live(), *(topic for topic in networks.topics if topic.gone_since is None)]
+            there = [
+                *topics.existing_topics(),
+                *(topic for topic in networks.topics if topic.gone_since is None),
+            ]
             self._topics = [
                 Entry(
                     f"topic:{topic.key}",
-                    topic_words(topic.key),
+                    topic_label(topic.key),
                     TOPIC_ICONS.get(topic.codec, "list"),
                     topic.msg_type,
                 )

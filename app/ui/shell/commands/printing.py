@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QDialog
 
 from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
-from app.ui.shell.commands.program_pictures import beside
+from app.ui.shell.commands.program_pictures import suggested_path
 from app.ui.shell.commands.shell import Shell
 from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from nep.i18n import _, day_text
@@ -29,7 +29,7 @@ MAX_DPI = 300
 class SupportsPrinting(Protocol):
     """Panel whose contents can be printed."""
 
-    def pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         """Render a PDF with this page layout; ``done`` gets b"" if there is nothing to print."""
 
 
@@ -45,9 +45,9 @@ class Printing:
     ) -> None:
         # `printers` returns the names of the computer's printers.
         self._shell, self._session, self._asks = shell, session, asks
-        self._printers = printers if printers is not None else known_printers
+        self._printers = printers if printers is not None else printer_names
 
-    def ask(self) -> None:
+    def show_dialog(self) -> None:
         """Show the print dialog or, if there are no printers, the dialog to save a PDF."""
         if not self._printers():
             self._shell.show_toast(_("No printer is set up on this computer. Save the pages as PDF instead."))
@@ -57,7 +57,7 @@ class Printing:
 
         printer = QPrinter(QPrinter.PrinterMode.HighResolution)
         printer.setDocName(self._session.document.name)
-        printer.setPageLayout(usual_paper())
+        printer.setPageLayout(default_page_layout())
         dialog = QPrintDialog(printer, self._shell.surface.window())
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setWindowModality(Qt.WindowModality.NonModal)  # keeps Stop accessible
@@ -71,7 +71,7 @@ class Printing:
 
         def paint(data: bytes) -> None:
             if not data:
-                self._say_nothing_there()
+                self._notify_no_blocks()
             elif paint_pdf(data, printer):
                 self._shell.show_toast(_("Sent to the printer {name}").format(name=printer.printerName()))
             else:
@@ -85,7 +85,7 @@ class Printing:
         """Ask for a file and save a PDF."""
         self._asks.save_as(
             _("Save blocks as PDF"),
-            beside(self._session.document),
+            suggested_path(self._session.document),
             (FileKind("PDF", ".pdf"),),
             lambda path, _kind: self.save(path),
         )
@@ -96,7 +96,7 @@ class Printing:
 
         def write(data: bytes) -> None:
             if not data:
-                self._say_nothing_there()
+                self._notify_no_blocks()
                 return
             try:
                 write_atomically(whole, data)
@@ -107,20 +107,20 @@ class Printing:
             else:
                 self._shell.show_toast(_("Saved {name}").format(name=whole.name))
 
-        self._make(usual_paper(), write)
+        self._make(default_page_layout(), write)
 
     def _make(self, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         editor = self._shell.editor()
         if isinstance(editor, SupportsPrinting):
             today = dt.datetime.now().astimezone()
             date = day_text(today.day, today.month, today.year)
-            editor.pdf(self._session.document.name, date, layout, done)
+            editor.render_pdf(self._session.document.name, date, layout, done)
 
-    def _say_nothing_there(self) -> None:
+    def _notify_no_blocks(self) -> None:
         self._shell.show_toast(_("This page has no blocks"))
 
 
-def known_printers() -> list[str]:
+def printer_names() -> list[str]:
     """Return the names of the computer's printers; empty if Qt's print support is missing."""
     try:
         from PySide6.QtPrintSupport import QPrinterInfo  # noqa: PLC0415 - needed for printing only
@@ -129,7 +129,7 @@ def known_printers() -> list[str]:
     return list(QPrinterInfo.availablePrinterNames())
 
 
-def usual_paper() -> QPageLayout:
+def default_page_layout() -> QPageLayout:
     """Return A4, or Letter where US units are the system's default."""
     inches = QLocale.system().measurementSystem() == QLocale.MeasurementSystem.ImperialUSSystem
     size = QPageSize.PageSizeId.Letter if inches else QPageSize.PageSizeId.A4

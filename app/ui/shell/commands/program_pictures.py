@@ -11,30 +11,30 @@ from PySide6.QtGui import QGuiApplication, QImage
 from app.core.documents.document import Document
 from app.core.session import Session
 from app.core.storage.atomic_file import write_atomically
-from app.core.storage.settings import kept_folder
+from app.core.storage.settings import closed_tabs_folder
 from app.ui.shell.commands.shell import Shell
 from app.ui.widgets.file_dialogs import FileDialogs, FileKind
 from nep.i18n import _, lazy
 
-ON_WHITE = (
+OPAQUE_KINDS = (
     FileKind(lazy("Image"), ".png"),
     FileKind(lazy("An image that stays sharp at any size"), ".svg"),
 )
 KINDS = (
-    ON_WHITE[0],
+    OPAQUE_KINDS[0],
     FileKind(lazy("Image with transparent background"), ".png"),
-    ON_WHITE[1],
+    OPAQUE_KINDS[1],
     FileKind(lazy("Vector image with transparent background"), ".svg"),
 )
 
 
-def beside(document: Document) -> Path:
+def suggested_path(document: Document) -> Path:
     """Return the suggested path, without extension, for a file made from a behaviour.
 
     Its folder is that of the behaviour's file, or the home folder for files that Studio manages.
     """
     own = document.path
-    folder = own.parent if own is not None and own.parent != kept_folder() else Path.home()
+    folder = own.parent if own is not None and own.parent != closed_tabs_folder() else Path.home()
     return folder / document.name
 
 
@@ -52,12 +52,12 @@ class ProgramPictures:
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
 
-    def ask(self) -> None:
+    def ask_save(self) -> None:
         """Ask for a file and format, then save the image."""
-        suggestion = beside(self._session.document)
+        suggestion = suggested_path(self._session.document)
 
         def take(path: Path, kind: FileKind) -> None:
-            self.save(path, kind.ending.lstrip("."), kind in ON_WHITE)
+            self.save(path, kind.suffix.lstrip("."), kind in OPAQUE_KINDS)
 
         self._asks.save_as(_("Save blocks as image"), suggestion, KINDS, take)
 
@@ -67,7 +67,7 @@ class ProgramPictures:
 
         def write(data: bytes) -> None:
             if not data:
-                self._say_nothing_there()
+                self._notify_no_blocks()
                 return
             try:
                 write_atomically(whole, data)
@@ -83,20 +83,20 @@ class ProgramPictures:
     def copy(self) -> None:
         """Copy an image of the blocks to the clipboard."""
 
-        def put(data: bytes) -> None:
+        def copy_image(data: bytes) -> None:
             image = QImage.fromData(data)
             if image.isNull():
-                self._say_nothing_there()
+                self._notify_no_blocks()
                 return
             QGuiApplication.clipboard().setImage(image)
             self._shell.show_toast(_("Copied the image"))
 
-        self._make("png", True, put)
+        self._make("png", True, copy_image)
 
     def _make(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
         editor = self._shell.editor()
         if isinstance(editor, SupportsPicture):
             editor.picture(kind, white, done)
 
-    def _say_nothing_there(self) -> None:
+    def _notify_no_blocks(self) -> None:
         self._shell.show_toast(_("This page has no blocks"))

@@ -10,7 +10,7 @@ from app.core.network.topics import split_key
 from app.core.recording.choice import RecordingChoice
 from app.core.session import Session
 from app.ui.shell.commands.shell import Shell
-from app.ui.text.numbers import length_words, size_words
+from app.ui.text.numbers import length_text, size_text
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.i18n import _
 from nep.system.lazy_import import lazy_module
@@ -25,7 +25,7 @@ else:
 class SupportsRecordings(Protocol):
     """Panel of recordings."""
 
-    def choose_file(self, path: Path) -> None:
+    def select_file(self, path: Path) -> None:
         """Select this recording as soon as it is listed."""
 
 
@@ -35,7 +35,7 @@ class RecordCommands:
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
         self._recordings = session.recordings
-        self._recordings.on_made = self._made
+        self._recordings.on_made = self._on_saved
         self._sheet: record_sheet.RecordSheet | None = None
 
     def toggle(self) -> None:
@@ -43,15 +43,15 @@ class RecordCommands:
         if self._recordings.is_recording:
             self._recordings.stop()
         else:
-            self._begin()
+            self._start()
 
-    def press(self) -> None:
+    def start_and_open_sheet(self) -> None:
         """Start a recording with the last settings if none is running, and open the sheet."""
         if not self._recordings.is_recording:
-            self._begin()
+            self._start()
         self.open_sheet()
 
-    def _begin(self, choice: RecordingChoice | None = None) -> bool:
+    def _start(self, choice: RecordingChoice | None = None) -> bool:
         why_not = self._recordings.record(choice=choice)
         if why_not and choice is None:
             self._shell.show_toast(why_not, _("Choose topics to record"), self.open_sheet)
@@ -67,7 +67,7 @@ class RecordCommands:
         if network:
             self._shell.show_toast(_("Only topics of Studio's own network can be recorded"))
             return False
-        if not self._begin(RecordingChoice("chosen", (topic,))):
+        if not self._start(RecordingChoice("chosen", (topic,))):
             return False
         self._shell.show_toast(
             _("Recording {topic}").format(topic=topic), _("Stop recording"), self._recordings.stop
@@ -79,40 +79,40 @@ class RecordCommands:
         if self._sheet is None:
             shell = self._shell
             self._sheet = record_sheet.RecordSheet(
-                shell.theme, shell.surface, self._session, self.keep, shell.show_toast
+                shell.theme, shell.surface, self._session, self.save_last, shell.show_toast
             )
         self._sheet.open()
 
-    def keep(self) -> None:
+    def save_last(self) -> None:
         """Save the contents of the flight recorder as a recording."""
         recordings = self._recordings
         if not recordings.wish.is_on:
             self._shell.show_toast(
                 _("The flight recorder is off: there is nothing to save"),
                 _("Turn it on"),
-                self._switch_on,
+                self._enable_flight_recorder,
             )
             return
         why_not = recordings.save_last()
         if why_not:
             self._shell.show_toast(why_not)
 
-    def _switch_on(self) -> None:
+    def _enable_flight_recorder(self) -> None:
         recordings = self._recordings
-        recordings.set_wish(replace(recordings.wish, is_on=True))
+        recordings.set_ring_settings(replace(recordings.wish, is_on=True))
         words = _("The flight recorder now keeps the last {count} s")
         self._shell.show_toast(words.format(count=recordings.wish.seconds))
 
     def show(self, path: Path | None = None) -> None:
         """Show the recordings panel and select a recording."""
         if self._sheet is not None:
-            self._sheet.shut()  # the sheet may cover the panel
+            self._sheet.dismiss()  # the sheet may cover the panel
         if self._shell.bench is None:
             self._shell.show_layout("developer")
         dock = self._shell.open_panel("recordings")
         if dock is not None and path is not None and isinstance(dock.panel, SupportsRecordings):
-            dock.panel.choose_file(path)
-        self._shell.panel_focus.give(dock)
+            dock.panel.select_file(path)
+        self._shell.panel_focus.focus(dock)
 
     def show_for_export(self, path: Path) -> None:
         """Show the recordings panel to export a part of a recording: the timeline's loop, if it is open."""
@@ -120,9 +120,9 @@ class RecordCommands:
             self.show(path)
         else:
             words = _("{file} is in another folder. Choose that folder for recordings first")
-            self._shell.show_toast(words.format(file=path.name), _("Choose a folder"), self.choose_folder)
+            self._shell.show_toast(words.format(file=path.name), _("Choose a folder"), self.select_folder)
 
-    def choose_folder(self) -> None:
+    def select_folder(self) -> None:
         """Ask for the folder in which recordings are saved."""
         recordings = self._recordings
 
@@ -131,9 +131,9 @@ class RecordCommands:
             self._shell.show_toast(_("Recordings are saved in {folder}").format(folder=folder))
 
         place = recordings.folder
-        self._asks.choose_folder(str(place if place.is_dir() else Path.home()), take)
+        self._asks.select_folder(str(place if place.is_dir() else Path.home()), take)
 
-    def _made(self, path: Path, kind: str) -> None:
+    def _on_saved(self, path: Path, kind: str) -> None:
         if kind == "kept":
             words = _("Saved the last seconds: {file}").format(file=path.stem)
         else:
@@ -143,6 +143,6 @@ class RecordCommands:
                 "size": _("Recording stopped at the size limit: {file}, {length}, {size}"),
             }.get(state.limit, _("Saved recording {file}: {length}, {size}"))
             words = words.format(
-                file=path.stem, length=length_words(state.duration_s), size=size_words(state.size_bytes)
+                file=path.stem, length=length_text(state.duration_s), size=size_text(state.size_bytes)
             )
         self._shell.show_toast(words, _("Show"), lambda: self.show(path))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QUrl
 
 from app.core.session import Session
-from app.ui.other_programs import open_outside
+from app.ui.other_programs import open_externally
 from app.ui.shell.commands.shell import Shell
 from app.ui.widgets.file_dialogs import FileDialogs
 from nep.errors import RecordingError
@@ -33,7 +33,7 @@ class ReplayCommands:
     def ask_open(self) -> None:
         """Ask for a recording and open it."""
         replay = self._session.replay
-        place = replay.path.parent if replay is not None else folder.usual_folder()
+        place = replay.path.parent if replay is not None else folder.default_folder()
         self._asks.open_recording(str(place), self.open)
 
     def open(self, path: Path) -> None:
@@ -45,16 +45,16 @@ class ReplayCommands:
         self._session.open_recording(path)
         self._shell.open_panel(TIMELINE)
 
-    def back_to_live(self) -> None:
+    def return_to_live(self) -> None:
         """Close the recording and show the live network."""
-        self._session.back_to_live()
+        self._session.return_to_live()
         bench = self._shell.bench
         if bench is not None and TIMELINE in bench.open_names():
             bench.docks[TIMELINE].close()
 
     def show_folder(self, path: Path) -> None:
         """Open the folder of a recording in the file manager."""
-        open_outside(QUrl.fromLocalFile(str(path.parent)))
+        open_externally(QUrl.fromLocalFile(str(path.parent)))
 
     @property
     def _replay(self) -> Replay | None:
@@ -74,7 +74,9 @@ class ReplayCommands:
             made = replay.bookmark()
         except RecordingError as error:
             sentence = f"{error.reason[:1].upper()}{error.reason[1:]}."
-            self._session.alerts.put("recording:bookmark", "error", _("Can't save the bookmark."), sentence)
+            self._session.alerts.raise_alert(
+                "recording:bookmark", "error", _("Can't save the bookmark."), sentence
+            )
             return
         if made is not None:
             self._shell.show_toast(_("Added a bookmark"), _("Undo"), lambda: replay.remove_bookmark(made))

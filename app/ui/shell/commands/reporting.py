@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QWidget
 from app.core.documents.file_format import BehaviourFile, file_bytes
 from app.core.reports.crash_reports import ALERT
 from app.core.session import Session
-from app.ui.other_programs import open_outside
+from app.ui.other_programs import open_externally
 from app.ui.shell.commands.shell import Shell
 from app.ui.shell.documents import DocumentController
 from app.ui.widgets.file_dialogs import FileDialogs
@@ -54,9 +54,9 @@ class ReportCommands:
         """Open a problem report that includes the newest edits of the open behaviours."""
         self._session.alerts.resolve(ALERT)
         doctor = self._session.doctor
-        if doctor.looked_s is None or self._clock() - doctor.looked_s > DOCTOR_MAX_AGE_S:
+        if doctor.finished_s is None or self._clock() - doctor.finished_s > DOCTOR_MAX_AGE_S:
             doctor.start()
-        self._files.with_newest(self._open)
+        self._files.after_flush(self._open)
 
     def _open(self) -> None:
         shell, session = self._shell, self._session
@@ -68,10 +68,10 @@ class ReportCommands:
             qt_facts(shell.surface), session.settings.all(), lambda: session.doctor.report(DOCTOR_TIMEOUT_S)
         )
         documents = session.documents
-        names = [documents.title(each) for each in documents if not each.blank]
-        self._sheet.show_for(parts, names, self._work)
+        names = [documents.title(each) for each in documents if not each.is_blank]
+        self._sheet.show_for(parts, names, self._reported_work)
 
-    def _work(self) -> list[problem_report.ReportedWork]:
+    def _reported_work(self) -> list[problem_report.ReportedWork]:
         documents = self._session.documents
         return [
             problem_report.ReportedWork(
@@ -79,15 +79,15 @@ class ReportCommands:
                 file_bytes(BehaviourFile(each.name, each.workspace, each.robots, each.others)),
             )
             for each in documents
-            if not each.blank
+            if not each.is_blank
         ]
 
-    def look_for_new_version(self, page: str = RELEASES_PAGE) -> None:
+    def open_releases_page(self, page: str = RELEASES_PAGE) -> None:
         """Open the web page of releases in the browser, and show the installed version.
 
         Studio itself sends no request.
         """
-        opened = open_outside(QUrl(page))
+        opened = open_externally(QUrl(page))
         words = (
             _("This is NEP Studio {version}. The newest version is shown in your browser.")
             if opened

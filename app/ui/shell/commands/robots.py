@@ -22,7 +22,7 @@ class RobotSwap:
     """Missing robot, and the robot that replaces it in the behaviour."""
 
     missing: str
-    other: str
+    replacement: str
 
     @classmethod
     def parse(cls, text: str) -> RobotSwap:
@@ -32,10 +32,10 @@ class RobotSwap:
 
 
 @runtime_checkable
-class FillsScreen(Protocol):
+class SupportsFullScreen(Protocol):
     """Panel that can be shown in full screen."""
 
-    def fill_screen(self) -> None:
+    def toggle_full_screen(self) -> None:
         """Toggle full screen."""
 
 
@@ -51,35 +51,37 @@ class RobotCommands:
         self._other_networks: OtherNetworksSheet | None = None
         self._web_pages: WebPagesSheet | None = None
 
-    def choose_start(self) -> None:
+    def toggle_reset_before_run(self) -> None:
         """Toggle whether virtual robots return to their start position before each run."""
         fleet = self._session.fleet
         try:
-            fleet.choose_start(begins=not fleet.begins_at_start)
+            fleet.set_resets_at_start(begins=not fleet.resets_at_start)
         except SettingsError as error:
-            self._shell.complain(str(error))
+            self._shell.log_problem(str(error))
 
     def start_pepper(self) -> None:
         """Start the virtual Pepper without changing the layout."""
         self._session.launcher.start_virtual_robot()
 
-    def virtual_pepper(self) -> None:
+    def use_virtual_pepper(self) -> None:
         """Start the virtual Pepper and show the Behaviour layout."""
         self.start_pepper()
-        if self._shell.showing != "behaviour":  # otherwise the focus stays where it is
+        if self._shell.current_layout != "behaviour":  # otherwise the focus stays where it is
             self._shell.show_layout("behaviour")
 
-    def virtual_turtle(self) -> None:
+    def use_virtual_turtle(self) -> None:
         """Start the virtual Turtle."""
         self._session.launcher.start_virtual_robot("Turtle", "diffdrive")
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
-        self._shell.show_toast(_("Starting the virtual Turtle"), until=lambda: not self._is_coming("Turtle"))
+        self._shell.show_toast(
+            _("Starting the virtual Turtle"), until=lambda: not self._is_starting("Turtle")
+        )
 
-    def _is_coming(self, name: str) -> bool:
-        return name in self._session.coming
+    def _is_starting(self, name: str) -> bool:
+        return name in self._session.starting_robots
 
-    def end_virtual(self, name: str = "") -> bool:
+    def stop_virtual(self, name: str = "") -> bool:
         """Stop one or all virtual robots that this Studio started. They aren't restored at the next start."""
         launcher = self._session.launcher
         names = [each for each in launcher.wanted if name in {"", each}]
@@ -87,24 +89,24 @@ class RobotCommands:
             launcher.stop_virtual_robot(each)
         return bool(names)
 
-    def room_in_full_screen(self) -> None:
+    def toggle_room_full_screen(self) -> None:
         """Toggle full screen for the room of virtual robots."""
         dock = self._shell.open_panel("robot")
-        if dock is not None and isinstance(dock.panel, FillsScreen):
-            dock.panel.fill_screen()
+        if dock is not None and isinstance(dock.panel, SupportsFullScreen):
+            dock.panel.toggle_full_screen()
 
     def connect(self, name: str) -> None:
         """Restart a missing virtual robot, or show the list of robots for a missing real one."""
-        kind = self._described(name).get("rb:robot")
-        model = _model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
+        kind = self._description(name).get("rb:robot")
+        model = _virtual_model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
         if model is not None:
             self._session.launcher.restart_virtual_robot(name, model)
         else:
             self._shell.open_panel("robots")
 
-    def start_for(self, missing: str) -> bool:
+    def start_virtual_model(self, missing: str) -> bool:
         """Start the virtual model of a missing robot, with undo. Return False if it has none."""
-        model = _model(self._described(missing).get("rb:robot"))
+        model = _virtual_model(self._description(missing).get("rb:robot"))
         if model is None:
             return False
         launcher = self._session.launcher
@@ -113,45 +115,45 @@ class RobotCommands:
             _("Starting the virtual {robot}").format(robot=missing),
             _("Undo"),
             lambda: launcher.stop_virtual_robot(missing),
-            until=lambda: not self._is_coming(missing),
+            until=lambda: not self._is_starting(missing),
         )
         return True
 
-    def _described(self, name: str) -> Mapping[str, object]:
+    def _description(self, name: str) -> Mapping[str, object]:
         # The last description received, or the one saved in the behaviour.
         link = self._session.fleet.link(name)
         return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
-    def use(self, swap: RobotSwap) -> bool:
+    def replace_robot(self, swap: RobotSwap) -> bool:
         """Replace a missing robot in the behaviour, with undo.
 
         Return False if the other one is not connected.
         """
-        link = self._session.fleet.link(swap.other)
+        link = self._session.fleet.link(swap.replacement)
         if link is None:
             return False
         document, robot = self._session.document, link.robot
 
-        def change() -> None:
+        def replace() -> None:
             if document.use_robot(swap.missing, robot):
                 words = _("Replaced {other} with {robot}")
-                words = words.format(robot=swap.other, other=swap.missing)
+                words = words.format(robot=swap.replacement, other=swap.missing)
                 self._shell.show_toast(words, _("Undo"), self._undo)
 
-        self._files.with_newest(change)
+        self._files.after_flush(replace)
         return True
 
-    def ask_before_moving(self) -> None:
+    def revoke_motion_permissions(self) -> None:
         """Revoke the permissions of real robots to move, so that Studio asks again."""
         words = _("Studio will ask again before a real robot moves")
         try:
-            self._session.fleet.permission.forget()
+            self._session.fleet.permission.revoke_all()
         except SettingsError as error:
-            self._shell.complain(str(error))
+            self._shell.log_problem(str(error))
             words = _("Until you close Studio, it will ask again before a real robot moves")
         self._shell.show_toast(words)
 
-    def ask_about_others(self) -> None:
+    def open_network_access(self) -> None:
         """Open the sheet for access from other computers."""
         if self._network_access is None:
             self._network_access = NetworkAccessSheet(
@@ -159,7 +161,7 @@ class RobotCommands:
             )
         self._network_access.open()
 
-    def choose_networks(self) -> None:
+    def open_other_networks(self) -> None:
         """Open the sheet for monitoring other networks."""
         if self._other_networks is None:
             self._other_networks = OtherNetworksSheet(
@@ -183,7 +185,7 @@ class RobotCommands:
         return tuple(link.name for link in self._session.fleet.connected)
 
 
-def _model(kind: object) -> str | None:
+def _virtual_model(kind: object) -> str | None:
     # None if there is no virtual robot of the model.
     model = str(kind.get("model")) if isinstance(kind, Mapping) else ""
     return model if model in VIRTUAL_ROBOTS else None

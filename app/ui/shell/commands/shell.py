@@ -16,7 +16,7 @@ from app.ui.shell.start_page.page import Example
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
 
-START = "start"  # value of `Shell.showing` for the start page
+START_PAGE = "start"  # value of `Shell.showing` for the start page
 
 
 class Shell(Protocol):
@@ -41,7 +41,7 @@ class Shell(Protocol):
         """Parent widget of sheets and menus, in which shortcuts work."""
 
     @property
-    def showing(self) -> str:
+    def current_layout(self) -> str:
         """Name of the current layout, or `START`."""
 
     @property
@@ -52,7 +52,7 @@ class Shell(Protocol):
     def show_toast(self) -> ShowToast:
         """Function that shows a toast."""
 
-    def complain(self, sentence: str) -> None:
+    def log_problem(self, sentence: str) -> None:
         """Log a problem that needs no action in the Console."""
 
     def editor(self) -> object:

@@ -14,18 +14,18 @@ from typing import TypeVar
 from app.core.session import Session
 from app.ui.shell.actions.command import ArgumentCommand, Command
 from app.ui.shell.commands.acting import ActingCommands
-from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPlace, read_stack
+from app.ui.shell.commands.behaviours import BehaviourCommands, TabName, TabPosition, read_stack
 from app.ui.shell.commands.editing import Edit, EditCommands
-from app.ui.shell.commands.freeze import freezable
+from app.ui.shell.commands.freeze import freeze_buttons
 from app.ui.shell.commands.recording import RecordCommands
 from app.ui.shell.commands.replay import ReplayCommands
 from app.ui.shell.commands.reporting import ReportCommands
 from app.ui.shell.commands.robots import RobotCommands, RobotSwap
-from app.ui.shell.commands.shell import START, Shell
+from app.ui.shell.commands.shell import START_PAGE, Shell
 from app.ui.shell.commands.variables import VariableCommands
 from app.ui.shell.commands.view import TEXT_STEP, ViewCommands, read_value
 from app.ui.shell.documents import DocumentController
-from app.ui.theme.theme import TEXT_PERCENT
+from app.ui.theme.theme import TEXT_PERCENT_RANGE
 from nep.i18n import _, lazy
 from nep.programs.alarms import AlarmCondition
 from nep.version import RELEASES_PAGE
@@ -33,7 +33,7 @@ from nep.version import RELEASES_PAGE
 A = TypeVar("A")
 LOOK, RECORD = lazy("Appearance"), lazy("Record")
 MENUS = (lazy("File"), lazy("Edit"), lazy("View"), lazy("Run"), lazy("Robots"), lazy("Help"))
-WHY_NO_RUN = {
+RUN_DISABLED_REASONS = {
     "stopping": lazy("Stopping robots"),
     "unanswered": lazy("Stop not confirmed by a robot"),
 }
@@ -65,7 +65,7 @@ def _no_run(do: Handlers) -> str:
     view = do.session.runs.view()
     if view.can_run or view.can_restart:
         return ""
-    return _(WHY_NO_RUN.get(view.state, NOTHING_TO_RUN))
+    return _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN))
 
 
 def _no_restart(do: Handlers) -> str:
@@ -81,11 +81,11 @@ def _no_pause(do: Handlers) -> str:
 
 def _no_step(do: Handlers) -> str:
     view = do.session.runs.view()
-    return "" if view.can_step else _(WHY_NO_RUN.get(view.state, NOTHING_TO_RUN))
+    return "" if view.can_step else _(RUN_DISABLED_REASONS.get(view.state, NOTHING_TO_RUN))
 
 
 def _no_editor(do: Handlers) -> str:
-    return "" if do.shell.showing == "behaviour" else _("Only in the Behaviour layout")
+    return "" if do.shell.current_layout == "behaviour" else _("Only in the Behaviour layout")
 
 
 def _no_panels(do: Handlers) -> str:
@@ -93,32 +93,32 @@ def _no_panels(do: Handlers) -> str:
 
 
 def _no_own_layout(do: Handlers) -> str:
-    if do.shell.saved_layouts.own(do.shell.showing):
+    if do.shell.saved_layouts.custom_name(do.shell.current_layout):
         return ""
     return _no_panels(do) or _("Built-in layouts can't be changed")
 
 
-def _no_way_back(do: Handlers) -> str:
-    if do.shell.showing != START:
+def _no_previous_layout(do: Handlers) -> str:
+    if do.shell.current_layout != START_PAGE:
         return _("Only on the start page")
     return "" if do.shell.left else _("Nothing open")
 
 
 def _nothing_to_freeze(do: Handlers) -> str:
-    return "" if freezable(do.shell.bench) else _("Nothing to freeze here")
+    return "" if freeze_buttons(do.shell.bench) else _("Nothing to freeze here")
 
 
 def _no_recent(do: Handlers) -> str:
-    return "" if do.session.settings.recent_known else _("The list is empty")
+    return "" if do.session.settings.all_recent else _("The list is empty")
 
 
-def _disabled_without_recording(do: Handlers) -> str:
+def _no_open_recording(do: Handlers) -> str:
     return "" if do.session.replay is not None else _("No recording is open")
 
 
-def _not_there_yet(do: Handlers) -> str:
+def _no_loaded_recording(do: Handlers) -> str:
     if do.session.replay is None:
-        return _disabled_without_recording(do)
+        return _no_open_recording(do)
     return "" if do.session.replay.player is not None else _("The recording is still opening")
 
 
@@ -131,16 +131,16 @@ def _no_virtual_robot(do: Handlers) -> str:
     return "" if do.session.launcher.wanted else _("No virtual robot was started in this window")
 
 
-def _nothing_recorded(do: Handlers) -> str:
+def _not_recording(do: Handlers) -> str:
     return "" if do.session.recordings.is_recording else _("Not recording")
 
 
 def _largest_text(do: Handlers) -> str:
-    return _("Text is at its largest") if do.shell.theme.text_percent >= TEXT_PERCENT[1] else ""
+    return _("Text is at its largest") if do.shell.theme.text_percent >= TEXT_PERCENT_RANGE[1] else ""
 
 
 def _smallest_text(do: Handlers) -> str:
-    return _("Text is at its smallest") if do.shell.theme.text_percent <= TEXT_PERCENT[0] else ""
+    return _("Text is at its smallest") if do.shell.theme.text_percent <= TEXT_PERCENT_RANGE[0] else ""
 
 
 C = Command[Handlers]
@@ -162,12 +162,12 @@ def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) ->
     return C(
         f"edit.{what}",
         text,
-        lambda do: do.editing.do(what),
+        lambda do: do.editing.run(what),
         "Edit",
         icon=icon,
-        shows=key,
-        above=above,
-        why_not=lambda do: do.editing.why_not(what),
+        displayed_key=key,
+        separator_above=above,
+        disabled_reason=lambda do: do.editing.disabled_reason(what),
         in_palette=False,
         in_shortcuts=False,
     )
@@ -178,7 +178,7 @@ def releases(page: str) -> tuple[C, ...]:
     if not page:
         return ()
     return (
-        C("help.releases", lazy("Check for updates"), lambda do: do.reports.look_for_new_version(page),
+        C("help.releases", lazy("Check for updates"), lambda do: do.reports.open_releases_page(page),
           "Help", icon="external-link", tip=lazy("Opens the releases page in your browser")),
     )  # fmt: skip
 
@@ -187,179 +187,188 @@ COMMANDS: tuple[C, ...] = (
     C("file.new", lazy("New behaviour"), lambda do: do.files.new(), "File", ("Ctrl+N",), "file-plus"),
     C("file.open", lazy("Open a file"), lambda do: do.files.ask_open(), "File", ("Ctrl+O",), "folder-open"),
     C("replay.open", lazy("Open a recording"), lambda do: do.replay.ask_open(), "File", icon="film"),
-    C("file.save", lazy("Save"), lambda do: do.files.save(), "File", ("Ctrl+S",), "save", above=True),
+    C("file.save", lazy("Save"), lambda do: do.files.save(), "File", ("Ctrl+S",), "save",
+      separator_above=True),
     C("file.save_as", lazy("Save as"), lambda do: do.files.save_as(), "File", ("Ctrl+Shift+S",),
       "save-pen"),
-    C("picture.save", lazy("Save blocks as image"), lambda do: do.behaviours.pictures.ask(), "File",
-      icon="image-down", why_not=_no_editor),
-    C("print.ask", lazy("Print blocks"), lambda do: do.behaviours.printing.ask(), "File", ("Ctrl+P",),
-      "printer", why_not=_no_editor),
+    C("picture.save", lazy("Save blocks as image"), lambda do: do.behaviours.pictures.ask_save(), "File",
+      icon="image-down", disabled_reason=_no_editor),
+    C("print.ask", lazy("Print blocks"), lambda do: do.behaviours.printing.show_dialog(), "File", ("Ctrl+P",),
+      "printer", disabled_reason=_no_editor),
     C("print.pdf", lazy("Save blocks as PDF"), lambda do: do.behaviours.printing.ask_pdf(), "File",
-      icon="file-text", why_not=_no_editor),
-    C("file.earlier", lazy("Earlier versions"), lambda do: do.behaviours.earlier_versions(), "File"),
+      icon="file-text", disabled_reason=_no_editor),
+    C("file.earlier", lazy("Earlier versions"), lambda do: do.behaviours.show_earlier_versions(), "File"),
     C("tab.close", lazy("Close the behaviour"), lambda do: do.behaviours.close(), "File", ("Ctrl+W",), "x"),
     C("tab.rename", lazy("Rename the behaviour"), lambda do: do.behaviours.rename_current(), "File", ("F2",),
       "pencil"),
     C("tab.reopen", lazy("Reopen closed behaviour"), lambda do: do.files.reopen(), "File",
       ("Ctrl+Shift+T",), "history"),
-    C("file.forget_recent", lazy("Clear recent files"), lambda do: do.behaviours.forget_recent(),
-      why_not=_no_recent),
-    C("file.start_page", lazy("Start page"), lambda do: do.view.start_page(), "File", ("Alt+Home",),
-      "house", above=True, mac=("Ctrl+Shift+H",)),
+    C("file.forget_recent", lazy("Clear recent files"), lambda do: do.behaviours.clear_recent(),
+      disabled_reason=_no_recent),
+    C("file.start_page", lazy("Start page"), lambda do: do.view.show_start_page(), "File", ("Alt+Home",),
+      "house", separator_above=True, mac_keys=("Ctrl+Shift+H",)),
     C("start_page.leave", lazy("Back to your work"), lambda do: do.view.leave_start_page(), icon="arrow-left",
-      in_shortcuts=False, why_not=_no_way_back),
+      in_shortcuts=False, disabled_reason=_no_previous_layout),
     C("settings.open", lazy("Settings"), lambda do: do.view.open_settings(), "File", ("Ctrl+,",), "settings"),
-    C("file.quit", lazy("Quit"), lambda do: do.shell.close(), "File", ("Ctrl+Q",), above=True),
+    C("file.quit", lazy("Quit"), lambda do: do.shell.close(), "File", ("Ctrl+Q",), separator_above=True),
     C("edit.undo", lazy("Undo"), lambda do: do.behaviours.undo(), "Edit", ("Ctrl+Z",), "rotate-ccw",
-      why_not=_no_editor),
+      disabled_reason=_no_editor),
     C("edit.redo", lazy("Redo"), lambda do: do.behaviours.redo(), "Edit", ("Ctrl+Shift+Z", "Ctrl+Y"),
-      "rotate-cw", why_not=_no_editor),
+      "rotate-cw", disabled_reason=_no_editor),
     _edit("cut", lazy("Cut"), "Ctrl+X", "scissors", above=True),
     _edit("copy", lazy("Copy"), "Ctrl+C", "copy"),
     _edit("paste", lazy("Paste"), "Ctrl+V", "clipboard-paste"),
     _edit("selectAll", lazy("Select all"), "Ctrl+A", "text-select"),
     C("picture.copy", lazy("Copy blocks as image"), lambda do: do.behaviours.pictures.copy(),
-      "Edit", icon="image", above=True, why_not=_no_editor),
+      "Edit", icon="image", separator_above=True, disabled_reason=_no_editor),
     C("blocks.find", lazy("Find in blocks"), lambda do: do.behaviours.find_blocks(to_add=False), "Edit",
-      ("Ctrl+F",), "search", above=True),
+      ("Ctrl+F",), "search", separator_above=True),
     C("blocks.search", lazy("Find and add a block"), lambda do: do.behaviours.find_blocks(to_add=True),
       "Edit"),
     C("variable.new", lazy("New variable"), lambda do: do.variables.new(is_list=False), "Edit",
-      icon="variable", above=True),
+      icon="variable", separator_above=True),
     C("variable.new_list", lazy("New list"), lambda do: do.variables.new(is_list=True), "Edit",
       icon="list-plus"),
     C("palette.open", lazy("Find a command or panel"), lambda do: do.view.open_palette(), "View", ("Ctrl+K",),
       "search", in_palette=False),
     # macOS types special characters with Option (Alt) and reserves Cmd+Tab
     C("layout.behaviour", lazy("Behaviour layout"), lambda do: do.view.show_layout("behaviour"), "View",
-      ("Alt+1",), "blocks", group="layout", above=True, mac=("Ctrl+Alt+1",)),
+      ("Alt+1",), "blocks", group="layout", separator_above=True, mac_keys=("Ctrl+Alt+1",)),
     C("layout.developer", lazy("Developer layout"), lambda do: do.view.show_layout("developer"), "View",
-      ("Alt+2",), "activity", group="layout", mac=("Ctrl+Alt+2",)),
-    C("layout.keep", lazy("Save layout as"), lambda do: do.view.keep_layout(), "View",
-      under=lazy("Layouts"), why_not=_no_panels),
+      ("Alt+2",), "activity", group="layout", mac_keys=("Ctrl+Alt+2",)),
+    C("layout.keep", lazy("Save layout as"), lambda do: do.view.save_layout(), "View",
+      submenu=lazy("Layouts"), disabled_reason=_no_panels),
     C("layout.rename", lazy("Rename layout"), lambda do: do.view.rename_layout(), "View",
-      under=lazy("Layouts"), why_not=_no_own_layout),
+      submenu=lazy("Layouts"), disabled_reason=_no_own_layout),
     C("layout.delete", lazy("Delete layout"), lambda do: do.view.delete_layout(), "View", icon="trash-2",
-      under=lazy("Layouts"), why_not=_no_own_layout),
+      submenu=lazy("Layouts"), disabled_reason=_no_own_layout),
     C("layout.export", lazy("Save layout to a file"), lambda do: do.view.export_layout(), "View",
-      icon="download", under=lazy("Layouts"), why_not=_no_panels),
+      icon="download", submenu=lazy("Layouts"), disabled_reason=_no_panels),
     C("layout.open", lazy("Open a layout from a file"), lambda do: do.view.ask_layout(), "View",
-      icon="folder-open", under=lazy("Layouts")),
+      icon="folder-open", submenu=lazy("Layouts")),
     C("layout.reset", lazy("Reset panels"), lambda do: do.view.reset_layout(), "View",
-      why_not=_no_panels),
+      disabled_reason=_no_panels),
     C("panel.next", lazy("Next panel"), lambda do: do.shell.panel_focus.next(1), "View", ("F6",),
-      why_not=_no_panels),
+      disabled_reason=_no_panels),
     C("panel.previous", lazy("Previous panel"), lambda do: do.shell.panel_focus.next(-1), "View",
-      ("Shift+F6",), why_not=_no_panels),
+      ("Shift+F6",), disabled_reason=_no_panels),
     *map(_go_to_panel, range(1, 10)),
     C("tab.next", lazy("Next behaviour"), lambda do: do.behaviours.next_tab(1), "View", ("Ctrl+Tab",),
-      above=True, mac=("Meta+Tab", "Ctrl+Shift+]")),
+      separator_above=True, mac_keys=("Meta+Tab", "Ctrl+Shift+]")),
     C("tab.previous", lazy("Previous behaviour"), lambda do: do.behaviours.next_tab(-1), "View",
-      ("Ctrl+Shift+Tab",), mac=("Meta+Shift+Tab", "Ctrl+Shift+[")),
+      ("Ctrl+Shift+Tab",), mac_keys=("Meta+Shift+Tab", "Ctrl+Shift+[")),
     C("view.freeze", lazy("Freeze display"), lambda do: do.view.freeze(), "View", icon="snowflake",
-      tip=lazy("Freezes the Inspector and images"), check=True, above=True,
-      why_not=_nothing_to_freeze),
-    C("replay.live", lazy("Back to live"), lambda do: do.replay.back_to_live(), "View", icon="radio-tower",
-      tip=lazy("Closes the recording and returns to the live network"), above=True,
-      why_not=_disabled_without_recording),
+      tip=lazy("Freezes the Inspector and images"), is_checkable=True, separator_above=True,
+      disabled_reason=_nothing_to_freeze),
+    C("replay.live", lazy("Back to live"), lambda do: do.replay.return_to_live(), "View", icon="radio-tower",
+      tip=lazy("Closes the recording and returns to the live network"), separator_above=True,
+      disabled_reason=_no_open_recording),
     C("replay.play", lazy("Play recording"), lambda do: do.replay.play(), icon="play",
-      why_not=_not_there_yet),
+      disabled_reason=_no_loaded_recording),
     C("replay.bookmark", lazy("Add bookmark"), lambda do: do.replay.bookmark(), icon="bookmark",
-      why_not=_not_there_yet),
+      disabled_reason=_no_loaded_recording),
     C("theme.light", lazy("Light"), lambda do: do.view.set_theme("light"), "View", icon="sun", group="theme",
-      under=LOOK),
+      submenu=LOOK),
     C("theme.dark", lazy("Dark"), lambda do: do.view.set_theme("dark"), "View", icon="moon", group="theme",
-      under=LOOK),
+      submenu=LOOK),
     C("theme.system", lazy("Match system"), lambda do: do.view.set_theme("system"), "View", icon="monitor",
-      group="theme", under=LOOK),
+      group="theme", submenu=LOOK),
     C("text.larger", lazy("Larger text"),
-      lambda do: do.view.set_text(do.shell.theme.text_percent + TEXT_STEP), "View", ("Ctrl++", "Ctrl+="),
-      "zoom-in", above=True, why_not=_largest_text),
+      lambda do: do.view.set_text_size(do.shell.theme.text_percent + TEXT_STEP), "View", ("Ctrl++", "Ctrl+="),
+      "zoom-in", separator_above=True, disabled_reason=_largest_text),
     C("text.smaller", lazy("Smaller text"),
-      lambda do: do.view.set_text(do.shell.theme.text_percent - TEXT_STEP), "View", ("Ctrl+-",), "zoom-out",
-      why_not=_smallest_text),
-    C("text.normal", lazy("Normal text"), lambda do: do.view.set_text(100), "View", ("Ctrl+0",)),
-    C("theme.contrast", lazy("High contrast"), lambda do: do.view.choose_contrast(), "View", check=True,
-      under=LOOK, above=True),
-    C("theme.motion", lazy("Reduce motion"), lambda do: do.view.choose_motion(), "View", check=True,
-      under=LOOK),
-    C("run.run", lazy("Run"), lambda do: do.behaviours.run_or_go_on(), "Run", ("F5",), "play",
-      lazy("Runs the behaviour, or restarts it"), why_not=_no_run),
+      lambda do: do.view.set_text_size(do.shell.theme.text_percent - TEXT_STEP), "View", ("Ctrl+-",),
+      "zoom-out",
+      disabled_reason=_smallest_text),
+    C("text.normal", lazy("Normal text"), lambda do: do.view.set_text_size(100), "View", ("Ctrl+0",)),
+    C("theme.contrast", lazy("High contrast"), lambda do: do.view.update_contrast(), "View",
+      is_checkable=True,
+      submenu=LOOK, separator_above=True),
+    C("theme.motion", lazy("Reduce motion"), lambda do: do.view.update_motion(), "View", is_checkable=True,
+      submenu=LOOK),
+    C("run.run", lazy("Run"), lambda do: do.behaviours.run_or_resume(), "Run", ("F5",), "play",
+      lazy("Runs the behaviour, or restarts it"), disabled_reason=_no_run),
     C("run.restart", lazy("Restart"), lambda do: do.behaviours.restart(), "Run", ("Ctrl+F5",), "rotate-ccw",
-      lazy("Stops the program and runs the behaviour in its current state"), why_not=_no_restart),
+      lazy("Stops the program and runs the behaviour in its current state"), disabled_reason=_no_restart),
     C("run.pause", lazy("Pause"), lambda do: do.session.runs.pause(), "Run", ("F8",), "pause",
-      lazy("Pauses the program and its robots"), why_not=_no_pause),
+      lazy("Pauses the program and its robots"), disabled_reason=_no_pause),
     C("run.step", lazy("Step"), lambda do: do.behaviours.run_step(), "Run", ("F10",), "step-forward",
-      lazy("Runs one block"), why_not=_no_step),
+      lazy("Runs one block"), disabled_reason=_no_step),
     C("run.full_speed", lazy("Full speed"), lambda do: do.session.runs.set_pace(0.0), "Run", group="pace",
-      above=True),
+      separator_above=True),
     C("run.slow", lazy("Slow motion: 0.5 s per block"), lambda do: do.session.runs.set_pace(0.5), "Run",
       group="pace"),
     C("run.very_slow", lazy("Very slow: 1.5 s per block"), lambda do: do.session.runs.set_pace(1.5), "Run",
       group="pace"),
     C("run.from_start", lazy("Reset robots to their start position before each run"),
-      lambda do: do.robots.choose_start(), "Run", check=True, above=True,
+      lambda do: do.robots.toggle_reset_before_run(), "Run", is_checkable=True, separator_above=True,
       tip=lazy("Virtual robots return to their start position before each run")),
     # two keys: on Macs and many laptops F12 changes the volume
     C("run.stop", lazy("Stop the program and all robots"), lambda do: do.session.runs.stop(), "Run",
-      ("F12", "Ctrl+."), "square", lazy("Stops the program and every robot"), above=True, everywhere=True),
-    C("run.confirm", lazy("Not playing"), lambda do: do.session.runs.confirm_still(), in_palette=False,
+      ("F12", "Ctrl+."), "square", lazy("Stops the program and every robot"), separator_above=True,
+      in_all_windows=True),
+    C("run.confirm", lazy("Not playing"), lambda do: do.session.runs.confirm_stopped(), in_palette=False,
       in_shortcuts=False),
-    C("robots.virtual", lazy("Use the virtual Pepper"), lambda do: do.robots.virtual_pepper(), "Robots",
+    C("robots.virtual", lazy("Use the virtual Pepper"), lambda do: do.robots.use_virtual_pepper(), "Robots",
       icon="bot"),
-    C("robots.turtle", lazy("Use the virtual Turtle"), lambda do: do.robots.virtual_turtle(), "Robots",
+    C("robots.turtle", lazy("Use the virtual Turtle"), lambda do: do.robots.use_virtual_turtle(), "Robots",
       icon="bot"),
-    C("robots.end_virtual", lazy("Remove virtual robots"), lambda do: do.robots.end_virtual(), "Robots",
-      why_not=_no_virtual_robot),
-    C("robots.room", lazy("Room in full screen"), lambda do: do.robots.room_in_full_screen(), "Robots",
-      ("F11",), "fullscreen", why_not=_no_room),
+    C("robots.end_virtual", lazy("Remove virtual robots"), lambda do: do.robots.stop_virtual(), "Robots",
+      disabled_reason=_no_virtual_robot),
+    C("robots.room", lazy("Room in full screen"), lambda do: do.robots.toggle_room_full_screen(), "Robots",
+      ("F11",), "fullscreen", disabled_reason=_no_room),
     # unlike "robots.virtual" without changing the layout
     C("robots.start", lazy("Start the virtual Pepper"), lambda do: do.robots.start_pepper(), in_palette=False,
       in_shortcuts=False),
     C("robots.show", lazy("Try what a robot can do"), lambda do: do.shell.open_panel("robots"), "Robots",
-      icon="eye", above=True),
-    C("robots.ask", lazy("Ask again before real robots move"), lambda do: do.robots.ask_before_moving(),
+      icon="eye", separator_above=True),
+    C("robots.ask", lazy("Ask again before real robots move"),
+      lambda do: do.robots.revoke_motion_permissions(),
       "Robots", icon="footprints"),
-    C("network.others", lazy("Let other computers connect"), lambda do: do.robots.ask_about_others(),
-      "Robots", icon="wifi", above=True),
-    C("network.look", lazy("Browse other robot networks"), lambda do: do.robots.choose_networks(), "Robots",
+    C("network.others", lazy("Let other computers connect"), lambda do: do.robots.open_network_access(),
+      "Robots", icon="wifi", separator_above=True),
+    C("network.look", lazy("Browse other robot networks"), lambda do: do.robots.open_other_networks(),
+      "Robots",
       icon="waypoints"),
     C("network.web", lazy("Web pages and tablets"), lambda do: do.robots.show_web_pages(), "Robots",
       icon="globe"),
-    C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell", above=True,
-      why_not=_no_panels),
+    C("alarm.new", lazy("New alarm"), lambda do: do.view.new_alarm(), "View", icon="bell",
+      separator_above=True,
+      disabled_reason=_no_panels),
     C("publish.new", lazy("Publish a message"), lambda do: do.acting.publish(), icon="send",
       tip=lazy("Creates a message; nothing is sent until you arm sending")),
     C("service.show", lazy("Call a service"), lambda do: do.acting.call(""), icon="spline",
       tip=lazy("Shows the services that programs offer")),
     C("recording.toggle", lazy("Start or stop recording"), lambda do: do.recording.toggle(), "View",
-      ("Ctrl+R",), "circle-dot", lazy("Records messages of programs until stopped"), under=RECORD),
+      ("Ctrl+R",), "circle-dot", lazy("Records messages of programs until stopped"), submenu=RECORD),
     C("recording.stop", lazy("Stop recording"), lambda do: do.session.recordings.stop(), icon="circle-dot",
-      in_shortcuts=False, why_not=_nothing_recorded),
+      in_shortcuts=False, disabled_reason=_not_recording),
     C("recording.sheet", lazy("Choose topics to record"), lambda do: do.recording.open_sheet(), "View",
-      icon="list-checks", under=RECORD),
-    C("recording.keep", lazy("Save the last seconds"), lambda do: do.recording.keep(), "View", ("F9",),
-      "history", lazy("Saves what just happened as a recording"), under=RECORD, above=True),
-    C("recording.folder", lazy("Folder for recordings"), lambda do: do.recording.choose_folder(), "View",
-      icon="folder-open", under=RECORD, above=True),
+      icon="list-checks", submenu=RECORD),
+    C("recording.keep", lazy("Save the last seconds"), lambda do: do.recording.save_last(), "View", ("F9",),
+      "history", lazy("Saves what just happened as a recording"), submenu=RECORD, separator_above=True),
+    C("recording.folder", lazy("Folder for recordings"), lambda do: do.recording.select_folder(), "View",
+      icon="folder-open", submenu=RECORD, separator_above=True),
     C("recording.show", lazy("Recordings"), lambda do: do.recording.show(), "View", icon="film",
-      under=RECORD, in_palette=False),
-    C("help.first_steps", lazy("First steps"), lambda do: do.view.first_steps(), "Help", icon="lightbulb"),
+      submenu=RECORD, in_palette=False),
+    C("help.first_steps", lazy("First steps"), lambda do: do.view.show_first_steps(), "Help",
+      icon="lightbulb"),
     C("help.guide", lazy("Guide"), lambda do: do.view.open_guide(), "Help", icon="book-open"),
-    C("help.examples", lazy("Examples"), lambda do: do.view.examples(), "Help", icon="blocks"),
+    C("help.examples", lazy("Examples"), lambda do: do.view.show_examples(), "Help", icon="blocks"),
     C("help.shortcuts", lazy("Keyboard shortcuts"), lambda do: do.view.open_shortcuts(), "Help", ("F1",),
       "keyboard"),
     C("help.doctor", lazy("Connection doctor"), lambda do: do.view.open_doctor(), "Help", ("F4",),
       "stethoscope"),
     C("help.report", lazy("Report a problem"), lambda do: do.reports.report(), "Help",
-      icon="message-square-warning", above=True),
+      icon="message-square-warning", separator_above=True),
     C("help.log", lazy("Show the log"), lambda do: do.view.show_log(), "Help", icon="folder-open"),
     *releases(RELEASES_PAGE),
-    C("help.about", lazy("About NEP Studio"), lambda do: do.view.about(), "Help", icon="info", above=True),
+    C("help.about", lazy("About NEP Studio"), lambda do: do.view.about(), "Help", icon="info",
+      separator_above=True),
 )  # fmt: skip
 
 
-def _about(
+def _argument_command(
     id: str, parse: Callable[[str], A], run: Callable[[Handlers, A], object]
 ) -> ArgumentCommand[Handlers]:
     # `run` returns False if the argument refers to nothing.
@@ -367,47 +376,47 @@ def _about(
 
 
 def _fix_blocks(verb: str) -> ArgumentCommand[Handlers]:
-    return _about(verb, str, lambda do, what: do.files.fix(f"{verb}:{what}"))
+    return _argument_command(verb, str, lambda do, what: do.files.fix(f"{verb}:{what}"))
 
 
 ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
-    _about("panel", str, lambda do, name: do.shell.open_panel(name) is not None),
-    _about("inspect", str, lambda do, topic: do.view.inspect(topic)),
-    _about(
+    _argument_command("panel", str, lambda do, name: do.shell.open_panel(name) is not None),
+    _argument_command("inspect", str, lambda do, topic: do.view.inspect(topic)),
+    _argument_command(
         "alarm.topic", str, lambda do, topic: do.view.new_alarm(AlarmCondition("silent", topic, for_s=2.0))
     ),
-    _about("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
-    _about("alarm.value", read_value, lambda do, about: do.view.alarm_on_value(about)),
-    _about("publish.topic", str, lambda do, topic: do.acting.publish(topic)),
-    _about("service.call", str, lambda do, service: do.acting.call(service)),
-    _about("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
-    _about("recording.open", Path, lambda do, path: do.replay.open(path)),
-    _about("recording.export", Path, lambda do, path: do.recording.show_for_export(path)),
-    _about("recording.folder", Path, lambda do, path: do.replay.show_folder(path)),
-    _about("key", str, lambda do, key: do.view.press(key)),
-    _about("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
-    _about("try", read_stack, lambda do, stack: do.behaviours.try_stack(stack)),
-    _about("block", str, lambda do, block: do.behaviours.show_block(block)),
-    _about("variable.rename", str, lambda do, id: do.variables.ask_other_name(id)),
-    _about("variable.delete", str, lambda do, id: do.variables.delete(id)),
-    _about("variable.watch", str, lambda do, id: do.variables.watch(id)),
-    _about("variable.find", str, lambda do, id: do.variables.find(id)),
-    _about("variable.put", str, lambda do, id: do.variables.put(id)),
-    _about("point.block", str, lambda do, block: do.behaviours.point_at(block)),
-    _about("point.button", str, lambda do, command: do.view.point_at(command)),
-    _about("tab", str, lambda do, key: do.behaviours.show_tab(key)),
-    _about("tab.close", str, lambda do, key: do.behaviours.close_tab(key)),
-    _about("tab.close_others", str, lambda do, key: do.behaviours.close_other_tabs(key)),
-    _about("tab.save_as", str, lambda do, key: do.behaviours.save_tab_as(key)),
-    _about("tab.rename", TabName.parse, lambda do, to: do.behaviours.rename_tab(to)),
-    _about("tab.duplicate", str, lambda do, key: do.behaviours.duplicate_tab(key)),
-    _about("tab.save", str, lambda do, key: do.behaviours.save_tab(key)),
-    _about("tab.folder", str, lambda do, key: do.behaviours.show_folder(key)),
-    _about("tab.move", TabPlace.parse, lambda do, place: do.behaviours.move_tab(place)),
-    _about("connect", str, lambda do, robot: do.robots.connect(robot)),
-    _about("robot.use", RobotSwap.parse, lambda do, swap: do.robots.use(swap)),
-    _about("robot.end_virtual", str, lambda do, robot: do.robots.end_virtual(robot)),
-    _about("robot.virtual", str, lambda do, missing: do.robots.start_for(missing)),
+    _argument_command("alarm.node", str, lambda do, node: do.view.new_alarm(AlarmCondition("leaves", node))),
+    _argument_command("alarm.value", read_value, lambda do, about: do.view.new_value_alarm(about)),
+    _argument_command("publish.topic", str, lambda do, topic: do.acting.publish(topic)),
+    _argument_command("service.call", str, lambda do, service: do.acting.call(service)),
+    _argument_command("record.topic", str, lambda do, topic: do.recording.record_topic(topic)),
+    _argument_command("recording.open", Path, lambda do, path: do.replay.open(path)),
+    _argument_command("recording.export", Path, lambda do, path: do.recording.show_for_export(path)),
+    _argument_command("recording.folder", Path, lambda do, path: do.replay.show_folder(path)),
+    _argument_command("key", str, lambda do, key: do.view.run_key(key)),
+    _argument_command("blocks.edit", str, lambda do, what: do.behaviours.edit_blocks(what)),
+    _argument_command("try", read_stack, lambda do, stack: do.behaviours.try_stack(stack)),
+    _argument_command("block", str, lambda do, block: do.behaviours.show_block(block)),
+    _argument_command("variable.rename", str, lambda do, id: do.variables.ask_rename(id)),
+    _argument_command("variable.delete", str, lambda do, id: do.variables.delete(id)),
+    _argument_command("variable.watch", str, lambda do, id: do.variables.watch(id)),
+    _argument_command("variable.find", str, lambda do, id: do.variables.find(id)),
+    _argument_command("variable.put", str, lambda do, id: do.variables.ask_value(id)),
+    _argument_command("point.block", str, lambda do, block: do.behaviours.point_at(block)),
+    _argument_command("point.button", str, lambda do, command: do.view.point_at(command)),
+    _argument_command("tab", str, lambda do, key: do.behaviours.show_tab(key)),
+    _argument_command("tab.close", str, lambda do, key: do.behaviours.close_tab(key)),
+    _argument_command("tab.close_others", str, lambda do, key: do.behaviours.close_other_tabs(key)),
+    _argument_command("tab.save_as", str, lambda do, key: do.behaviours.save_tab_as(key)),
+    _argument_command("tab.rename", TabName.parse, lambda do, to: do.behaviours.rename_tab(to)),
+    _argument_command("tab.duplicate", str, lambda do, key: do.behaviours.duplicate_tab(key)),
+    _argument_command("tab.save", str, lambda do, key: do.behaviours.save_tab(key)),
+    _argument_command("tab.folder", str, lambda do, key: do.behaviours.show_folder(key)),
+    _argument_command("tab.move", TabPosition.parse, lambda do, place: do.behaviours.move_tab(place)),
+    _argument_command("connect", str, lambda do, robot: do.robots.connect(robot)),
+    _argument_command("robot.use", RobotSwap.parse, lambda do, swap: do.robots.replace_robot(swap)),
+    _argument_command("robot.end_virtual", str, lambda do, robot: do.robots.stop_virtual(robot)),
+    _argument_command("robot.virtual", str, lambda do, missing: do.robots.start_virtual_model(missing)),
     *map(
         _fix_blocks, ("limit", "define", "add", "after", "begin", "receive")
     ),  # for buttons of problems (`app.blocks.fixes.fixes`)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from itertools import chain, count
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from app.blocks.model.workspace import Placed, Workspace, parse_workspace
+from app.blocks.model.workspace import PlacedBlock, Workspace, parse_workspace
 from app.core.session import Session
 from app.robots.description.typed_number import TypedNumberError, parse_number
 from app.ui.shell.commands.shell import Shell
@@ -46,35 +46,39 @@ class VariableCommands:
         question = _("New list") if is_list else _("New variable")
         verb = _("Create")
 
-        def asked() -> None:
+        def ask_name() -> None:
             take = lambda name: self._edit({"do": "new", "name": name, "list": is_list})  # noqa: E731
-            self._ask().ask(question, verb, self.refusal, take, self._free_name(is_list=is_list))
+            self._get_name_sheet().ask(
+                question, verb, self.rejection_reason, take, self._free_name(is_list=is_list)
+            )
 
-        self._with_newest(asked)
+        self._after_flush(ask_name)
 
     def _free_name(self, *, is_list: bool) -> str:
         # Suggests a name so that none has to be typed: "count", "count 2", "count 3".
         first = pgettext("variable", "list") if is_list else pgettext("variable", "count")
-        return next(n for n in chain([first], (f"{first} {n}" for n in count(2))) if not self.refusal(n))
+        return next(
+            n for n in chain([first], (f"{first} {n}" for n in count(2))) if not self.rejection_reason(n)
+        )
 
-    def ask_other_name(self, id: str) -> None:
+    def ask_rename(self, id: str) -> None:
         """Ask for a new name of a variable, or for the first name of an unnamed variable."""
 
-        def asked() -> None:
+        def ask_name() -> None:
             workspace = self._workspace()
             old = workspace.variables.get(id)
             if old is None:
                 return
-            has_name = id not in workspace.nameless
-            self._ask().ask(
+            has_name = id not in workspace.nameless_variables
+            self._get_name_sheet().ask(
                 _("New name for “{name}”").format(name=old) if has_name else _("Variable name"),
                 _("Rename") if has_name else _("Name it"),
-                lambda name: "" if name == old else self.refusal(name, id),
+                lambda name: "" if name == old else self.rejection_reason(name, id),
                 lambda name: self._edit({"do": "rename", "id": id, "name": name}),
                 old if has_name else "",
             )
 
-        self._with_newest(asked)
+        self._after_flush(ask_name)
 
     def delete(self, id: str) -> None:
         """Delete a variable and the blocks that use it; the toast offers to undo it."""
@@ -94,7 +98,7 @@ class VariableCommands:
                 ).format(name=name, count=count)
             self._shell.show_toast(said, _("Undo"), lambda: self._edit({"do": "undo"}))
 
-        self._with_newest(delete)
+        self._after_flush(delete)
 
     def watch(self, id: str) -> None:
         """Show or hide the variable's value next to the blocks."""
@@ -111,9 +115,9 @@ class VariableCommands:
                 self._used_before = {id: uses[place]}
                 self._edit({"do": "show", "id": uses[place]})
 
-        self._with_newest(show)
+        self._after_flush(show)
 
-    def put(self, id: str) -> None:
+    def ask_value(self, id: str) -> None:
         """Ask for a new value of a variable while the program runs."""
         runs = self._session.runs
         name = self._workspace().variables.get(id)
@@ -122,19 +126,19 @@ class VariableCommands:
             return
 
         def take(words: str) -> None:
-            if not runs.put_variable(id, value_of(words)):
+            if not runs.set_variable(id, parse_value(words)):
                 self._shell.show_toast(_("The behaviour ended: “{name}” was not changed").format(name=name))
 
         is_number = now is not None and now.kind == "number"
-        self._ask().ask(
+        self._get_name_sheet().ask(
             _("New value for “{name}”").format(name=name),
             _("Apply"),
-            lambda words: separators_refusal(words) if is_number else "",
+            lambda words: separator_problem(words) if is_number else "",
             take,
             now.text if now is not None and now.kind in ("number", "text", "boolean") else "",
         )
 
-    def refusal(self, name: str, own: str = "") -> str:
+    def rejection_reason(self, name: str, own: str = "") -> str:
         """Return the reason why a name is invalid, or "". ``own`` is the id of the variable to rename."""
         if not name:
             return _("Enter a name for the variable.")
@@ -145,9 +149,9 @@ class VariableCommands:
             return _("A variable named “{name}” already exists. Choose another name.").format(name=name)
         return ""
 
-    def _with_newest(self, act: Callable[[], None]) -> None:
+    def _after_flush(self, act: Callable[[], None]) -> None:
         self._shell.show_layout("behaviour")
-        self._files.with_newest(act)
+        self._files.after_flush(act)
 
     def _workspace(self) -> Workspace:
         return parse_workspace(self._session.document.workspace)
@@ -157,7 +161,7 @@ class VariableCommands:
         if isinstance(editor, SupportsVariables):
             editor.edit_variable(edit)
 
-    def _ask(self) -> name_sheet.NameSheet:
+    def _get_name_sheet(self) -> name_sheet.NameSheet:
         if self._sheet is None:
             self._sheet = name_sheet.NameSheet(self._shell.theme, self._shell.surface)
         return self._sheet
@@ -166,20 +170,22 @@ class VariableCommands:
 def uses_of(workspace: Workspace, id: str) -> list[str]:
     """Return the ids of the blocks that set, change or read a variable, in page order."""
     found: list[str] = []
-    waiting: list[Placed] = [placed for script in reversed(workspace.scripts) for placed in reversed(script)]
+    waiting: list[PlacedBlock] = [
+        placed for script in reversed(workspace.scripts) for placed in reversed(script)
+    ]
     while waiting:
         placed = waiting.pop()
-        if any(_names(value, id) for value in placed.fields.values()):
+        if any(_refers_to(value, id) for value in placed.fields.values()):
             found.append(placed.id)
         waiting += [each for chain in reversed(list(placed.inputs.values())) for each in reversed(chain)]
     return found
 
 
-def _names(field: object, id: str) -> bool:
+def _refers_to(field: object, id: str) -> bool:
     return isinstance(field, Mapping) and field.get("id") == id
 
 
-def separators_refusal(words: str) -> str:
+def separator_problem(words: str) -> str:
     """Return the reason why a number with several separators is not a valid value; "" for other text."""
     try:
         parse_number(words)
@@ -188,7 +194,7 @@ def separators_refusal(words: str) -> str:
     return ""
 
 
-def value_of(words: str) -> str | float | bool:
+def parse_value(words: str) -> str | float | bool:
     """Parse a typed value: a number, yes or no (or "true" and "false"), else text."""
     plain = words.strip()
     said = plain.casefold()

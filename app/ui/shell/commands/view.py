@@ -18,26 +18,26 @@ from app import resources
 from app.core.faults import log_folder
 from app.core.recording.choice import file_stem
 from app.core.session import Session
-from app.core.storage.atomic_file import read_whole, write_atomically
-from app.ui.other_programs import open_outside
+from app.core.storage.atomic_file import read_regular_file, write_atomically
+from app.ui.other_programs import open_externally
 from app.ui.shell.actions.actions import Actions
 from app.ui.shell.actions.shortcuts import Shortcuts
-from app.ui.shell.commands.freeze import freeze_or_go_on
+from app.ui.shell.commands.freeze import toggle_freeze
 from app.ui.shell.commands.palette_entries import PaletteEntries
-from app.ui.shell.commands.shell import START, Shell
+from app.ui.shell.commands.shell import START_PAGE, Shell
 from app.ui.shell.dialogs.about import AboutSheet
 from app.ui.shell.docking.layout_file import MAX_BYTES, LayoutFileError, layout_bytes, read_layout
 from app.ui.shell.docking.layouts import layout_named
 from app.ui.shell.documents import DocumentController
 from app.ui.shell.hint_ring import HintRing
-from app.ui.speaker import has_voice_engine, voice_words
+from app.ui.speaker import has_voice_engine, voice_text
 from app.ui.theme.system import Preference
 from app.ui.theme.theme import Mode
 from app.ui.widgets.file_dialogs import LAYOUTS, FileKind
 from app.ui.widgets.lists.fuzzy import Entry
 from nep.errors import NepError
-from nep.i18n import _, language, listed
-from nep.messages.fields import parse_path, pick
+from nep.i18n import _, format_list, language
+from nep.messages.fields import parse_path, value_at
 from nep.programs.alarms import AlarmCondition
 from nep.programs.alarms.rule import NUMBER_KINDS
 from nep.system.lazy_import import lazy_module
@@ -66,15 +66,15 @@ MAX_NAMED = 4
 class SupportsRobotChoice(Protocol):
     """Panel that can show one of several robots."""
 
-    def choose(self, name: str) -> None:
+    def select_robot(self, name: str) -> None:
         """Select the robot of this name."""
 
 
 @runtime_checkable
-class AnswersWhy(Protocol):
+class SupportsDiagnosis(Protocol):
     """Panel of the connection doctor."""
 
-    def begin_for(self, asker: PanelWidget | None) -> None:
+    def check_panel(self, asker: PanelWidget | None) -> None:
         """Set the panel whose missing data is to be diagnosed; None for a general check."""
 
 
@@ -82,7 +82,7 @@ class AnswersWhy(Protocol):
 class SupportsAlarms(Protocol):
     """Panel of alarms."""
 
-    def begin(self) -> None:
+    def add_alarm(self) -> None:
         """Start to create an alarm."""
 
     def edit(self, rule_id: str, slot: str) -> None:
@@ -108,26 +108,26 @@ class ViewCommands:
         self._ring: HintRing | None = None
         self._guide: guide.GuideSheet | None = None
 
-    def use(self, actions: Actions, entries: PaletteEntries) -> None:
+    def set_actions(self, actions: Actions, entries: PaletteEntries) -> None:
         """Set the actions to keep up to date, and the entries of the palette."""
         self._actions, self._entries = actions, entries
         self.shortcuts.changed.connect(self.show_keys)
-        self._shell.theme.changed.connect(self._mark_theme)
+        self._shell.theme.changed.connect(self._update_theme_actions)
         self.show_keys()
-        self._mark_theme()
+        self._update_theme_actions()
 
     def show_keys(self) -> None:
         """Update the keys of all actions.
 
         Find has its key only in the Behaviour layout; in other layouts, panels use the key themselves.
         """
-        here = self._shell.showing == "behaviour" and self._shell.bench is not None
-        of = self.shortcuts.of
+        here = self._shell.current_layout == "behaviour" and self._shell.bench is not None
+        of = self.shortcuts.keys_of
         self._actions.set_keys(lambda name: of(name) if here or name != "blocks.find" else ())
 
-    def press(self, key: str) -> bool:
+    def run_key(self, key: str) -> bool:
         """Run the command that has a key. Return False if there is none."""
-        holder = self.shortcuts.holder(key)
+        holder = self.shortcuts.command_for(key)
         return bool(holder) and self._actions.run(holder)
 
     def open_palette(self) -> None:
@@ -135,14 +135,14 @@ class ViewCommands:
         if self._palette is None:
             shell = self._shell
             self._palette = command_palette.Palette(
-                shell.theme, shell.surface, self._entries.all, self.do, self._rebind
+                shell.theme, shell.surface, self._entries.all, self.run_entry, self._rebind
             )
             kept: list[object] = self._session.settings.get("palette_last", [])
             self._palette.last = [id for id in kept if isinstance(id, str)]
-            self._palette.on_last = lambda ids: shell.state.keep("palette_last", list(ids))
+            self._palette.on_last = lambda ids: shell.state.save("palette_last", list(ids))
         self._palette.open()
 
-    def do(self, entry: Entry) -> None:
+    def run_entry(self, entry: Entry) -> None:
         """Run an entry of the palette."""
         kind, name, shell = entry.kind, entry.name, self._shell
         if kind == "command":
@@ -153,15 +153,15 @@ class ViewCommands:
             if shell.bench is None:
                 self.show_layout("developer")
             shell.open_topic(name)
-            self._mark_topic(name)
+            self._select_topic(name)
         elif kind == "robot":
             dock = shell.open_panel("robots")
             if dock is not None and isinstance(dock.panel, SupportsRobotChoice):
-                dock.panel.choose(name)
+                dock.panel.select_robot(name)
         elif kind == "layout":
             self.show_own_layout(name)
         elif kind in {"file", "example"}:
-            (self._files.open if kind == "file" else self._files.example)(Path(name))
+            (self._files.open if kind == "file" else self._files.open_example)(Path(name))
 
     def _open_panel(self, name: str, *, one_more: bool) -> None:
         bench = self._shell.bench
@@ -176,7 +176,7 @@ class ViewCommands:
         dock = bench.open_latest("inspector") if bench is not None else None
         if dock is not None:
             dock.panel.show_topic(topic)
-            self._mark_topic(topic)
+            self._select_topic(topic)
 
     def new_alarm(self, about: AlarmCondition | None = None) -> None:
         """Create an alarm with a condition and open it for editing."""
@@ -184,15 +184,15 @@ class ViewCommands:
         if dock is None or not isinstance(dock.panel, SupportsAlarms):
             return
         if about is None:
-            dock.panel.begin()
+            dock.panel.add_alarm()
             return
-        rule = self._session.alarms.new(about)
+        rule = self._session.alarms.create(about)
         waits = about.kind in NUMBER_KINDS  # the limit has to be entered first
         if waits:
-            self._session.alarms.put(replace(rule, is_on=False))
+            self._session.alarms.set_rule(replace(rule, is_enabled=False))
         dock.panel.edit(rule.id, "limit" if waits else "")
 
-    def alarm_on_value(self, about: tuple[str, str]) -> None:
+    def new_value_alarm(self, about: tuple[str, str]) -> None:
         """Create an alarm on a value of a topic.
 
         If the value is a number, the user has to enter the limit.
@@ -202,13 +202,13 @@ class ViewCommands:
         newest = known.newest if known is not None else None
         value: object = None
         with suppress(NepError):
-            value = pick(newest.payload, parse_path(path or ".")) if newest is not None else None
+            value = value_at(newest.payload, parse_path(path or ".")) if newest is not None else None
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         limit = value if isinstance(value, int | float) and is_number else None
         kind = "below" if is_number else "changes"
         self.new_alarm(AlarmCondition(kind, topic, path or ".", limit))
 
-    def _mark_topic(self, name: str) -> None:
+    def _select_topic(self, name: str) -> None:
         # If the topics panel is open, the topic is selected there too.
         bench = self._shell.bench
         if bench is not None and "topics" in bench.open_names():
@@ -216,16 +216,16 @@ class ViewCommands:
 
     def open_shortcuts(self) -> None:
         """Open the sheet of shortcuts."""
-        self._sheet_of_shortcuts().open()
+        self._get_shortcut_sheet().open()
 
-    def _sheet_of_shortcuts(self) -> shortcuts.ShortcutSheet:
+    def _get_shortcut_sheet(self) -> shortcuts.ShortcutSheet:
         if self._shortcut_sheet is None:
             shell = self._shell
             self._shortcut_sheet = shortcuts.ShortcutSheet(shell.theme, shell.surface, self.shortcuts)
         return self._shortcut_sheet
 
     def _rebind(self, command: str) -> None:
-        self._sheet_of_shortcuts().open_for(command)
+        self._get_shortcut_sheet().open_for(command)
 
     def open_settings(self) -> None:
         """Open the settings."""
@@ -237,7 +237,7 @@ class ViewCommands:
                 shell.state,
                 self._session.settings,
                 self._files.asks,
-                self._voice_words,
+                self._voice_text,
                 restart=self._restart if shell.can_restart else None,
             )
             self._settings_sheet.shortcuts.clicked.connect(self.open_shortcuts)
@@ -248,57 +248,57 @@ class ViewCommands:
         if why_not:
             self._shell.show_toast(why_not)
 
-    def _voice_words(self) -> str:
+    def _voice_text(self) -> str:
         # Includes whether speech actually works: an engine can be installed without a voice.
-        return voice_words(self._session.voices.problem, has_engine=has_voice_engine())
+        return voice_text(self._session.voices.problem, has_engine=has_voice_engine())
 
-    def start_page(self) -> None:
+    def show_start_page(self) -> None:
         """Show the start page, now and after the next start."""
         self._shell.show_start()
-        self._shell.state.keep_layout(START)
+        self._shell.state.save_layout(START_PAGE)
 
     def leave_start_page(self) -> None:
         """Leave the start page and show the previous layout."""
-        if self._shell.showing == START and self._shell.left:
+        if self._shell.current_layout == START_PAGE and self._shell.left:
             self.show_layout(self._shell.left)
 
     def show_layout(self, layout: str) -> None:
         """Show Behaviour or Developer in its last state."""
         self._shell.show_layout(layout)
-        self._actions.choose(f"layout.{layout}")
+        self._actions.select(f"layout.{layout}")
 
     def show_built_in_layout(self, layout: str) -> None:
         """Show the built-in arrangement of a layout in place of a custom one."""
-        self._shell.saved_layouts.use(self._shell.show_layout(layout), layout, "")
-        self._actions.choose(f"layout.{layout}")
+        self._shell.saved_layouts.switch(self._shell.show_layout(layout), layout, "")
+        self._actions.select(f"layout.{layout}")
 
     def show_own_layout(self, name: str) -> None:
         """Show a custom layout by name."""
         own = self._shell.saved_layouts.named(name)
         if own is not None:
             bench = self._shell.show_layout(own.base)
-            self._shell.saved_layouts.use(bench, own.base, name)
-            self._actions.choose(f"layout.{own.base}")
+            self._shell.saved_layouts.switch(bench, own.base, name)
+            self._actions.select(f"layout.{own.base}")
 
     def reset_layout(self) -> None:
         """Restore the default arrangement of the current layout's panels."""
         if self._shell.bench is not None:
-            self._shell.bench.arrange()
+            self._shell.bench.reset_layout()
 
-    def _ask_name(self) -> name_sheet.NameSheet:
+    def _get_name_sheet(self) -> name_sheet.NameSheet:
         if self._name_sheet is None:
             self._name_sheet = name_sheet.NameSheet(self._shell.theme, self._shell.surface)
         return self._name_sheet
 
-    def keep_layout(self) -> None:
+    def save_layout(self) -> None:
         """Ask for a name and save the current arrangement as a custom layout."""
         shell = self._shell
-        arrangements, bench, base = shell.saved_layouts, shell.bench, shell.showing
+        arrangements, bench, base = shell.saved_layouts, shell.bench, shell.current_layout
         if bench is None:
             return
 
-        def keep(name: str) -> None:
-            kept = arrangements.keep_as(bench, base, name)
+        def save(name: str) -> None:
+            kept = arrangements.save_as(bench, base, name)
             words = (
                 _("Saved layout “{name}”")
                 if kept
@@ -306,17 +306,17 @@ class ViewCommands:
             )
             shell.show_toast(words.format(name=name))
 
-        self._ask_name().ask(_("Save layout as"), _("Keep"), arrangements.refusal, keep)
+        self._get_name_sheet().ask(_("Save layout as"), _("Keep"), arrangements.rejection_reason, save)
 
     def rename_layout(self) -> None:
         """Ask for a new name for the current custom layout."""
         arrangements = self._shell.saved_layouts
-        old = arrangements.own(self._shell.showing)
+        old = arrangements.custom_name(self._shell.current_layout)
         if old:
-            self._ask_name().ask(
+            self._get_name_sheet().ask(
                 _("New name for “{name}”").format(name=old),
                 _("Rename"),
-                lambda name: arrangements.refusal(name, old),
+                lambda name: arrangements.rejection_reason(name, old),
                 lambda name: arrangements.rename(old, name),
                 old,
             )
@@ -324,7 +324,7 @@ class ViewCommands:
     def delete_layout(self) -> None:
         """Delete the current custom layout; the toast offers to undo it."""
         arrangements, shell = self._shell.saved_layouts, self._shell
-        name = arrangements.own(shell.showing)
+        name = arrangements.custom_name(shell.current_layout)
         if name:
             kept, undo = arrangements.delete(shell.bench, name)
             words = (
@@ -337,10 +337,10 @@ class ViewCommands:
     def export_layout(self) -> None:
         """Ask for a file and export the current layout to it."""
         shell = self._shell
-        bench, base = shell.bench, shell.showing
+        bench, base = shell.bench, shell.current_layout
         if bench is None:
             return
-        name = shell.saved_layouts.own(base) or _(layout_named(base).title)
+        name = shell.saved_layouts.custom_name(base) or _(layout_named(base).title)
 
         def save(path: Path, _kind: FileKind) -> None:
             try:
@@ -352,7 +352,7 @@ class ViewCommands:
                 shell.show_toast(_("Saved the layout to {file}").format(file=path.name))
 
         kind = FileKind(LAYOUTS[0], LAYOUTS[1].lstrip("*"))
-        suggestion = Path.home() / f"{file_stem(name)}{kind.ending}"
+        suggestion = Path.home() / f"{file_stem(name)}{kind.suffix}"
         self._files.asks.save_as(_("Save layout to a file"), suggestion, [kind], save)
 
     def ask_layout(self) -> None:
@@ -363,68 +363,68 @@ class ViewCommands:
         """Import a layout file and show the layout. Errors are shown in a toast."""
         shell = self._shell
         try:
-            found = read_layout(read_whole(path, MAX_BYTES), path.stem, shell.panels)
+            found = read_layout(read_regular_file(path, MAX_BYTES), path.stem, shell.panels)
         except (OSError, LayoutFileError) as error:
             reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
             reason = f"{reason[:1].lower()}{reason[1:]}"
             shell.show_toast(_("Can't open {file}: {reason}").format(file=path.name, reason=reason))
             return
-        layouts, before = shell.saved_layouts, shell.saved_layouts.own(found.base)
-        if not layouts.fits(shell.show_layout(found.base), found.base, found.saved):
+        layouts, before = shell.saved_layouts, shell.saved_layouts.custom_name(found.base)
+        if not layouts.can_restore(shell.show_layout(found.base), found.base, found.saved):
             shell.show_toast(
                 _("Can't open {file}: {reason}").format(file=path.name, reason=_("it is damaged"))
             )
             return
-        name, _is_kept = layouts.take_in(found.name, found.base, found.saved)
+        name, _is_kept = layouts.import_layout(found.name, found.base, found.saved)
         self.show_own_layout(name)
 
         def undo() -> None:
-            bench = shell.bench if shell.showing == found.base else None
+            bench = shell.bench if shell.current_layout == found.base else None
             layouts.delete(bench, name)
             if before and bench is not None:
-                layouts.use(bench, found.base, before)
+                layouts.switch(bench, found.base, before)
 
         words = _("Opened the layout “{name}”").format(name=name)
         if found.unknown:
-            left_out = listed(list(found.unknown[:MAX_NAMED]))
+            left_out = format_list(list(found.unknown[:MAX_NAMED]))
             words = _("{opened}. Unknown panels were skipped: {panels}").format(opened=words, panels=left_out)
         shell.show_toast(words, _("Undo"), undo)
 
     def freeze(self) -> None:
         """Freeze all panels, or unfreeze them if all are frozen."""
-        freeze_or_go_on(self._shell.bench)
+        toggle_freeze(self._shell.bench)
 
-    def _mark_theme(self) -> None:
+    def _update_theme_actions(self) -> None:
         theme = self._shell.theme
-        self._actions.choose(f"theme.{theme.mode}")
+        self._actions.select(f"theme.{theme.mode}")
         self._actions["theme.motion"].setChecked(theme.reduced_motion)
         self._actions["theme.contrast"].setChecked(theme.high_contrast)
 
     def set_theme(self, mode: Mode) -> None:
         """Set the colour theme: light, dark or the system's."""
         self._shell.theme.set_mode(mode)
-        self._shell.state.keep_theme(self._shell.theme)
+        self._shell.state.save_theme(self._shell.theme)
 
-    def choose_motion(self) -> None:
+    def update_motion(self) -> None:
         """Turn reduced motion on or off, to match the state of its action."""
-        self._shell.theme.set_motion(_wish(self._actions["theme.motion"]))
-        self._shell.state.keep_theme(self._shell.theme)
+        self._shell.theme.set_motion(_preference(self._actions["theme.motion"]))
+        self._shell.state.save_theme(self._shell.theme)
 
-    def choose_contrast(self) -> None:
+    def update_contrast(self) -> None:
         """Turn high contrast on or off, to match the state of its action."""
-        self._shell.theme.set_contrast(_wish(self._actions["theme.contrast"]))
-        self._shell.state.keep_theme(self._shell.theme)
+        self._shell.theme.set_contrast(_preference(self._actions["theme.contrast"]))
+        self._shell.state.save_theme(self._shell.theme)
 
-    def set_text(self, percent: int) -> None:
+    def set_text_size(self, percent: int) -> None:
         """Set the text size in percent."""
         self._shell.theme.set_text_percent(percent)
-        self._shell.state.keep_theme(self._shell.theme)
+        self._shell.state.save_theme(self._shell.theme)
 
-    def first_steps(self) -> None:
+    def show_first_steps(self) -> None:
         """Show the card with the first steps next to the blocks."""
         self.show_layout("behaviour")
         self._shell.open_panel("behaviour")
-        self._shell.panel_focus.give(self._shell.open_panel("first_steps"))
+        self._shell.panel_focus.focus(self._shell.open_panel("first_steps"))
 
     def open_guide(self) -> None:
         """Open the guide at the page that was shown last."""
@@ -436,9 +436,9 @@ class ViewCommands:
     def _guide_pages(self) -> Sequence[guide.GuidePage]:
         return guide.read_pages(resources.folder() / "guide", language(), self.shortcuts.first)
 
-    def examples(self) -> None:
+    def show_examples(self) -> None:
         """Show all examples on the start page."""
-        self.start_page()
+        self.show_start_page()
         self._shell.show_examples()
 
     def point_at(self, command: str) -> bool:
@@ -449,12 +449,12 @@ class ViewCommands:
 
     def open_doctor(self, asker: PanelWidget | None = None, topic: str = "") -> None:
         """Run the connection doctor, first for the topic whose messages ``asker`` doesn't receive."""
-        self._session.doctor.miss(topic)
+        self._session.doctor.expect_topic(topic)
         if self._shell.bench is None:
             self.show_layout("developer")
         dock = self._shell.open_panel("doctor")
-        if dock is not None and isinstance(dock.panel, AnswersWhy):
-            dock.panel.begin_for(asker)
+        if dock is not None and isinstance(dock.panel, SupportsDiagnosis):
+            dock.panel.check_panel(asker)
 
     def show_log(self) -> None:
         """Open the folder of log files, creating it if necessary."""
@@ -465,7 +465,7 @@ class ViewCommands:
             reason = (error.strerror or str(error)).lower()
             self._shell.show_toast(_("Can't create {folder}: {reason}").format(folder=folder, reason=reason))
             return
-        if not open_outside(QUrl.fromLocalFile(str(folder))):
+        if not open_externally(QUrl.fromLocalFile(str(folder))):
             self._shell.show_toast(_("The log files are in {folder}").format(folder=folder))
 
     def about(self) -> None:
@@ -473,5 +473,5 @@ class ViewCommands:
         AboutSheet(self._shell.theme, self._shell.surface, self._shell.show_toast).open()
 
 
-def _wish(action: QAction) -> Preference:
+def _preference(action: QAction) -> Preference:
     return "on" if action.isChecked() else "off"

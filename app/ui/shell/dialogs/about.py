@@ -21,7 +21,7 @@ LINES = (
     lazy("NEP Studio is free software (MIT licence)."),
     lazy("Inter, JetBrains Mono and M PLUS 1p: SIL Open Font License 1.1. Icons: Lucide, ISC licence."),
 )
-WIDE = 460
+WIDTH = 460
 
 
 def versions() -> tuple[tuple[str, str], ...]:
@@ -53,7 +53,7 @@ class AboutSheet(Overlay):
         head = QHBoxLayout()
         head.addWidget(label(TITLE, "heading", wrap=True), 1)
         self._close = IconButton(theme, "x", _("Close"), "Esc")
-        self._close.clicked.connect(self.shut)
+        self._close.clicked.connect(self.dismiss)
         head.addWidget(self._close)
         column.addLayout(head)
         lines = QVBoxLayout()
@@ -88,8 +88,8 @@ class AboutSheet(Overlay):
     def first(self) -> QWidget:
         return self._close
 
-    def wanted_size(self, room: QSize) -> QSize:
-        wide = min(room.width(), round(self.theme.scaled(WIDE)))
+    def preferred_size(self, room: QSize) -> QSize:
+        wide = min(room.width(), round(self.theme.scaled(WIDTH)))
         layout = self.layout()
         high = layout.totalHeightForWidth(wide) if layout is not None else 0
         return QSize(wide, min(room.height(), high))

@@ -10,7 +10,7 @@ from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from app.ui.shell.dialogs.overlay import Overlay
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import shortcut_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import label, paint
@@ -20,7 +20,7 @@ from app.ui.widgets.menus import EditMenu
 from nep.i18n import _, lazy, ngettext
 
 WIDTH, TOP, FIELD, FOOTER_HEIGHT = 640, 128, 56, 36
-ROWS_SHOWN = 9.5
+MAX_VISIBLE_ROWS = 9.5
 MAX_RESULTS, MAX_RESULTS_EMPTY, MAX_LAST_SHOWN, MAX_LAST_SAVED = 40, 8, 5, 12
 
 
@@ -45,7 +45,7 @@ class _Field(QLineEdit):
         font.setPixelSize(round(self._theme.scaled(17)))
         self.setFont(font)
         self.setFixedHeight(round(self._theme.scaled(FIELD)))
-        right = round(paint.key_width(self._theme, spoken_key("Esc"))) + 26
+        right = round(paint.key_width(self._theme, shortcut_text("Esc"))) + 26
         self.setTextMargins(round(self._theme.scaled(20)) + 28, 0, right, 0)
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -54,7 +54,7 @@ class _Field(QLineEdit):
         middle, side = self.height() / 2, self._theme.scaled(20)
         square = QRectF(18, middle - side / 2, side, side)
         paint_icon(painter, square, "search", self._theme.colour("textSecondary"))
-        paint.key_cap(painter, self._theme, self.width() - 19, middle, spoken_key("Esc"))
+        paint.key_cap(painter, self._theme, self.width() - 19, middle, shortcut_text("Esc"))
         paint.hairline(painter, QRectF(self.rect()), Qt.Edge.BottomEdge, self._theme.colour("border"))
         painter.end()
 
@@ -85,7 +85,7 @@ class _Foot(QWidget):
         count = paint.width_of(font, self.counted)
         for keys, words in self.KEYS:
             said = _(words)
-            caps = [spoken_key(key) for key in keys]
+            caps = [shortcut_text(key) for key in keys]
             wide = sum(paint.key_width(theme, cap) + 5 for cap in caps) + paint.width_of(font, said)
             if left + wide > self.width() - count - 40:
                 break
@@ -93,10 +93,10 @@ class _Foot(QWidget):
                 left = paint.key_cap(painter, theme, left + paint.key_width(theme, cap), middle, cap).right()
                 left += 5
             area = QRectF(left + 1, 0, 400, self.height())
-            paint.words(painter, area, said, font, quiet)
+            paint.text_line(painter, area, said, font, quiet)
             left += paint.width_of(font, said) + 17
         area = QRectF(0, 0, self.width() - 19, self.height())
-        paint.words(painter, area, self.counted, font, quiet, paint.RIGHT)
+        paint.text_line(painter, area, self.counted, font, quiet, paint.RIGHT)
         painter.end()
 
 
@@ -139,8 +139,8 @@ class Palette(Overlay):
         column.addWidget(self.foot)
         self.field.installEventFilter(self)
         self.field.textChanged.connect(self._search)
-        self.rows.moved.connect(self._update_status)
-        self.rows.pressed_row.connect(self.do_it)
+        self.rows.selection_moved.connect(self._update_status)
+        self.rows.row_activated.connect(self.run_selected)
         theme.changed.connect(self._restyle)
 
     def first(self) -> QWidget:
@@ -149,7 +149,7 @@ class Palette(Overlay):
     def open(self) -> None:
         """Open the palette with all entries, the last used ones first; close it if it is open."""
         if self.isVisible():
-            self.shut()
+            self.dismiss()
             return
         self._finder = Finder(self._offers())
         self.field.blockSignals(True)
@@ -158,9 +158,9 @@ class Palette(Overlay):
         self._search()
         super().open()
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
-        rows = min(self.rows.height_of_all(), round(scaled(40) * ROWS_SHOWN)) + 8
+        rows = min(self.rows.content_height(), round(scaled(40) * MAX_VISIBLE_ROWS)) + 8
         shown = rows if self.rows.lines.lines else self.nothing.sizeHint().height()
         high = self.field.height() + shown + self.foot.height() + 2
         return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), high))
@@ -172,7 +172,7 @@ class Palette(Overlay):
 
     def _search(self) -> None:
         query = self.field.text().strip()
-        lines = self._for_nothing_typed() if not query else []
+        lines = self._default_lines() if not query else []
         if query:
             found, count = self._finder.find(query, MAX_RESULTS)
             self.foot.counted = _("{shown} of {count}").format(shown=count, count=len(self._finder.entries))
@@ -188,7 +188,7 @@ class Palette(Overlay):
         self.foot.update()
         self.place()
 
-    def _for_nothing_typed(self) -> list[Line]:
+    def _default_lines(self) -> list[Line]:
         # The last used entries, then the first ones of each kind.
         entries = self._finder.entries
         known = {entry.id: entry for entry in entries if entry.id in self.last}
@@ -223,11 +223,11 @@ class Palette(Overlay):
                 if pressed.modifiers() & Qt.KeyboardModifier.ControlModifier:
                     self.rebind()
                 else:
-                    self.do_it()
+                    self.run_selected()
                 return True
         return super().eventFilter(watched, event)
 
-    def do_it(self) -> None:
+    def run_selected(self) -> None:
         """Run the selected entry if it is available."""
         entry = self.rows.entry
         if entry is None:
@@ -237,14 +237,14 @@ class Palette(Overlay):
             return
         self.last = [entry.id, *(id for id in self.last if id != entry.id)][:MAX_LAST_SAVED]
         self.on_last(self.last)
-        self.shut()
+        self.dismiss()
         self._run(entry)
 
     def rebind(self) -> None:
         """Ask for a new key for the selected command."""
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
-            self.shut()
+            self.dismiss()
             self._rebind(entry.name)
 
 

@@ -26,21 +26,21 @@ from PySide6.QtWidgets import (
 
 from app.core.documents.file_format import SUFFIX
 from app.core.documents.folder import (
+    INVALID_CHARACTERS,
     MAX_NAME_LENGTH,
-    REFUSED,
     FolderEntry,
     entries_of,
     free_name,
-    name_refusal,
-    whole_path,
+    name_problem,
+    parse_absolute_path,
 )
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text import plain
-from app.ui.text.dates import when_words
-from app.ui.text.numbers import size_words
+from app.ui.text.dates import date_time_text
+from app.ui.text.numbers import size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ElidedLabel, IconButton, label, paint
-from app.ui.widgets.file_dialogs import BEHAVIOURS, PICTURE_ENDINGS, FileKind, meant, pictures_folder
+from app.ui.widgets.file_dialogs import BEHAVIOURS, PICTURE_SUFFIXES, FileKind, pictures_folder, resolve_kind
 from app.ui.widgets.inputs.combo_box import ComboBox
 from app.ui.widgets.lists.scroll_areas import ScrollColumn
 from app.ui.widgets.menus import EditMenu
@@ -62,24 +62,24 @@ class FileQuestion:
     heading: str
     verb: str
     empty: str
-    endings: tuple[str, ...] = (SUFFIX,)
+    suffixes: tuple[str, ...] = (SUFFIX,)
     icon: str = "blocks"
-    saves: bool = False
-    wants_folder: bool = False
+    is_saving: bool = False
+    selects_folder: bool = False
     kinds: tuple[FileKind, ...] = (FileKind(BEHAVIOURS[0], SUFFIX),)
 
 
 OPEN = FileQuestion(lazy("Open a behaviour"), lazy("Open"), lazy("No behaviours or folders here."))
-SAVE = FileQuestion(lazy("Save behaviour"), lazy("Save"), lazy("This folder is empty."), saves=True)
+SAVE = FileQuestion(lazy("Save behaviour"), lazy("Save"), lazy("This folder is empty."), is_saving=True)
 PICTURE = FileQuestion(
     lazy("Choose an image"), lazy("Choose"), lazy("No images or folders here."),
-    endings=PICTURE_ENDINGS, icon="image",
+    suffixes=PICTURE_SUFFIXES, icon="image",
 )  # fmt: skip
-FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", endings=(), wants_folder=True)
+FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", suffixes=(), selects_folder=True)
 
 
 @dataclass(frozen=True)
-class FolderPlace:
+class FolderLocation:
     """Folder with a well-known name such as "Documents"."""
 
     name: str
@@ -87,18 +87,18 @@ class FolderPlace:
     folder: Path
 
 
-def known_places(studio: Path, recent: Iterable[Path]) -> tuple[FolderPlace, ...]:
+def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocation, ...]:
     """Return the user's standard folders as far as they exist, Studio's folder, and those of recent files."""
     kinds = QStandardPaths.StandardLocation
     found = [
-        FolderPlace(_("Home"), "house", Path.home()),
-        FolderPlace(_("Desktop"), "monitor", _standard(kinds.DesktopLocation)),
-        FolderPlace(_("Documents"), "file-text", _standard(kinds.DocumentsLocation)),
-        FolderPlace(_("Images"), "image", Path(pictures_folder())),
-        FolderPlace(_("Backed up by Studio"), "archive", studio),
-        *(FolderPlace(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
+        FolderLocation(_("Home"), "house", Path.home()),
+        FolderLocation(_("Desktop"), "monitor", _standard(kinds.DesktopLocation)),
+        FolderLocation(_("Documents"), "file-text", _standard(kinds.DocumentsLocation)),
+        FolderLocation(_("Images"), "image", Path(pictures_folder())),
+        FolderLocation(_("Backed up by Studio"), "archive", studio),
+        *(FolderLocation(path.parent.name or str(path.parent), "history", path.parent) for path in recent),
     ]
-    made: list[FolderPlace] = []
+    made: list[FolderLocation] = []
     for place in found:
         if place.folder.is_dir() and place.folder not in [each.folder for each in made]:
             made.append(place)
@@ -116,8 +116,8 @@ class _Row(QTreeWidgetItem):
         then = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
         is_behaviour = not entry.is_folder and entry.path.name.lower().endswith(SUFFIX)
         name = entry.path.name[: -len(SUFFIX)] if is_behaviour else entry.path.name
-        size = "" if entry.is_folder else size_words(entry.size)
-        super().__init__([name, when_words(then, now), size])
+        size = "" if entry.is_folder else size_text(entry.size)
+        super().__init__([name, date_time_text(then, now), size])
         self.entry = entry
         self.setIcon(NAME, theme.icon("folder" if entry.is_folder else icon, "textSecondary"))
         self.setTextAlignment(SIZE, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -145,12 +145,12 @@ class FileSheet(Overlay):
     """
 
     top = 56
-    lies_over_others = True
+    is_nested = True
 
-    def __init__(self, theme: Theme, window: QWidget, places: Callable[[], Sequence[FolderPlace]]) -> None:
+    def __init__(self, theme: Theme, window: QWidget, places: Callable[[], Sequence[FolderLocation]]) -> None:
         # `places` is called whenever the sheet opens.
         super().__init__(theme, window, _("Files"))
-        self._scrim.pressed.disconnect(self.shut)  # a click outside must not discard a typed name
+        self._scrim.pressed.disconnect(self.dismiss)  # a click outside must not discard a typed name
         self._places = places
         self._take: Callable[[Path], object] = lambda _path: None
         self.question = OPEN
@@ -165,30 +165,30 @@ class FileSheet(Overlay):
         self.folder_name.setPlaceholderText(_("Folder name"))
         self.folder_name.setAccessibleName(_("Folder name"))
         self.make_folder = Button(theme, _("Create"), size="small")
-        self.make_folder.clicked.connect(self._make_folder)
+        self.make_folder.clicked.connect(self._create_folder)
         self.places = ScrollColumn(_("Locations"), gap=2)
         self.list = QTreeWidget()
         self.name = QLineEdit()
         self.name.setAccessibleName(_("File name"))
-        self.name.textEdited.connect(lambda _text: self._judge())
-        self.name.returnPressed.connect(self._done)
-        self.folder_name.returnPressed.connect(self._make_folder)
+        self.name.textEdited.connect(lambda _text: self._validate())
+        self.name.returnPressed.connect(self._accept)
+        self.folder_name.returnPressed.connect(self._create_folder)
         for field in (self.name, self.folder_name):
             field.setProperty("focusRadius", theme.radius("control"))
             EditMenu(theme, field)
         self.ending = label(SUFFIX, "bodyLarge", role="textTertiary")
         self.kind = ComboBox(theme, name=_("File type"))
-        self.kind.currentIndexChanged.connect(self._kind_chosen)
+        self.kind.currentIndexChanged.connect(self._on_kind_changed)
         self.said = label("", "body", role="textSecondary", wrap=True)
         self.cancel = Button(theme, _("Cancel"), size="form")
-        self.cancel.clicked.connect(self.shut)
+        self.cancel.clicked.connect(self.dismiss)
         self.keep_both = Button(theme, _("Keep both"), size="form")
         self.keep_both.clicked.connect(self._keep_both)
         self.done = Button(theme, "", kind="primary", size="form")
-        self.done.clicked.connect(self._done)
+        self.done.clicked.connect(self._accept)
         self._set_up_list()
         self._lay_out()
-        theme.changed.connect(self._again)
+        theme.changed.connect(self._reload)
 
     def _set_up_list(self) -> None:
         tree = self.list
@@ -205,13 +205,13 @@ class FileSheet(Overlay):
         tree.header().setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
         for column in (CHANGED, SIZE):
             tree.header().setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-        tree.itemActivated.connect(self._opened)
-        tree.currentItemChanged.connect(lambda item, _before: self._chose(item))
-        tree.itemSelectionChanged.connect(self._judge)
+        tree.itemActivated.connect(self._on_activated)
+        tree.currentItemChanged.connect(lambda item, _before: self._on_selected(item))
+        tree.itemSelectionChanged.connect(self._validate)
         tree.installEventFilter(self)
 
     def _lay_out(self) -> None:
-        head = self.head(self.heading)
+        head = self.make_header(self.heading)
         way = QHBoxLayout()
         way.setSpacing(8)
         way.addWidget(self.up)
@@ -272,23 +272,23 @@ class FileSheet(Overlay):
         take: Callable[[Path, FileKind], object],
     ) -> None:
         """Ask for place, name and format to save another kind of file."""
-        endings = tuple(dict.fromkeys(each.ending for each in kinds))
+        endings = tuple(dict.fromkeys(each.suffix for each in kinds))
         question = FileQuestion(
-            title, SAVE.verb, SAVE.empty, endings=endings, icon="image", saves=True, kinds=tuple(kinds)
+            title, SAVE.verb, SAVE.empty, suffixes=endings, icon="image", is_saving=True, kinds=tuple(kinds)
         )
-        self._ask_name(question, suggestion, lambda path: take(*meant(path, self._kind, kinds)))
+        self._ask_name(question, suggestion, lambda path: take(*resolve_kind(path, self._kind, kinds)))
 
     def _ask_name(self, question: FileQuestion, suggestion: Path, take: Callable[[Path], object]) -> None:
         name = suggestion.name.removesuffix(SUFFIX)
-        self.name.setText(REFUSED.sub(" ", name).strip(". ")[:MAX_NAME_LENGTH])
+        self.name.setText(INVALID_CHARACTERS.sub(" ", name).strip(". ")[:MAX_NAME_LENGTH])
         self.kind.blockSignals(True)
         self.kind.clear()
         for kind in question.kinds:
-            self.kind.addItem(_(kind.words))
+            self.kind.addItem(_(kind.label))
         self.kind.blockSignals(False)
         self.kind.updateGeometry()
         paint.show_when(self.kind, len(question.kinds) > 1)
-        self.ending.setText(question.kinds[0].ending)
+        self.ending.setText(question.kinds[0].suffix)
         self._ask(question, suggestion.parent, take)
         self.name.selectAll()
 
@@ -296,38 +296,38 @@ class FileSheet(Overlay):
     def _kind(self) -> FileKind:
         return self.question.kinds[max(0, self.kind.currentIndex())]
 
-    def _kind_chosen(self) -> None:
+    def _on_kind_changed(self) -> None:
         # Removes a typed file extension, because it would override the chosen format.
         name = self.name.text()
-        typed = next((each for each in self.question.endings if name.lower().endswith(each)), "")
+        typed = next((each for each in self.question.suffixes if name.lower().endswith(each)), "")
         self.name.setText(name[: len(name) - len(typed)])
-        self.ending.setText(self._kind.ending)
-        self._judge()
+        self.ending.setText(self._kind.suffix)
+        self._validate()
 
     def _ask(self, question: FileQuestion, folder: Path, take: Callable[[Path], object]) -> None:
         self.question, self._take = question, take
         heading = _(question.heading)
         self.heading.setText(heading)
         self.setAccessibleName(heading)
-        paint.show_when(self._naming, question.saves)
+        paint.show_when(self._naming, question.is_saving)
         self._show_folder_field(False)
-        self._show_places()
+        self._show_locations()
         self.go_to(folder if folder.is_dir() else Path.home())
         self.open()
 
     @property
-    def saves(self) -> bool:
+    def is_saving(self) -> bool:
         """True if the sheet asks for a name."""
-        return self.question.saves
+        return self.question.is_saving
 
     @property
-    def _makes_folders(self) -> bool:
-        return self.saves or self.question.wants_folder
+    def _can_create_folders(self) -> bool:
+        return self.is_saving or self.question.selects_folder
 
     def first(self) -> QWidget:
-        return self.name if self.saves else self.list
+        return self.name if self.is_saving else self.list
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         return QSize(min(room.width(), round(scaled(WIDTH))), min(room.height(), round(scaled(HEIGHT))))
 
@@ -335,14 +335,14 @@ class FileSheet(Overlay):
         # Unlike other sheets, this one stays open when it loses the focus, as by a press of Stop.
         ...
 
-    def _show_places(self) -> None:
+    def _show_locations(self) -> None:
         column = self.places.column
         while column.count() > 1 and (item := column.takeAt(0)) is not None:
             if (old := item.widget()) is not None:
                 old.deleteLater()
         for number, place in enumerate(self._places()):
             button = Button(self.theme, place.name, place.icon, kind="ghost", size="small")
-            button.let_shrink()
+            button.allow_shrinking()
             button.setToolTip(plain.tip(str(place.folder)))
             button.clicked.connect(lambda _on=False, folder=place.folder: self.go_to(folder))
             column.insertWidget(number, button)
@@ -351,7 +351,7 @@ class FileSheet(Overlay):
     def go_to(self, folder: Path) -> None:
         """Show a folder. On an error, show the reason and stay in the current folder."""
         try:
-            found = entries_of(folder, self.question.endings)
+            found = entries_of(folder, self.question.suffixes)
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
             self._set_status(
@@ -376,31 +376,31 @@ class FileSheet(Overlay):
         if place is not None:
             self.list.setCurrentItem(place)
         self.list.blockSignals(False)
-        self._judge()
+        self._validate()
 
     def _rows(self) -> list[_Row]:
         rows = (self.list.topLevelItem(number) for number in range(self.list.topLevelItemCount()))
         return [row for row in rows if isinstance(row, _Row)]
 
     @property
-    def chosen(self) -> FolderEntry | None:
+    def selected_entry(self) -> FolderEntry | None:
         """File or folder selected in the list, or None."""
         row = self.list.currentItem()
         # QTreeWidget makes the first row current when it gets the focus, which isn't a selection.
-        meant = row is not None and (row.isSelected() or not self.question.wants_folder)
+        meant = row is not None and (row.isSelected() or not self.question.selects_folder)
         return row.entry if meant and isinstance(row, _Row) else None
 
-    def _chose(self, item: QTreeWidgetItem | None) -> None:
-        if self.saves and isinstance(item, _Row) and not item.entry.is_folder and self.list.hasFocus():
+    def _on_selected(self, item: QTreeWidgetItem | None) -> None:
+        if self.is_saving and isinstance(item, _Row) and not item.entry.is_folder and self.list.hasFocus():
             self.name.setText(item.text(NAME))
-        self._judge()
+        self._validate()
 
-    def _opened(self, item: QTreeWidgetItem) -> None:
+    def _on_activated(self, item: QTreeWidgetItem) -> None:
         # Return or double click enters a folder, opens a file, or copies its name.
         if isinstance(item, _Row) and item.entry.is_folder:
             self.go_to(item.entry.path)
-        elif isinstance(item, _Row) and not self.saves:
-            self._answer(item.entry.path)
+        elif isinstance(item, _Row) and not self.is_saving:
+            self._finish(item.entry.path)
         elif isinstance(item, _Row):
             self.name.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -413,12 +413,12 @@ class FileSheet(Overlay):
         # The text field replaces the "New folder" button.
         self.folder_name.setMinimumWidth(round(self.theme.scaled(FOLDER_NAME_WIDTH)))
         for widget in (self.folder_name, self.make_folder):
-            paint.show_when(widget, shown and self._makes_folders)
-        paint.show_when(self.new_folder, self._makes_folders and not shown)
+            paint.show_when(widget, shown and self._can_create_folders)
+        paint.show_when(self.new_folder, self._can_create_folders and not shown)
 
-    def _make_folder(self) -> None:
+    def _create_folder(self) -> None:
         name = self.folder_name.text().strip()
-        wrong = name_refusal(name) or ("" if name else _("Enter a folder name."))
+        wrong = name_problem(name) or ("" if name else _("Enter a folder name."))
         if not wrong and (self.folder / name).exists():
             wrong = _("“{name}” already exists.").format(name=name)
         if not wrong:
@@ -437,33 +437,33 @@ class FileSheet(Overlay):
     @property
     def target(self) -> Path | None:
         """File or folder that the button would use, or None."""
-        chosen = self.chosen
-        if self.question.wants_folder:
+        chosen = self.selected_entry
+        if self.question.selects_folder:
             return chosen.path if chosen is not None else self.folder
-        if not self.saves:
+        if not self.is_saving:
             return chosen.path if chosen is not None and not chosen.is_folder else None
         name = self.name.text().strip()
-        ending = next((e for e in self.question.endings if name.lower().endswith(e)), self._kind.ending)
+        ending = next((e for e in self.question.suffixes if name.lower().endswith(e)), self._kind.suffix)
         if name.lower().endswith(ending):
             name = name[: -len(ending)]
-        whole = whole_path(name)
+        whole = parse_absolute_path(name)
         if whole is not None:
             return whole.with_name(f"{whole.name}{ending}") if whole.parent.is_dir() else None
-        return self.folder / f"{name}{ending}" if name and not name_refusal(name) else None
+        return self.folder / f"{name}{ending}" if name and not name_problem(name) else None
 
-    def _judge(self) -> None:
+    def _validate(self) -> None:
         # Shows the effect of the button, such as overwriting a file, and sets its text.
         target = self.target
-        taken = self.saves and target is not None and target.exists()
+        taken = self.is_saving and target is not None and target.exists()
         paint.show_when(self.keep_both, taken)
-        self.done.set_word(_("Replace") if taken else _(self.question.verb))
-        chosen = self.chosen
-        wants_folder = self.question.wants_folder
-        into = not self.saves and not wants_folder and chosen is not None and chosen.is_folder
+        self.done.set_label(_("Replace") if taken else _(self.question.verb))
+        chosen = self.selected_entry
+        wants_folder = self.question.selects_folder
+        into = not self.is_saving and not wants_folder and chosen is not None and chosen.is_folder
         inside = target if wants_folder else target.parent if target else self.folder
-        writable = not self._makes_folders or os.access(inside or self.folder, os.W_OK)
+        writable = not self._can_create_folders or os.access(inside or self.folder, os.W_OK)
         self.done.setEnabled((target is not None and writable) or into)
-        wrong = self._wrong() if self.saves else ""
+        wrong = self._problem() if self.is_saving else ""
         if wrong:
             self._set_status(wrong, "error")
         elif not writable:
@@ -483,11 +483,11 @@ class FileSheet(Overlay):
         else:
             self._set_status("", "textSecondary")
 
-    def _wrong(self) -> str:
+    def _problem(self) -> str:
         name = self.name.text().strip()
-        whole = whole_path(name)
+        whole = parse_absolute_path(name)
         if whole is None:
-            return name_refusal(name)
+            return name_problem(name)
         return (
             ""
             if whole.parent.is_dir()
@@ -505,26 +505,26 @@ class FileSheet(Overlay):
         if words:
             paint.announce(self.said, words)
 
-    def _done(self) -> None:
-        target, chosen = self.target, self.chosen
+    def _accept(self) -> None:
+        target, chosen = self.target, self.selected_entry
         if target is not None and self.done.isEnabled():
-            self._answer(target)
-        elif not self.saves and chosen is not None and chosen.is_folder:
+            self._finish(target)
+        elif not self.is_saving and chosen is not None and chosen.is_folder:
             self.go_to(chosen.path)
 
     def _keep_both(self) -> None:
         target = self.target
         if target is not None:
             name = free_name(target.parent, target.stem, target.suffix)
-            self._answer(target.with_name(f"{name}{target.suffix}"))
+            self._finish(target.with_name(f"{name}{target.suffix}"))
 
-    def _answer(self, path: Path) -> None:
-        self.shut()
+    def _finish(self, path: Path) -> None:
+        self.dismiss()
         self._take(path)
 
-    def _again(self) -> None:
+    def _reload(self) -> None:
         if self.isVisible():
-            self._show_places()
+            self._show_locations()
             self.go_to(self.folder)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:

@@ -39,10 +39,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.storage.atomic_file import read_whole
+from app.core.storage.atomic_file import read_regular_file
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.text import plain
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import shortcut_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import SearchField, label, paint
 from nep.i18n import ENGLISH, _, ngettext
@@ -64,7 +64,7 @@ class GuidePage:
     text: str
     folders: tuple[Path, ...] = ()
 
-    def has(self, words: str) -> bool:
+    def matches(self, words: str) -> bool:
         """Return True if the page, with the alternative texts of images, contains all of these words."""
         said = _MARKS.sub(" ", _PICTURE.sub(r"\1", self.text)).casefold()
         return all(word in said for word in words.casefold().split())
@@ -90,8 +90,8 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
     own = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
     for path in sorted((folder / ENGLISH).glob("*.md")):
         translated = own / path.name
-        text = read_whole(translated if translated.is_file() else path).decode("utf-8")
-        text = _KEY.sub(lambda found: f"**{spoken_key(key_of(found[1])) or '-'}**", text)
+        text = read_regular_file(translated if translated.is_file() else path).decode("utf-8")
+        text = _KEY.sub(lambda found: f"**{shortcut_text(key_of(found[1])) or '-'}**", text)
         title = text.partition("\n")[0].lstrip("# ")
         made.append(GuidePage(title, text, (own, folder / ENGLISH)))
     return tuple(made)
@@ -139,7 +139,7 @@ class PageView(QTextBrowser):
         self._laid_for = self._room()
         document, ratio = self.document(), self.devicePixelRatioF()
         cursor = QTextCursor(document)
-        for place in self._places():
+        for place in self._image_positions():
             cursor.setPosition(place)
             cursor.setPosition(place + 1, QTextCursor.MoveMode.KeepAnchor)
             look = cursor.charFormat().toImageFormat()
@@ -162,7 +162,7 @@ class PageView(QTextBrowser):
             look.setToolTip(plain.tip(str(look.property(QTextFormat.Property.ImageAltText))))
             cursor.setCharFormat(look)
 
-    def _places(self) -> list[int]:
+    def _image_positions(self) -> list[int]:
         # Text positions of images.
         found = []
         block = self.document().begin()
@@ -198,10 +198,10 @@ class GuideSheet(Overlay):
         self.none = label(_("No matching pages."), "body", role="textSecondary", wrap=True)
         self.page = PageView(theme)
         self._lay_out()
-        theme.changed.connect(self._again)
+        theme.changed.connect(self._restyle)
 
     def _lay_out(self) -> None:
-        head = self.head(label(_("Guide"), "heading"))
+        head = self.make_header(label(_("Guide"), "heading"))
         left = QVBoxLayout()
         left.setSpacing(8)
         left.addWidget(self.search)
@@ -223,7 +223,7 @@ class GuideSheet(Overlay):
     def first(self) -> QWidget:
         return self.list
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
 
@@ -236,15 +236,15 @@ class GuideSheet(Overlay):
         super().open()
 
     @property
-    def shown(self) -> tuple[GuidePage, ...]:
+    def matching_pages(self) -> tuple[GuidePage, ...]:
         """Pages that match the search."""
-        return tuple(page for page in self._pages if page.has(self.search.text()))
+        return tuple(page for page in self._pages if page.matches(self.search.text()))
 
     def _filter(self, words: str) -> None:
         self.list.blockSignals(True)
         self.list.clear()
         self._left.setFixedWidth(round(self.theme.scaled(LIST_WIDTH)))
-        for page in self.shown:
+        for page in self.matching_pages:
             item = QListWidgetItem(page.title)
             item.setSizeHint(QSize(0, round(self.theme.scaled(self.theme.size("row", "comfortable")))))
             self.list.addItem(item)
@@ -258,7 +258,7 @@ class GuideSheet(Overlay):
             self._show_page(0)
 
     def _show_page(self, row: int) -> None:
-        if not 0 <= row < len(self.shown):
+        if not 0 <= row < len(self.matching_pages):
             return
         theme, document = self.theme, self.page.document()
         palette = self.page.palette()
@@ -268,7 +268,7 @@ class GuideSheet(Overlay):
         self.page.setStyleSheet(f"background: {theme.colour('raised').name()};")
         document.setDefaultFont(theme.font("bodyLarge"))
         document.setDocumentMargin(4)
-        self.page.show_page(self.shown[row])
+        self.page.show_page(self.matching_pages[row])
         for frame in document.rootFrame().childFrames():
             if isinstance(frame, QTextTable):
                 self._line(frame)
@@ -326,6 +326,6 @@ class GuideSheet(Overlay):
         look.setCellPadding(7)
         table.setFormat(look)
 
-    def _again(self) -> None:
+    def _restyle(self) -> None:
         if self.isVisible():
             self._filter(self.search.text())

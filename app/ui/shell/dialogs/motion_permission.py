@@ -100,19 +100,19 @@ class MotionQuestion(QWidget):
         self._seen = self._moving.revision
         question = self._moving.question
         if question is None:
-            self._put_away()
+            self._close()
             return
         names = list(question.names)
-        self.title.setText(plain.breakable(question.title))
-        self.sentence.setText(plain.breakable(question.sentence))
+        self.title.setText(plain.make_breakable(question.title))
+        self.sentence.setText(plain.make_breakable(question.message))
         self._always_for = _("Always for these")
         if len(names) == 1:
             self._always_for = _("Always for {robot}").format(robot=names[0])
         self.always.setAccessibleName(self._always_for)
         self.always.setChecked(False)
-        self.let.set_word(_("Allow motion"))
+        self.let.set_label(_("Allow motion"))
         self.setAccessibleName(question.title)
-        self.setAccessibleDescription(question.sentence)
+        self.setAccessibleDescription(question.message)
         if not self.isVisible():
             self._before = QApplication.focusWidget()
         self.show()  # before measuring: showing the card applies fonts and margins of the style sheet
@@ -120,7 +120,7 @@ class MotionQuestion(QWidget):
         self.raise_()
         self.not_now.setFocus(Qt.FocusReason.PopupFocusReason)
 
-    def _put_away(self) -> None:
+    def _close(self) -> None:
         focus = QApplication.focusWidget()
         had_focus = focus is not None and self.isAncestorOf(focus)
         self.hide()
@@ -141,7 +141,7 @@ class MotionQuestion(QWidget):
             return
         wide = min(round(self._theme.scaled(WIDTH)), window.width() - 32)
         self.setFixedWidth(wide)
-        self._name_always(wide)
+        self._set_always_text(wide)
         layout = self.layout()
         if layout is not None:
             layout.invalidate()
@@ -151,7 +151,7 @@ class MotionQuestion(QWidget):
         top = round(window.height() * TOP_SHARE)
         self.move((window.width() - wide) // 2, min(top, max(8, window.height() - self.height() - 8)))
 
-    def _name_always(self, wide: int) -> None:
+    def _set_always_text(self, wide: int) -> None:
         # The robot's name is on the switch only if it fits there; the title always contains it.
         self.always.setText(self._always_for)
         buttons = self.not_now.sizeHint().width() + self.let.sizeHint().width()

@@ -14,7 +14,7 @@ from app.ui.widgets import Button, label, paint
 from app.ui.widgets.menus import EditMenu
 from nep.i18n import _
 
-WIDE = 420
+WIDTH = 420
 
 
 class NameSheet(Overlay):
@@ -33,7 +33,7 @@ class NameSheet(Overlay):
         self.wrong = label("", "body", role="error", wrap=True)
         self.button = Button(theme, "", kind="primary", size="form")
         cancel = Button(theme, _("Cancel"), size="form")
-        cancel.clicked.connect(self.shut)
+        cancel.clicked.connect(self.dismiss)
         row = QHBoxLayout()
         row.addStretch(1)
         row.addWidget(cancel)
@@ -44,8 +44,8 @@ class NameSheet(Overlay):
         for widget in (self.heading, self.field, self.wrong):
             column.addWidget(widget)
         column.addLayout(row)
-        self.field.textEdited.connect(self._typed)
-        self.button.clicked.connect(self._done)
+        self.field.textEdited.connect(self._on_edited)
+        self.button.clicked.connect(self._submit)
 
     def ask(
         self,
@@ -70,25 +70,25 @@ class NameSheet(Overlay):
         self.field.setAccessibleName(question)
         self.field.setText(name)
         self.field.selectAll()
-        self.button.set_word(verb)
-        self._typed(name)
+        self.button.set_label(verb)
+        self._on_edited(name)
         self.open()
 
     def first(self) -> QWidget:
         return self.field
 
-    def wanted_size(self, room: QSize) -> QSize:
-        wide = min(room.width(), round(self.theme.scaled(WIDE)))
+    def preferred_size(self, room: QSize) -> QSize:
+        wide = min(room.width(), round(self.theme.scaled(WIDTH)))
         layout = self.layout()
         high = layout.totalHeightForWidth(wide) if layout is not None else 0
         return QSize(wide, min(room.height(), max(high, self.sizeHint().height())))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-            self._done()
+            self._submit()
         super().keyPressEvent(event)
 
-    def _complain(self, sentence: str) -> None:
+    def _show_error(self, sentence: str) -> None:
         self.wrong.setText(sentence)
         paint.show_when(self.wrong, bool(sentence))
         self.field.setProperty("wrong", "true" if sentence else "false")
@@ -98,18 +98,18 @@ class NameSheet(Overlay):
         if sentence:
             paint.announce(self.wrong, sentence)
 
-    def _typed(self, text: str) -> None:
+    def _on_edited(self, text: str) -> None:
         # No error is shown for an empty field until the button is pressed.
         name = text.strip()
         sentence = self._refusal(name) if name else ""
-        self._complain(sentence)
+        self._show_error(sentence)
         self.button.setEnabled(not sentence and bool(name or not self._refusal("")))
 
-    def _done(self) -> None:
+    def _submit(self) -> None:
         name = self.field.text().strip()
         sentence = self._refusal(name)
         if sentence:
-            self._complain(sentence)
+            self._show_error(sentence)
             return
-        self.shut()
+        self.dismiss()
         self._take(name)

@@ -12,7 +12,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, ComboBox, IconButton, label, paint
 from nep.i18n import _, lazy
 
-WIDE = 520
+WIDTH = 520
 WARNING = lazy(
     "Anyone on this network will be able to see and control your robots. There is no password: "
     "use a network you trust, never a public one."
@@ -40,9 +40,9 @@ class NetworkAccessSheet(Overlay):
         self.yes = Button(theme, _("Allow connections"), "wifi", kind="primary", size="form")
         self.no = Button(theme, _("Cancel"), size="form")
         self.end = Button(theme, _("This computer only"), "lock", size="form")
-        self.yes.clicked.connect(self._let_in)
-        self.no.clicked.connect(self.shut)
-        self.end.clicked.connect(self._let_nobody_in)
+        self.yes.clicked.connect(self._allow_access)
+        self.no.clicked.connect(self.dismiss)
+        self.end.clicked.connect(self._revoke_access)
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -71,10 +71,10 @@ class NetworkAccessSheet(Overlay):
     def first(self) -> QWidget:
         return self.no
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         layout = self.layout()
         hint = self.sizeHint()
-        wide = min(room.width(), max(round(self.theme.scaled(WIDE)), self.minimumSizeHint().width()))
+        wide = min(room.width(), max(round(self.theme.scaled(WIDTH)), self.minimumSizeHint().width()))
         high = layout.totalHeightForWidth(wide) if layout is not None else hint.height()
         return QSize(wide, min(room.height(), high))
 
@@ -86,9 +86,9 @@ class NetworkAccessSheet(Overlay):
     def _show(self) -> None:
         access = self._access
         addresses = access.addresses()
-        is_open, can_open = bool(access.hosts), access.is_near and bool(addresses)
+        is_open, can_open = bool(access.hosts), access.is_local and bool(addresses)
         self.heading.setText(self._heading(is_open=is_open, can_open=can_open))
-        self.warning.setText(self._words(is_open=is_open, can_open=can_open))
+        self.warning.setText(self._message(is_open=is_open, can_open=can_open))
         if self.choice is not None:
             self.where.removeWidget(self.choice)
             self.choice.deleteLater()
@@ -96,19 +96,19 @@ class NetworkAccessSheet(Overlay):
         if can_open and not is_open:
             options = [(own.host, f"{own.host} ({own.interface})") for own in addresses]
             self.choice = ComboBox(self.theme, options, name=_("Address"))
-            self.choice.currentIndexChanged.connect(lambda _index: self._say_chosen())
+            self.choice.currentIndexChanged.connect(lambda _index: self._show_selected())
             self.where.insertWidget(1, self.choice)
         paint.show_when(self.where_word, self.choice is not None)
-        self._say_typed(access.hosts[0] if is_open else addresses[0].host if addresses else "")
+        self._show_setting(access.hosts[0] if is_open else addresses[0].host if addresses else "")
         for shown in (self.typed, self.copy, self.typed_word):
             paint.show_when(shown, is_open or can_open)
         paint.show_when(self.yes, can_open and not is_open)
-        paint.show_when(self.end, is_open and access.is_near)
-        self.no.set_word(_("Cancel"))
+        paint.show_when(self.end, is_open and access.is_local)
+        self.no.set_label(_("Cancel"))
         self.setAccessibleName(f"{self.heading.text()} {self.warning.text()}")
 
     def _heading(self, *, is_open: bool, can_open: bool) -> str:
-        if not self._access.is_near:
+        if not self._access.is_local:
             return _("The master is on another computer, {host}").format(host=self._access.master_host)
         if is_open:
             addresses = ", ".join(self._access.hosts)
@@ -119,25 +119,25 @@ class NetworkAccessSheet(Overlay):
             else _("This computer is not connected to a network")
         )
 
-    def _words(self, *, is_open: bool, can_open: bool) -> str:
-        if not self._access.is_near:
+    def _message(self, *, is_open: bool, can_open: bool) -> str:
+        if not self._access.is_local:
             return _("Connections are controlled on that computer.")
         if is_open or can_open:
             return _(WARNING)
         return _("Join a Wi-Fi network or plug in a cable, then try again.")
 
-    def _say_typed(self, host: str) -> None:
-        self.typed.setText(self._access.typed_by_others(host))
+    def _show_setting(self, host: str) -> None:
+        self.typed.setText(self._access.environment_variable(host))
 
-    def _say_chosen(self) -> None:
+    def _show_selected(self) -> None:
         if self.choice is not None:
-            self._say_typed(self.choice.value)
+            self._show_setting(self.choice.value)
 
-    def _let_in(self) -> None:
+    def _allow_access(self) -> None:
         if self.choice is not None:
-            self._access.listen_at((self.choice.value,))
-        self.shut()
+            self._access.listen_on((self.choice.value,))
+        self.dismiss()
 
-    def _let_nobody_in(self) -> None:
-        self._access.listen_at(())
-        self.shut()
+    def _revoke_access(self) -> None:
+        self._access.listen_on(())
+        self.dismiss()

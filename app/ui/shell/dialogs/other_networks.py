@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QScrollArea, QVBoxLayout, 
 from app.core.networks.networks import Networks, OtherNetwork
 from app.errors import SettingsError
 from app.ui.shell.dialogs.overlay import Overlay
-from app.ui.text.numbers import grouped
+from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Separator, Switch, label, paint, set_role
 from app.ui.widgets.menus import EditMenu
@@ -53,7 +53,7 @@ class OtherNetworksSheet(Overlay):
         self._area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._area.viewport().setAutoFillBackground(False)
         self._area.setWidget(self._inside)
-        self._head = self.head(label(_("Other networks"), "heading"))
+        self._head = self.make_header(label(_("Other networks"), "heading"))
         self._head.setContentsMargins(SIDE, 0, SIDE, 0)
         column = QVBoxLayout(self)
         column.setContentsMargins(1, 14, 1, 16)
@@ -68,7 +68,7 @@ class OtherNetworksSheet(Overlay):
     def first(self) -> QWidget:
         return self.rows[0].switch
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         least = max(row.minimumSizeHint().width() for row in self.rows) + 2 + 2 * SIDE + SCROLL_BAR
         wide = min(room.width(), max(round(self.theme.scaled(WIDTH)), least))
         inner = wide - 2 - 2 * SIDE - SCROLL_BAR
@@ -80,16 +80,16 @@ class OtherNetworksSheet(Overlay):
     def open(self) -> None:
         """Open the sheet; the states are updated until it is closed."""
         for row in self.rows:
-            row.show_choice()
+            row.show_setting()
         self.show_states()
         self._timer.start()
         super().open()
 
-    def shut(self) -> None:
+    def dismiss(self) -> None:
         """Apply typed addresses and close the sheet."""
         for row in self.rows:
             row.apply()
-        super().shut()
+        super().dismiss()
 
     def show_states(self) -> None:
         """Update the state of each network."""
@@ -106,10 +106,10 @@ class NetworkRow(QWidget):
         super().__init__()
         self._network, self._networks = network, networks
         kind = network.kind
-        self.switch = Switch(theme, kind.words)
+        self.switch = Switch(theme, kind.product_name)
         self.switch.setMinimumWidth(round(theme.scaled(SWITCH_WIDTH)))
-        place = _(kind.place)
-        self.address = AddressField(theme, f"{kind.words}: {place}", kind.example, self.apply)
+        place = _(kind.address_label)
+        self.address = AddressField(theme, f"{kind.product_name}: {place}", kind.example, self.apply)
         said = label(place, "small", role="textTertiary")
         self.state = label("", "small", role="textSecondary", wrap=True)
         self._wrong = ""
@@ -124,7 +124,7 @@ class NetworkRow(QWidget):
         self._lines.setSpacing(4)
         self._lines.addLayout(above)
         self._lines.addWidget(self.state)
-        self.switch.clicked.connect(self._switched)
+        self.switch.clicked.connect(self._on_toggled)
         self.address.editingFinished.connect(self.apply)
 
     def height_for(self, width: int) -> int:
@@ -132,17 +132,17 @@ class NetworkRow(QWidget):
         self._lines.invalidate()
         return self._lines.totalHeightForWidth(width)
 
-    def show_choice(self) -> None:
+    def show_setting(self) -> None:
         """Show the saved setting."""
         network = self._network
-        self.switch.setChecked(network.is_chosen)
-        if network.is_chosen:
+        self.switch.setChecked(network.is_selected)
+        if network.is_selected:
             self.address.setText(network.address)
-        self._complain("")
+        self._show_error("")
 
     def show_state(self) -> None:
         """Show the state: connected, searching or the error. While off, explain the address."""
-        words = self._wrong or state_words(self._network)
+        words = self._wrong or state_text(self._network)
         role = "error" if self._wrong else "warn" if self._network.state == "lost" else "textSecondary"
         set_role(self.state, role)
         if words != self.state.text():
@@ -150,32 +150,32 @@ class NetworkRow(QWidget):
             self.switch.setAccessibleDescription(words)
             self.changed.emit()
 
-    def _switched(self, on: bool) -> None:
+    def _on_toggled(self, on: bool) -> None:
         if on:
-            self._do(lambda: self._networks.choose(self._network.kind.name, self.address.text()))
-            self.switch.setChecked(self._network.is_chosen)
+            self._apply_change(lambda: self._networks.select(self._network.kind.name, self.address.text()))
+            self.switch.setChecked(self._network.is_selected)
         else:
-            self._do(lambda: self._networks.leave(self._network.kind.name))
+            self._apply_change(lambda: self._networks.deselect(self._network.kind.name))
 
     def apply(self) -> None:
         """Apply a changed address if the network is switched on."""
         network = self._network
-        if network.is_chosen and self.address.text().strip() != network.address:
-            self._do(lambda: self._networks.choose(network.kind.name, self.address.text()))
+        if network.is_selected and self.address.text().strip() != network.address:
+            self._apply_change(lambda: self._networks.select(network.kind.name, self.address.text()))
 
-    def _do(self, change: Callable[[], None]) -> None:
+    def _apply_change(self, change: Callable[[], None]) -> None:
         try:
             change()
         except (NepError, SettingsError) as error:
-            self._complain(f"{str(error)[:1].upper()}{str(error)[1:]}.")
+            self._show_error(f"{str(error)[:1].upper()}{str(error)[1:]}.")
         else:
-            self._complain("")
-            if self._network.is_chosen:
+            self._show_error("")
+            if self._network.is_selected:
                 self.address.setText(self._network.address)
 
-    def _complain(self, sentence: str) -> None:
+    def _show_error(self, sentence: str) -> None:
         self._wrong = sentence
-        self.address.mark(wrong=bool(sentence))
+        self.address.set_invalid(wrong=bool(sentence))
         self.show_state()
         if sentence:
             paint.announce(self.state, sentence)
@@ -194,7 +194,7 @@ class AddressField(QLineEdit):
         self.setMaxLength(400)
         EditMenu(theme, self)
 
-    def mark(self, *, wrong: bool) -> None:
+    def set_invalid(self, *, wrong: bool) -> None:
         """Set or remove the style of an invalid value."""
         self.setProperty("wrong", "true" if wrong else "false")
         self.style().unpolish(self)
@@ -207,7 +207,7 @@ class AddressField(QLineEdit):
             super().keyPressEvent(event)
 
 
-def state_words(network: OtherNetwork) -> str:
+def state_text(network: OtherNetwork) -> str:
     """Describe the state of a network in a sentence. While the network is off, explain its address."""
     if network.state == "lost":
         return f"{network.sentence[:1].upper()}{network.sentence[1:]}."
@@ -217,6 +217,6 @@ def state_words(network: OtherNetwork) -> str:
         return _(network.kind.hint)
     topics, nodes = len(network.topics), len(network.nodes)
     return _("Connected: {topics}, {nodes}.").format(
-        topics=ngettext("{count} topic", "{count} topics", topics).format(count=grouped(topics)),
-        nodes=ngettext("{count} node", "{count} nodes", nodes).format(count=grouped(nodes)),
+        topics=ngettext("{count} topic", "{count} topics", topics).format(count=group_digits(topics)),
+        nodes=ngettext("{count} node", "{count} nodes", nodes).format(count=group_digits(nodes)),
     )

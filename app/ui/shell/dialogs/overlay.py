@@ -25,25 +25,25 @@ from app.ui.widgets.menus import round_region
 from nep.i18n import _
 
 SHADOW_PX = 28
-SHADOW_DOWN = 10
+SHADOW_OFFSET_PX = 10
 EDGE = 16
-BELOW_STOP = 5
+STOP_GAP = 5
 STOP_INSET = 4  # margin in px of the button around its body, for the focus ring
 
 
-def stops_in(window: QWidget) -> list[StopButton]:
+def stop_buttons_in(window: QWidget) -> list[StopButton]:
     """Return all visible Stop buttons of a window."""
     return [stop for stop in window.findChildren(StopButton) if stop.isVisible() and stop.window() is window]
 
 
-class StopPlaces(QObject):
+class StopButtonWatcher(QObject):
     """Emits `changed` when a Stop button of a window is shown, hidden, moved or resized, also by its parents.
 
     Needed because a change of text size lays out the bars several times after all widgets were notified.
     """
 
     changed = Signal()
-    GEOMETRY = frozenset({QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide})
+    GEOMETRY_EVENTS = frozenset({QEvent.Type.Move, QEvent.Type.Resize, QEvent.Type.Show, QEvent.Type.Hide})
 
     def __init__(self, window: QWidget, parent: QObject) -> None:
         super().__init__(parent)
@@ -52,7 +52,7 @@ class StopPlaces(QObject):
 
     def watch(self) -> None:
         """Watch all Stop buttons, also hidden ones, until `rest` is called."""
-        self.rest()
+        self.unwatch()
         for stop in self._window.findChildren(StopButton):
             widget: QWidget | None = stop
             while widget is not None and widget is not self._window and widget not in self._watched:
@@ -60,7 +60,7 @@ class StopPlaces(QObject):
                 widget.installEventFilter(self)
                 widget = widget.parentWidget()
 
-    def rest(self) -> None:
+    def unwatch(self) -> None:
         """Stop watching the buttons."""
         watched, self._watched = self._watched, []
         for widget in watched:
@@ -68,7 +68,7 @@ class StopPlaces(QObject):
                 widget.removeEventFilter(self)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if event.type() in self.GEOMETRY:
+        if event.type() in self.GEOMETRY_EVENTS:
             self.changed.emit()
         return super().eventFilter(watched, event)
 
@@ -95,7 +95,7 @@ class Scrim(QWidget):
             return
         self.setGeometry(window.rect())
         whole = QRegion(self.rect())
-        for stop in stops_in(window):
+        for stop in stop_buttons_in(window):
             body = stop.size() - QSize(2 * STOP_INSET, 2 * STOP_INSET)
             hole = round_region(body, float(stop.property("focusRadius") or 0))
             whole -= hole.translated(stop.mapTo(window, QPoint(STOP_INSET, STOP_INSET)))
@@ -128,7 +128,7 @@ class Scrim(QWidget):
         radius = self._theme.radius("palette")
         for step in range(steps):
             out = 2.0 * step - SHADOW_PX / 2
-            box = over.translated(0, SHADOW_DOWN).adjusted(-out, -out, out, out)
+            box = over.translated(0, SHADOW_OFFSET_PX).adjusted(-out, -out, out, out)
             paint.box(painter, box, radius + max(0.0, out), shade)
 
 
@@ -140,9 +140,9 @@ class Overlay(QWidget):
 
     closed = Signal()
     top = EDGE
-    docks_right = False
+    is_docked_right = False
     """True for sheets that are docked at the right edge of the window; toasts then appear left of them."""
-    lies_over_others = False
+    is_nested = False
     """True for sheets opened from another sheet, which stays open below and gets the focus back."""
 
     def __init__(self, theme: Theme, window: QWidget, name: str) -> None:
@@ -152,20 +152,20 @@ class Overlay(QWidget):
         self.setAccessibleName(name)
         self._scrim = Scrim(theme, window)
         self._scrim.surface = self
-        self._scrim.pressed.connect(self.shut)
-        self._stops = StopPlaces(window, self)
+        self._scrim.pressed.connect(self.dismiss)
+        self._stops = StopButtonWatcher(window, self)
         self._stops.changed.connect(self._stop_moved)
         self._before: QWidget | None = None
         self._opening = QVariantAnimation(self)
         self._opening.setStartValue(0.0)
         self._opening.setEndValue(1.0)
         self._opening.setEasingCurve(QEasingCurve.Type.OutCubic)
-        self._opening.valueChanged.connect(self._move_on)
-        self._opening.finished.connect(self._arrived)
+        self._opening.valueChanged.connect(self._set_progress)
+        self._opening.finished.connect(self._finish_opening)
         theme.changed.connect(self.place)
         self.hide()
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         """Return the size of the sheet for the space available in the window."""
         return self.sizeHint().boundedTo(room)
 
@@ -178,7 +178,7 @@ class Overlay(QWidget):
         if self.isVisible():
             return
         self._before = QApplication.focusWidget()
-        window = self.window_below()
+        window = self.covered_window()
         window.installEventFilter(self)
         self._stops.watch()
         self.place()
@@ -187,7 +187,7 @@ class Overlay(QWidget):
         duration = self.theme.duration("palette")
         if duration:
             self.setGraphicsEffect(QGraphicsOpacityEffect(self))
-            self._move_on(0.0)
+            self._set_progress(0.0)
             self._opening.setDuration(duration)
             self._opening.start()
         else:
@@ -199,27 +199,27 @@ class Overlay(QWidget):
         if isinstance(application, QApplication):
             application.focusChanged.connect(self._focus_changed)
 
-    def head(self, heading: QWidget) -> QHBoxLayout:
+    def make_header(self, heading: QWidget) -> QHBoxLayout:
         """Return a layout with the heading and a close button, for the top of the sheet."""
         close = IconButton(self.theme, "x", _("Close"), "Esc")
-        close.clicked.connect(self.shut)
+        close.clicked.connect(self.dismiss)
         row = QHBoxLayout()
         row.addWidget(heading, 1)
         row.addWidget(close)
         return row
 
-    def shut(self) -> None:
+    def dismiss(self) -> None:
         """Close the sheet and restore the focus."""
         if not self.isVisible():
             return
-        inside = self._has_keyboard()
+        inside = self._has_focus()
         application = QApplication.instance()
         if isinstance(application, QApplication):
             application.focusChanged.disconnect(self._focus_changed)
-        self.window_below().removeEventFilter(self)
-        self._stops.rest()
+        self.covered_window().removeEventFilter(self)
+        self._stops.unwatch()
         self._opening.stop()
-        self._arrived()
+        self._finish_opening()
         before = self._before
         if inside and before is not None and isValid(before) and before.isVisible():
             before.setFocus(Qt.FocusReason.PopupFocusReason)
@@ -227,19 +227,19 @@ class Overlay(QWidget):
         self._scrim.hide()
         self.closed.emit()
 
-    def window_below(self) -> QWidget:
+    def covered_window(self) -> QWidget:
         """Return the window that the sheet covers."""
         parent = self.parentWidget()
         return parent if parent is not None else self
 
     def place(self) -> None:
         """Centre the sheet `top` px below the window's upper edge, or lower if it would cover Stop."""
-        window = self.window_below()
-        place = self._placed(self.top)
-        stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stops_in(window)]
+        window = self.covered_window()
+        place = self._geometry_at(self.top)
+        stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
         covered = [stop for stop in stops if stop.intersects(place)]
         if covered:
-            place = self._placed(max(stop.bottom() for stop in covered) + BELOW_STOP)
+            place = self._geometry_at(max(stop.bottom() for stop in covered) + STOP_GAP)
         if place != self.geometry() or self._scrim.size() != window.size() or not self.isVisible():
             self.setGeometry(place)
             self._scrim.cover()
@@ -248,9 +248,9 @@ class Overlay(QWidget):
         self.place()
         self._scrim.cover()
 
-    def _placed(self, top: int) -> QRect:
-        window = self.window_below()
-        size = self.wanted_size(QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE))
+    def _geometry_at(self, top: int) -> QRect:
+        window = self.covered_window()
+        size = self.preferred_size(QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE))
         return QRect(QPoint((window.width() - size.width()) // 2, top), size)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -266,7 +266,7 @@ class Overlay(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
-            self.shut()
+            self.dismiss()
         event.accept()  # keys must not reach the window below
 
     def focusNextPrevChild(self, forward: bool) -> bool:
@@ -286,7 +286,7 @@ class Overlay(QWidget):
         paint.box(painter, QRectF(self.rect()), theme.radius("palette"), fill, edge)
         painter.end()
 
-    def _has_keyboard(self) -> bool:
+    def _has_focus(self) -> bool:
         focus = QApplication.focusWidget()
         return focus is not None and (focus is self or self.isAncestorOf(focus))
 
@@ -294,18 +294,18 @@ class Overlay(QWidget):
         if new is None or QApplication.activePopupWidget() is not None or new.window() is not self.window():
             return
         above: QWidget | None = new
-        while above is not None and not (isinstance(above, Overlay) and above.lies_over_others):
+        while above is not None and not (isinstance(above, Overlay) and above.is_nested):
             above = above.parentWidget()
         if above is None and new is not self and not self.isAncestorOf(new):
-            self.shut()
+            self.dismiss()
 
-    def _move_on(self, share: object) -> None:
+    def _set_progress(self, share: object) -> None:
         strength = float(share) if isinstance(share, float) else 1.0
         self._scrim.set_strength(strength)
         effect = self.graphicsEffect()
         if isinstance(effect, QGraphicsOpacityEffect):
             effect.setOpacity(max(0.01, strength))
 
-    def _arrived(self) -> None:
+    def _finish_opening(self) -> None:
         self.setGraphicsEffect(None)  # type: ignore[arg-type]  # None removes the effect
         self._scrim.set_strength(1.0)

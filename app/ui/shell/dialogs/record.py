@@ -21,7 +21,7 @@ from app.core.recording.choice import (
 )
 from app.core.recording.client import LOW_DISK_BYTES
 from app.ui.shell.dialogs.overlay import EDGE, Overlay
-from app.ui.text.numbers import age_words, bandwidth_words, grouped, length_words, rate_words, size_words
+from app.ui.text.numbers import age_text, bandwidth_text, group_digits, length_text, rate_text, size_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Button,
@@ -50,12 +50,12 @@ if TYPE_CHECKING:
     from nep.recordings.recorder import TopicSelection
 
 WIDE, HIGH, SIDE = 640, 812, 20
-BESIDE_FROM = 1280  # px at 100 % text; in wider windows the sheet covers one column, without a scrim
+MIN_DOCKED_WIDTH = 1280  # px at 100 % text; in wider windows the sheet covers one column, without a scrim
 BELOW_BARS = 88
 REFRESH_MS = 300
-ROWS_HIGH = 170
+MIN_TABLE_HEIGHT = 170
 LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
-LONG_S = 2 * 86_400.0
+MAX_DISPLAYED_S = 2 * 86_400.0
 """Remaining time in s above which the disk's remaining recording time isn't shown."""
 _GB = 1e9
 
@@ -141,17 +141,17 @@ class RecordSheet(Overlay):
             ("pattern", _("By pattern"), None),
         ]
         self.mode = Segments(theme, options, check=True, name=_("Topics"))
-        self.mode.changed.connect(self._choose_mode)
+        self.mode.changed.connect(self._set_mode)
         self.count = label("", "small", role="textSecondary")
         self.patterns = PatternField(theme, _("Patterns"), _("/arm/* *camera* not /arm/raw"))
-        self.patterns.changed.connect(self._take_patterns)
+        self.patterns.changed.connect(self._apply_patterns)
         self.wrong = label("", "small", role="error", wrap=True)
         self.model: TableModel[Topic] = TableModel(self._columns(), lambda topic: topic.name)
         self.table: TableView[Topic] = TableView(theme, self.model, "topic")
         self.table.setAccessibleName(_("Topics to record"))
         self.table.opened.connect(self._toggle)
         self.table.order_changed.connect(self._show_topics)
-        self.table.setMinimumHeight(ROWS_HIGH)
+        self.table.setMinimumHeight(MIN_TABLE_HEIGHT)
         self.later = label(
             _("New matching topics are recorded from their first message."), "small", role="textTertiary",
             wrap=True,
@@ -164,8 +164,8 @@ class RecordSheet(Overlay):
         for field, name in ((self.ends_min, "ends_min"), (self.ends_gb, "ends_gb")):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
             field.number.connect(lambda value, name=name: self._change(**{name: value}))
-            field.emptied.connect(lambda name=name: self._change(**{name: None}))
-            field.problem.connect(self._ends_problem)
+            field.cleared.connect(lambda name=name: self._change(**{name: None}))
+            field.problem_changed.connect(self._show_limits_problem)
         self.ends_words = label("", "small", role="textSecondary", wrap=True)
 
     def _field(self, name: str, example: str) -> QLineEdit:
@@ -183,15 +183,15 @@ class RecordSheet(Overlay):
         self.ring.clicked.connect(self._switch_ring)
         self.seconds = NumberEdit(theme, MIN_S, MAX_S, _("s"))
         self.seconds.setAccessibleName(_("Seconds to keep"))
-        self.seconds.number.connect(lambda value: self._wish(seconds=round(value)))
+        self.seconds.number.connect(lambda value: self._update_flight_recorder(seconds=round(value)))
         self.size_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1)
         self.size_gb.setAccessibleName(_("Maximum size on disk (GB)"))
-        self.size_gb.number.connect(lambda value: self._wish(size_gb=value))
+        self.size_gb.number.connect(lambda value: self._update_flight_recorder(size_gb=value))
         for field in (self.seconds, self.size_gb):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
-            field.problem.connect(self._ring_problem)
+            field.problem_changed.connect(self._show_ring_problem)
         self.ring_topics = PatternField(theme, _("Topics to keep"), _("all topics; or /arm/* *camera*"))
-        self.ring_topics.settled.connect(self._take_ring_topics)
+        self.ring_topics.settled.connect(self._apply_ring_topics)
         self.ring_bar = ValueBar(theme)
         self.ring_words = label("", "small", role="textSecondary", wrap=True)
         self.keep = Button(theme, "", "history", size="small")
@@ -204,10 +204,10 @@ class RecordSheet(Overlay):
             _("At most 1 s is lost in a power failure"), "small", role="textTertiary", wrap=True
         )
         self.bookmark = Button(theme, _("Bookmark"), "bookmark", size="form")
-        self.bookmark.clicked.connect(self._bookmark)
+        self.bookmark.clicked.connect(self._add_bookmark)
         self.record = Button(theme, _("Record"), "circle-dot", kind="primary", size="form")
         name_command(self.record, "recording.toggle")
-        self.record.clicked.connect(self._press)
+        self.record.clicked.connect(self._toggle_recording)
 
     def _form_rows(self) -> QGridLayout:
         form = QGridLayout()
@@ -245,7 +245,7 @@ class RecordSheet(Overlay):
         rows.addLayout(there)
         return box
 
-    def _middle(self) -> QScrollArea:
+    def _make_scroll_area(self) -> QScrollArea:
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
         column = QVBoxLayout(self._inside)
@@ -266,8 +266,8 @@ class RecordSheet(Overlay):
         return area
 
     def _arrange(self) -> None:
-        self._area = self._middle()
-        head = self.head(label(_("Record"), "heading"))
+        self._area = self._make_scroll_area()
+        head = self.make_header(label(_("Record"), "heading"))
         head.setContentsMargins(SIDE, 0, 12, 0)
         foot = QHBoxLayout()
         foot.setContentsMargins(SIDE, 0, SIDE, 0)
@@ -286,73 +286,76 @@ class RecordSheet(Overlay):
     def first(self) -> QWidget:
         return self.record
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         least = self._inside.minimumSizeHint().width() + 2
         return QSize(max(round(scaled(WIDE)), least), round(scaled(HIGH))).boundedTo(room)
 
-    def _is_beside(self) -> bool:
-        return self.window_below().width() >= self.theme.scaled(BESIDE_FROM)
+    def _is_docked(self) -> bool:
+        return self.covered_window().width() >= self.theme.scaled(MIN_DOCKED_WIDTH)
 
-    def _placed(self, top: int) -> QRect:
-        if not self._is_beside():
-            return super()._placed(top)
-        window = self.window_below()
+    def _geometry_at(self, top: int) -> QRect:
+        if not self._is_docked():
+            return super()._geometry_at(top)
+        window = self.covered_window()
         top = max(top, round(self.theme.scaled(BELOW_BARS)))
         room = QSize(window.width() - 2 * EDGE, window.height() - top - 2 * EDGE)
-        return QRect(QPoint(EDGE // 2, top), self.wanted_size(room))
+        return QRect(QPoint(EDGE // 2, top), self.preferred_size(room))
 
     def place(self) -> None:
         super().place()
         if self.isVisible():
-            self._scrim.setVisible(not self._is_beside())
+            self._scrim.setVisible(not self._is_docked())
 
     def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:
-        if not self._is_beside():  # otherwise the user works in the window while the sheet shows the progress
+        if not self._is_docked():  # otherwise the user works in the window while the sheet shows the progress
             super()._focus_changed(old, new)
 
     def open(self) -> None:
         """Open the sheet; the progress is updated until it is closed."""
-        self._show_choice()
+        self._show_settings()
         self.show_state()
         self._timer.start()
         super().open()
         self.place()
 
     def _columns(self) -> tuple[Column[Topic], ...]:
-        def figures(topic: Topic) -> Cell:
+        def size_cell(topic: Topic) -> Cell:
             known = self._recordings.client.state.topics.get(topic.name)
-            if not self._has(topic.name):
+            if not self._is_included(topic.name):
                 return Cell(_("excluded"), role="textTertiary")
-            return Cell(size_words(known.size_bytes) if known is not None else "")
+            return Cell(size_text(known.size_bytes) if known is not None else "")
 
-        def lost(topic: Topic) -> Cell:
+        def lost_cell(topic: Topic) -> Cell:
             known = self._recordings.client.state.topics.get(topic.name)
             if known is None or known.lost is None:
                 return Cell()
             bad = known.lost > 0
-            return Cell(grouped(known.lost), "triangle-alert" if bad else None, "warn" if bad else "text")
+            return Cell(
+                group_digits(known.lost), "triangle-alert" if bad else None, "warn" if bad else "text"
+            )
 
-        def is_there(topic: Topic) -> Cell:
-            if self._has(topic.name):
-                return Cell(icon="check", role="accentText", said=_("recorded"))
-            return Cell(icon="minus", role="textTertiary", said=_("excluded"))
+        def included_cell(topic: Topic) -> Cell:
+            if self._is_included(topic.name):
+                return Cell(icon="check", role="accentText", accessible_text=_("recorded"))
+            return Cell(icon="minus", role="textTertiary", accessible_text=_("excluded"))
 
-        def ink(topic: Topic) -> str:
-            return "text" if self._has(topic.name) else "textTertiary"
+        def text_role(topic: Topic) -> str:
+            return "text" if self._is_included(topic.name) else "textTertiary"
 
         return (
-            Column("has", "", 40, is_there, words=lazy("Recorded")),
-            Column("topic", lazy("Topic"), 170, lambda topic: Cell(topic.name, role=ink(topic), mono=True),
+            Column("has", "", 40, included_cell, label=lazy("Recorded")),
+            Column("topic", lazy("Topic"), 170, lambda topic: Cell(topic.name, role=text_role(topic),
+                   mono=True),
                    key=lambda topic: topic.name, stretch=True, tip=lambda topic: topic.name),
             Column("rate", lazy("Rate /s"), 72,
-                   lambda topic: Cell(rate_words(topic.rate_hz), role=ink(topic)),
-                   key=lambda topic: topic.rate_hz, figures=True, yields=3),
+                   lambda topic: Cell(rate_text(topic.rate_hz), role=text_role(topic)),
+                   key=lambda topic: topic.rate_hz, is_numeric=True, hide_order=3),
             Column("bandwidth", lazy("Bandwidth"), 88,
-                   lambda topic: Cell(bandwidth_words(topic.bandwidth_Bps), role=ink(topic)),
-                   key=lambda topic: topic.bandwidth_Bps, figures=True, yields=2),
-            Column("size", lazy("Elapsed"), 84, figures, figures=True, yields=1),
-            Column("lost", lazy("Lost in transit"), 112, lost, figures=True),
+                   lambda topic: Cell(bandwidth_text(topic.bandwidth_Bps), role=text_role(topic)),
+                   key=lambda topic: topic.bandwidth_Bps, is_numeric=True, hide_order=2),
+            Column("size", lazy("Elapsed"), 84, size_cell, is_numeric=True, hide_order=1),
+            Column("lost", lazy("Lost in transit"), 112, lost_cell, is_numeric=True),
         )  # fmt: skip
 
     @property
@@ -370,39 +373,39 @@ class RecordSheet(Overlay):
         except BadTopicError:
             return None
 
-    def _has(self, topic: str) -> bool:
+    def _is_included(self, topic: str) -> bool:
         return topic in self._included
 
-    def _show_choice(self) -> None:
+    def _show_settings(self) -> None:
         choice, wish = self.choice, self._recordings.wish
         self.mode.set_value(choice.mode)
-        self.patterns.show_patterns(choice.patterns, choice.left_out)
+        self.patterns.show_patterns(choice.patterns, choice.excluded)
         self.patterns.setVisible(choice.mode == "pattern")
         problem = choice.problem if choice.mode == "pattern" else ""
-        self._mark_patterns(problem)
-        for field, limit in ((self.ends_min, choice.ends_min), (self.ends_gb, choice.ends_gb)):
+        self._show_pattern_problem(problem)
+        for field, limit in ((self.ends_min, choice.max_minutes), (self.ends_gb, choice.max_gb)):
             if limit is not None:
                 field.show_number(limit)
             else:
                 field.clear()
-        self._ends_problem("")
+        self._show_limits_problem("")
         self.ring.setChecked(wish.is_on)
-        self.ring_topics.show_patterns(wish.patterns, wish.left_out)
-        self.ring_topics.set_wrong(bool(wish.problem))
+        self.ring_topics.show_patterns(wish.patterns, wish.excluded)
+        self.ring_topics.set_invalid(bool(wish.problem))
         self.seconds.show_number(wish.seconds)
         self.size_gb.show_number(wish.size_gb)
         self._seen = None
 
-    def _mark_patterns(self, problem: str) -> None:
+    def _show_pattern_problem(self, problem: str) -> None:
         self.wrong.setText(problem)
         self.wrong.setVisible(bool(problem))
-        self.patterns.set_wrong(bool(problem))
+        self.patterns.set_invalid(bool(problem))
 
     def show_state(self) -> None:
         """Show the progress of the recording."""
         recordings = self._recordings
         going = recordings.is_recording
-        self.record.set_word(_("Stop recording") if going else _("Record"))
+        self.record.set_label(_("Stop recording") if going else _("Record"))
         self.record.setEnabled(recordings.client.state.phase != "ending")
         self.bookmark.setEnabled(recordings.client.state.phase == "recording")
         for field in (self.name, self.note, self.mode, self.patterns, self.ends_min, self.ends_gb):
@@ -433,23 +436,23 @@ class RecordSheet(Overlay):
             self._written = (elapsed, state.size_bytes)
         speed = self._speed
         begins = state.phase == "starting"
-        self.length.set_value(length_words(elapsed), _("starting") if begins else _("recording"), "error")
-        written = _("{speed} written").format(speed=bandwidth_words(speed)) if speed is not None else ""
-        self.size_so_far.set_value(size_words(state.size_bytes), written)
-        count = ngettext("{count} message", "{count} messages", state.unkept)
+        self.length.set_value(length_text(elapsed), _("starting") if begins else _("recording"), "error")
+        written = _("{speed} written").format(speed=bandwidth_text(speed)) if speed is not None else ""
+        self.size_so_far.set_value(size_text(state.size_bytes), written)
+        count = ngettext("{count} message", "{count} messages", state.unwritten)
         self.unkept.set_value(
-            count.format(count=grouped(state.unkept)) if state.unkept else _("none"),
-            _("the disk is too slow") if state.unkept else _("all data written"),
-            "warn" if state.unkept else "ok",
+            count.format(count=group_digits(state.unwritten)) if state.unwritten else _("none"),
+            _("the disk is too slow") if state.unwritten else _("all data written"),
+            "warn" if state.unwritten else "ok",
         )
-        self._show_end(recordings.recorded.end(elapsed, state.size_bytes, speed))
+        self._show_end(recordings.recorded.expected_end(elapsed, state.size_bytes, speed))
         free = state.free_bytes
         if free is None:
             self.disk.set_value("")
             return
-        left_s = free / speed if speed else LONG_S
-        full = _("full in {time}").format(time=age_words(left_s)) if left_s < LONG_S else ""
-        self.disk.set_value(size_words(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
+        left_s = free / speed if speed else MAX_DISPLAYED_S
+        full = _("full in {time}").format(time=age_text(left_s)) if left_s < MAX_DISPLAYED_S else ""
+        self.disk.set_value(size_text(free), full, "warn" if free < LOW_DISK_BYTES else "textSecondary")
 
     def _show_end(self, end: tuple[float, float] | None) -> None:
         # Only for a recording with limits and a known data rate.
@@ -457,9 +460,9 @@ class RecordSheet(Overlay):
             each.setVisible(end is not None)
         if end is not None:
             at_s, size_bytes = end
-            self.at_end.set_value(size_words(size_bytes), _("at {time}").format(time=length_words(at_s)))
+            self.at_end.set_value(size_text(size_bytes), _("at {time}").format(time=length_text(at_s)))
 
-    def _ends_problem(self, sentence: str) -> None:
+    def _show_limits_problem(self, sentence: str) -> None:
         # Explains the limits, or what is wrong with them.
         both = bool(self.ends_min.text() and self.ends_gb.text())
         none = not (self.ends_min.text() or self.ends_gb.text())
@@ -468,7 +471,7 @@ class RecordSheet(Overlay):
         set_role(self.ends_words, "error" if sentence else "textSecondary")
 
     def _show_topics(self) -> None:
-        topics = sorted(self._session.topics.live(), key=lambda topic: topic.name)
+        topics = sorted(self._session.topics.existing_topics(), key=lambda topic: topic.name)
         facts = (self._session.topics.revision, self.choice)
         if facts != self._seen:
             self._seen = facts
@@ -479,20 +482,20 @@ class RecordSheet(Overlay):
             self.model.set_rows(self.table.order.sort(topics))
             self.table.viewport().update()
         else:
-            self.table.tell_visible_changed()
+            self.table.refresh_visible()
         included = [each for each in topics if each.name in self._included]
         bandwidth = sum(each.bandwidth_Bps or 0.0 for each in included)
         count = ngettext("{count} of {all}", "{count} of {all}", len(topics))
-        words = count.format(count=grouped(len(included)), all=grouped(len(topics)))
+        words = count.format(count=group_digits(len(included)), all=group_digits(len(topics)))
         if bandwidth:
-            words = _("{topics}, {bandwidth}").format(topics=words, bandwidth=bandwidth_words(bandwidth))
+            words = _("{topics}, {bandwidth}").format(topics=words, bandwidth=bandwidth_text(bandwidth))
         self.count.setText(words)
         self.later.setVisible(self.choice.mode != "chosen")
 
     def _show_ring(self) -> None:
         recordings, state = self._recordings, self._recordings.client.state
         wish = recordings.wish
-        self.keep.set_word(_("Save last {count} s").format(count=wish.seconds))
+        self.keep.set_label(_("Save last {count} s").format(count=wish.seconds))
         self.keep.setEnabled(state.ring_s is not None)
         if state.ring_s is None:
             self.ring_bar.set_fraction(None)
@@ -501,18 +504,18 @@ class RecordSheet(Overlay):
         self.ring_bar.set_fraction(state.ring_s / wish.seconds)
         words = _("{count} s buffered, {size} of {most}").format(
             count=round(min(state.ring_s, wish.seconds)),
-            size=size_words(state.ring_bytes),
-            most=size_words(wish.size_gb * _GB),
+            size=size_text(state.ring_bytes),
+            most=size_text(wish.size_gb * _GB),
         )
         self.ring_words.setText(words)
 
-    def _choose_mode(self, mode: str) -> None:
+    def _set_mode(self, mode: str) -> None:
         recordings = self._recordings
         choice = replace(recordings.choice, mode=mode)
         if mode == "chosen" and not choice.topics:
             choice = replace(choice, topics=tuple(sorted(self._included)))
-        recordings.choose(choice)
-        self._show_choice()
+        recordings.set_choice(choice)
+        self._show_settings()
         self.show_state()
 
     def _toggle(self, topic: str) -> None:
@@ -522,7 +525,9 @@ class RecordSheet(Overlay):
             return
         topics = recordings.choice.topics
         rest = tuple(each for each in topics if each != topic)
-        recordings.choose(replace(recordings.choice, topics=rest if topic in topics else (*topics, topic)))
+        recordings.set_choice(
+            replace(recordings.choice, topics=rest if topic in topics else (*topics, topic))
+        )
         self.show_state()
 
     def _change(self, **changes: float | None) -> None:
@@ -530,43 +535,43 @@ class RecordSheet(Overlay):
         recordings = self._recordings
         choice = replace(recordings.choice, **changes)  # type: ignore[arg-type]
         if choice != recordings.choice and not recordings.is_recording:
-            recordings.choose(choice)
-        self._ends_problem("")
+            recordings.set_choice(choice)
+        self._show_limits_problem("")
 
-    def _take_patterns(self) -> None:
+    def _apply_patterns(self) -> None:
         wanted, unwanted = self.patterns.patterns()
-        choice = replace(self._recordings.choice, patterns=wanted, left_out=unwanted)
-        self._mark_patterns(choice.problem)
-        self._recordings.choose(choice)
+        choice = replace(self._recordings.choice, patterns=wanted, excluded=unwanted)
+        self._show_pattern_problem(choice.problem)
+        self._recordings.set_choice(choice)
         self.show_state()
 
     def _switch_ring(self) -> None:
-        self._wish(is_on=self.ring.isChecked())
+        self._update_flight_recorder(is_on=self.ring.isChecked())
 
-    def _wish(self, **changes: object) -> None:
+    def _update_flight_recorder(self, **changes: object) -> None:
         recordings = self._recordings
         wish = replace(recordings.wish, **changes)  # type: ignore[arg-type]
         if wish != recordings.wish:
-            recordings.set_wish(wish)
+            recordings.set_ring_settings(wish)
         self._show_ring()
 
-    def _take_ring_topics(self) -> None:
+    def _apply_ring_topics(self) -> None:
         wanted, unwanted = self.ring_topics.patterns()
-        problem = replace(self._recordings.wish, patterns=wanted, left_out=unwanted).problem
-        self.ring_topics.set_wrong(bool(problem))
+        problem = replace(self._recordings.wish, patterns=wanted, excluded=unwanted).problem
+        self.ring_topics.set_invalid(bool(problem))
         if problem:
-            self._ring_problem(problem)
+            self._show_ring_problem(problem)
         else:
-            self._wish(patterns=wanted, left_out=unwanted)
+            self._update_flight_recorder(patterns=wanted, left_out=unwanted)
 
-    def _ring_problem(self, sentence: str) -> None:
+    def _show_ring_problem(self, sentence: str) -> None:
         self.ring_words.setText(sentence or self.ring_words.text())
 
-    def _bookmark(self) -> None:
-        self._recordings.client.note("")
-        self._say(_("Bookmark at {time}").format(time=length_words(self._recordings.elapsed_s)))
+    def _add_bookmark(self) -> None:
+        self._recordings.client.add_bookmark("")
+        self._say(_("Bookmark at {time}").format(time=length_text(self._recordings.elapsed_s)))
 
-    def _press(self) -> None:
+    def _toggle_recording(self) -> None:
         recordings = self._recordings
         if recordings.is_recording:
             recordings.stop()

@@ -15,16 +15,16 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QScrollArea, QVBoxLayout, QWi
 
 from app.core.reports.privacy import without_home
 from app.core.reports.problem_report import (
-    ENDING,
+    FILE_SUFFIX,
     ReportedWork,
     ReportParts,
     ReportWriter,
+    describe_contents,
     file_name,
     make_report,
-    what_goes_in,
-    work_words,
+    work_text,
 )
-from app.ui.other_programs import open_outside
+from app.ui.other_programs import open_externally
 from app.ui.shell.dialogs.overlay import Overlay
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
@@ -34,16 +34,16 @@ from app.ui.widgets.inputs.fields import LongText
 from nep.i18n import _, lazy
 
 WIDE, SIDE, SCROLL_BAR = 620, 19, 10
-LOOK_MS = 50
+POLL_MS = 50
 ICON = 15
-ZIP = FileKind(lazy("Zip file"), ENDING)
+ZIP = FileKind(lazy("Zip file"), FILE_SUFFIX)
 INTRODUCTION = lazy(
     "Studio writes a file that describes its state on this computer. Nothing is sent: you "
     "decide who gets the file."
 )
 NO_BEHAVIOURS = lazy("Your behaviours")
 NO_BEHAVIOURS_UNLESS = lazy("Your behaviours, unless you include them below")
-NOT_IN_IT = (
+EXCLUDED_PARTS = (
     NO_BEHAVIOURS,
     lazy("Images, sounds and robot messages"),
     lazy("Keys, passwords and access codes. Your home folder appears as ~"),
@@ -93,14 +93,14 @@ class ReportSheet(Overlay):
         self.show_file = Button(theme, _("Show the file"), "folder-open", kind="primary", size="form")
         self.write = Button(theme, _("Write report"), "file-archive", kind="primary", size="form")
         self._looking = QTimer(self)
-        self._looking.setInterval(LOOK_MS)
+        self._looking.setInterval(POLL_MS)
         self._looking.timeout.connect(self._check)
-        self.write.clicked.connect(self._ask_where)
+        self.write.clicked.connect(self._ask_path)
         self.show_file.clicked.connect(self._show_file)
         self._lay_out()
 
     def _lay_out(self) -> None:
-        self._head = self.head(label(_("Report a problem"), "heading"))
+        self._head = self.make_header(label(_("Report a problem"), "heading"))
         self._head.setContentsMargins(SIDE, 0, SIDE, 0)
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
@@ -142,7 +142,7 @@ class ReportSheet(Overlay):
         inside.addWidget(label(_("Not included"), "title"))
         left_out = QVBoxLayout()
         left_out.setSpacing(4)
-        self._left_out = [_Line(self.theme, _(words), "x") for words in NOT_IN_IT]
+        self._left_out = [_Line(self.theme, _(words), "x") for words in EXCLUDED_PARTS]
         for line in self._left_out:
             left_out.addWidget(line)
         inside.addLayout(left_out)
@@ -163,11 +163,11 @@ class ReportSheet(Overlay):
             if line is not None:
                 line.hide()
                 line.deleteLater()
-        for words in what_goes_in(parts):
+        for words in describe_contents(parts):
             self.list.addWidget(_Line(self.theme, words, "check"))
         self._left_out[0].words.setText(_(NO_BEHAVIOURS_UNLESS if names else NO_BEHAVIOURS))
         self.work.setChecked(False)
-        self.names.setText(work_words(names) if names else "")
+        self.names.setText(work_text(names) if names else "")
         for widget in (self.work, self.names):
             paint.show_when(widget, bool(names))
         if self._writer is None:
@@ -177,7 +177,7 @@ class ReportSheet(Overlay):
     def first(self) -> QWidget:
         return self.happened.edit
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         buttons = self.write.sizeHint().width() + self.show_file.sizeHint().width() + 2 * SIDE + 40
         wide = min(room.width(), max(round(self.theme.scaled(WIDE)), buttons))
         layout = self._inside.layout()
@@ -203,11 +203,11 @@ class ReportSheet(Overlay):
             if words:
                 paint.announce(self.state, words)
 
-    def _ask_where(self) -> None:
+    def _ask_path(self) -> None:
         suggestion = documents_folder() / file_name(self._clock())
-        self._asks.save_as(_("Write report"), suggestion, (ZIP,), lambda path, _kind: self._begin(path))
+        self._asks.save_as(_("Write report"), suggestion, (ZIP,), lambda path, _kind: self._start(path))
 
-    def _begin(self, path: Path) -> None:
+    def _start(self, path: Path) -> None:
         parts = self._parts
         if parts is None or self._writer is not None:
             return
@@ -240,7 +240,7 @@ class ReportSheet(Overlay):
     def _show_file(self) -> None:
         if self.written is not None:
             folder = self.written.parent
-            if not open_outside(QUrl.fromLocalFile(str(folder))):
+            if not open_externally(QUrl.fromLocalFile(str(folder))):
                 self._say(_("The file is in {folder}").format(folder=folder))
 
 

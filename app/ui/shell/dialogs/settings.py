@@ -20,13 +20,13 @@ from app.ui.widgets.file_dialogs import FileDialogs
 from nep import i18n
 from nep.i18n import _, lazy, pgettext
 
-WIDE = 620
-MODE_WORDS = {
+WIDTH = 620
+MODE_LABELS = {
     "light": (lazy("Light"), "sun"),
     "dark": (lazy("Dark"), "moon"),
     "system": (lazy("Match system"), "monitor"),
 }
-PREFERENCE_WORDS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
+PREFERENCE_LABELS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
 MAX_SEGMENTS = 3
 """Maximum number of languages shown side by side; more are shown in a drop-down list."""
@@ -58,13 +58,13 @@ class SettingsSheet(Overlay):
         self._can_restart = restart is not None
         if restart is not None:
             self.restart.clicked.connect(restart)
-        modes = [(mode, _(MODE_WORDS[mode][0]), MODE_WORDS[mode][1]) for mode in MODES]
+        modes = [(mode, _(MODE_LABELS[mode][0]), MODE_LABELS[mode][1]) for mode in MODES]
         look = pgettext("colours of the window", "Appearance")
         self.mode = Segments(theme, modes, check=True, size="form", name=look)
         self.text = Segments(
             theme, [(p, f"{p} %", None) for p in TEXT_SIZES], check=True, size="form", name=_("Text size")
         )
-        wishes = [(wish, _(PREFERENCE_WORDS[wish]), None) for wish in PREFERENCES]
+        wishes = [(wish, _(PREFERENCE_LABELS[wish]), None) for wish in PREFERENCES]
         self.contrast = Segments(theme, wishes, check=True, size="form", name=_("High contrast"))
         self.motion = Segments(theme, wishes, check=True, size="form", name=_("Reduce motion"))
         self.robots = Switch(theme, _("Reopen at startup"))
@@ -72,30 +72,30 @@ class SettingsSheet(Overlay):
         self.shortcuts = Button(theme, _("Change shortcuts"), "keyboard", size="form")
         self.folder = ElidedLabel("bodyLarge", "textSecondary")
         self.choose = Button(theme, _("Choose a folder"), "folder-open", size="form")
-        self.mode.changed.connect(self._mode)
-        self.text.changed.connect(lambda percent: self._changed(lambda: theme.set_text_percent(int(percent))))
-        self.contrast.changed.connect(self._contrast)
-        self.motion.changed.connect(self._motion)
-        self.robots.clicked.connect(lambda on: state.keep(COME_BACK, on))
-        self.choose.clicked.connect(self._choose)
+        self.mode.changed.connect(self._set_mode)
+        self.text.changed.connect(lambda percent: self._apply(lambda: theme.set_text_percent(int(percent))))
+        self.contrast.changed.connect(self._set_contrast)
+        self.motion.changed.connect(self._set_motion)
+        self.robots.clicked.connect(lambda on: state.save(COME_BACK, on))
+        self.choose.clicked.connect(self._ask_folder)
         self._lay_out()
         theme.changed.connect(self._show)
 
     def _language_input(self) -> Segments | ComboBox:
-        offered = i18n.offered()
+        offered = i18n.selectable_languages()
         if len(offered) > MAX_SEGMENTS:
             choice = ComboBox(self.theme, offered, name=_("Language"))
-            choice.activated.connect(lambda _index: self._language(choice.value))
+            choice.activated.connect(lambda _index: self._set_language(choice.value))
             return choice
         segments = Segments(
             self.theme, [(code, name, None) for code, name in offered],
             check=True, size="form", name=_("Language"),
         )  # fmt: skip
-        segments.changed.connect(self._language)
+        segments.changed.connect(self._set_language)
         return segments
 
     def _lay_out(self) -> None:
-        head = self.head(label(_("Settings"), "heading"))
+        head = self.make_header(label(_("Settings"), "heading"))
         head.setContentsMargins(19, 0, 19, 0)
         self._inside = QWidget()
         self._inside.setProperty("bare", "true")
@@ -148,11 +148,11 @@ class SettingsSheet(Overlay):
     def first(self) -> QWidget:
         if isinstance(self.language, ComboBox):
             return self.language
-        return self.language.chosen_button() or self
+        return self.language.selected_button() or self
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         inside = self._inside.sizeHint()
-        wide = max(round(self.theme.scaled(WIDE)), inside.width() + 14)
+        wide = max(round(self.theme.scaled(WIDTH)), inside.width() + 14)
         high = inside.height() + self.sizeHint().height() - self._area.sizeHint().height() + 4
         return QSize(min(room.width(), wide), min(room.height(), high))
 
@@ -164,7 +164,7 @@ class SettingsSheet(Overlay):
 
     def _show(self) -> None:
         theme = self.theme
-        chosen = self._chosen_language()
+        chosen = self._selected_language()
         self.language.set_value(chosen)
         is_new = chosen != i18n.language()
         self.from_next_start.setVisible(is_new and not self._can_restart)
@@ -178,36 +178,36 @@ class SettingsSheet(Overlay):
         if self.isVisible():
             self.place()
 
-    def _changed(self, change: Callable[[], object]) -> None:
+    def _apply(self, change: Callable[[], object]) -> None:
         change()
-        self._state.keep_theme(self.theme)
+        self._state.save_theme(self.theme)
 
-    def _chosen_language(self) -> str:
+    def _selected_language(self) -> str:
         # The language that was chosen here if it is available, else the current one.
         chosen = self._settings.get("language", "")
-        return chosen if chosen in dict(i18n.offered()) else i18n.language()
+        return chosen if chosen in dict(i18n.selectable_languages()) else i18n.language()
 
-    def _language(self, chosen: str) -> None:
-        self._state.keep("language", chosen)
+    def _set_language(self, chosen: str) -> None:
+        self._state.save("language", chosen)
         self._show()
 
-    def _mode(self, chosen: str) -> None:
+    def _set_mode(self, chosen: str) -> None:
         mode = next(mode for mode in MODES if mode == chosen)
-        self._changed(lambda: self.theme.set_mode(mode))
+        self._apply(lambda: self.theme.set_mode(mode))
 
-    def _contrast(self, chosen: str) -> None:
+    def _set_contrast(self, chosen: str) -> None:
         wish = next(wish for wish in PREFERENCES if wish == chosen)
-        self._changed(lambda: self.theme.set_contrast(wish))
+        self._apply(lambda: self.theme.set_contrast(wish))
 
-    def _motion(self, chosen: str) -> None:
+    def _set_motion(self, chosen: str) -> None:
         wish = next(wish for wish in PREFERENCES if wish == chosen)
-        self._changed(lambda: self.theme.set_motion(wish))
+        self._apply(lambda: self.theme.set_motion(wish))
 
-    def _choose(self) -> None:
+    def _ask_folder(self) -> None:
         before = str(snapshots.folder(self._settings))
-        self._files.choose_folder(before, self.keep_folder)
+        self._files.select_folder(before, self.save_folder)
 
-    def keep_folder(self, folder: Path) -> None:
+    def save_folder(self, folder: Path) -> None:
         """Set and save the folder for images."""
-        self._state.keep(snapshots.CHOSEN, str(folder))
+        self._state.save(snapshots.FOLDER_SETTING, str(folder))
         self._show()

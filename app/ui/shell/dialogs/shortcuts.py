@@ -9,9 +9,9 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.ui.shell.actions.actions import STOP
-from app.ui.shell.actions.shortcuts import FIXED, Shortcuts, key_of
+from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts, key_of
 from app.ui.shell.dialogs.overlay import Overlay
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import shortcut_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, SearchField, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
@@ -19,7 +19,7 @@ from app.ui.widgets.lists.fuzzy import Entry, Match, match
 from nep.i18n import _, lazy
 
 WIDE, HIGH = 680, 640
-ONLY_MODIFIERS = frozenset(
+MODIFIER_KEYS = frozenset(
     {
         Qt.Key.Key_Control,
         Qt.Key.Key_Shift,
@@ -29,7 +29,7 @@ ONLY_MODIFIERS = frozenset(
         Qt.Key.Key_unknown,
     }
 )
-PLACES = {"file": lazy("File"), "panel": lazy("Panels"), "edit": lazy("Edit")}
+GROUP_LABELS = {"file": lazy("File"), "panel": lazy("Panels"), "edit": lazy("Edit")}
 HINT = lazy("Press Enter or click to change a shortcut. Press Delete to remove it.")
 
 
@@ -52,15 +52,15 @@ class ShortcutSheet(Overlay):
         self._lay_out()
         self.field.installEventFilter(self)
         self.field.textChanged.connect(self._show)
-        self.rows.pressed_row.connect(self.record)
-        self.rows.moved.connect(self._chosen)
+        self.rows.row_activated.connect(self.record)
+        self.rows.selection_moved.connect(self._on_selection_changed)
         self.swap.clicked.connect(self._swap)
         self.reset.clicked.connect(self._reset)
         self.reset_all.clicked.connect(shortcuts.reset_all)
         shortcuts.changed.connect(self._show)
 
     def _lay_out(self) -> None:
-        head = self.head(label(_("Keyboard shortcuts"), "heading"))
+        head = self.make_header(label(_("Keyboard shortcuts"), "heading"))
         foot = QHBoxLayout()
         foot.setSpacing(8)
         foot.addWidget(self.said, 1)
@@ -82,14 +82,14 @@ class ShortcutSheet(Overlay):
     def first(self) -> QWidget:
         return self.field
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
 
     def open(self) -> None:
         """Open the sheet with all shortcuts."""
         self.field.clear()
-        self._stop_waiting()
+        self._stop_recording()
         self._show()
         super().open()
 
@@ -103,42 +103,44 @@ class ShortcutSheet(Overlay):
         query = self.field.text().strip()
         before = self.rows.entry
         lines: list[Line] = []
-        for heading, entry in self._all():
-            text = f"{entry.words} {spoken_key(entry.key)}" if query else entry.words
+        for heading, entry in self._entries():
+            text = f"{entry.text} {shortcut_text(entry.key)}" if query else entry.text
             fits = match(query, text)
             if fits is None:
                 continue
             if Heading(heading) not in lines:
                 lines.append(Heading(heading))
-            end = len(entry.words)
+            end = len(entry.text)
             spans = tuple((begin, min(stop, end)) for begin, stop in fits[1] if begin < end)
             lines.append(Match(entry, 0.0, spans if query else ()))
         keep = chosen if chosen.startswith(("command:", "fixed:")) else before.id if before else ""
         self.rows.show_lines(lines, keep)
-        self._chosen()
+        self._on_selection_changed()
 
-    def _all(self) -> list[tuple[str, Entry]]:
+    def _entries(self) -> list[tuple[str, Entry]]:
         groups: dict[str, list[Entry]] = {}
         for row in self._shortcuts.commands.values():
             if not row.in_shortcuts:
                 continue
-            keys = "\n".join(self._shortcuts.of(row.id))
-            note = _("custom") if self._shortcuts.own(row.id) else ""
-            place = row.menu or PLACES.get(row.id.partition(".")[0], "View")
+            keys = "\n".join(self._shortcuts.keys_of(row.id))
+            note = _("custom") if self._shortcuts.is_customised(row.id) else ""
+            place = row.menu or GROUP_LABELS.get(row.id.partition(".")[0], "View")
             group = groups.setdefault(_(place), [])
-            group.append(Entry(f"command:{row.id}", row.words, "", note, keys))
-        for number, fixed in enumerate(FIXED):
+            group.append(Entry(f"command:{row.id}", row.label, "", note, keys))
+        for number, fixed in enumerate(FIXED_KEYS):
             keys = "\n".join(fixed.key.split(", "))
-            groups.setdefault(_(fixed.place), []).append(
-                Entry(f"fixed:{number}", _(fixed.words), "", _("always"), keys)
+            groups.setdefault(_(fixed.scope), []).append(
+                Entry(f"fixed:{number}", _(fixed.label), "", _("always"), keys)
             )
         return [(heading, entry) for heading, entries in groups.items() for entry in entries]
 
-    def _chosen(self) -> None:
+    def _on_selection_changed(self) -> None:
         entry = self.rows.entry
         command = entry is not None and entry.kind == "command"
-        self.reset.setEnabled(command and entry is not None and self._shortcuts.own(entry.name))
-        self.reset_all.setEnabled(any(self._shortcuts.own(name) for name in self._shortcuts.commands))
+        self.reset.setEnabled(command and entry is not None and self._shortcuts.is_customised(entry.name))
+        self.reset_all.setEnabled(
+            any(self._shortcuts.is_customised(name) for name in self._shortcuts.commands)
+        )
         if entry is not None and self.isVisible() and not self._waiting:
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
 
@@ -148,17 +150,17 @@ class ShortcutSheet(Overlay):
         if entry is None:
             return
         if entry.kind != "command":
-            self._set_status(_("The shortcut of “{command}” was not changed.").format(command=entry.words))
+            self._set_status(_("The shortcut of “{command}” was not changed.").format(command=entry.text))
             return
         self._waiting, self._offer = entry.name, None
         self.rows.look.waiting = entry.id
         paint.show_when(self.swap, False)
         self.field.setFocus(Qt.FocusReason.OtherFocusReason)
         words = _("Press the new shortcut for “{command}”. Esc cancels.")
-        self._set_status(words.format(command=entry.words))
+        self._set_status(words.format(command=entry.text))
         self.rows.viewport().update()
 
-    def _stop_waiting(self, said: str = "") -> None:
+    def _stop_recording(self, said: str = "") -> None:
         self._waiting = self.rows.look.waiting = ""
         self._offer = None
         paint.show_when(self.swap, False)
@@ -179,20 +181,20 @@ class ShortcutSheet(Overlay):
                 event.accept()
                 return True
         if event.type() == QEvent.Type.KeyPress:
-            return self._pressed(cast("QKeyEvent", event))
+            return self._handle_key(cast("QKeyEvent", event))
         return super().eventFilter(watched, event)
 
-    def _pressed(self, pressed: QKeyEvent) -> bool:
+    def _handle_key(self, pressed: QKeyEvent) -> bool:
         key = pressed.key()
         if self._waiting:
-            if key not in ONLY_MODIFIERS:
+            if key not in MODIFIER_KEYS:
                 self._assign(pressed)
             return True
         if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.record()
             return True
         if key == Qt.Key.Key_Delete and not self.field.text():
-            self._take_away()
+            self._remove_shortcut()
             return True
         plain = not pressed.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
         return plain and self.rows.handle(key)
@@ -200,52 +202,52 @@ class ShortcutSheet(Overlay):
     def _assign(self, pressed: QKeyEvent) -> None:
         name, key = self._waiting, key_of(pressed.keyCombination())
         if pressed.key() == Qt.Key.Key_Escape:
-            self._stop_waiting()
+            self._stop_recording()
             return
-        refusal = self._shortcuts.refusal(name, pressed.keyCombination())
+        refusal = self._shortcuts.rejection_reason(name, pressed.keyCombination())
         if refusal:
             self._set_status(refusal)
             return
-        words = self._shortcuts.commands[name].words
-        holder = self._shortcuts.holder(key)
+        words = self._shortcuts.commands[name].label
+        holder = self._shortcuts.command_for(key)
         if holder and holder != name:
-            other = self._shortcuts.commands[holder].words
+            other = self._shortcuts.commands[holder].label
             said = _(
                 "{key} is already the shortcut of “{command}”. Swap them, or press Enter again to replace it."
             )
-            self._stop_waiting(said.format(key=spoken_key(key), command=other))
+            self._stop_recording(said.format(key=shortcut_text(key), command=other))
             self._offer = (name, key)
             paint.show_when(self.swap, True)
             return
-        self._stop_waiting(
-            _("The shortcut of “{command}” is now {key}.").format(command=words, key=spoken_key(key))
+        self._stop_recording(
+            _("The shortcut of “{command}” is now {key}.").format(command=words, key=shortcut_text(key))
         )
-        self._shortcuts.give(name, key)
+        self._shortcuts.assign(name, key)
 
     def _swap(self) -> None:
         if self._offer is not None:
             name, key = self._offer
-            words = self._shortcuts.commands[name].words
-            self._stop_waiting(
-                _("The shortcut of “{command}” is now {key}.").format(command=words, key=spoken_key(key))
+            words = self._shortcuts.commands[name].label
+            self._stop_recording(
+                _("The shortcut of “{command}” is now {key}.").format(command=words, key=shortcut_text(key))
             )
             self._shortcuts.swap(name, key)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _take_away(self) -> None:
+    def _remove_shortcut(self) -> None:
         entry = self.rows.entry
-        if entry is None or entry.kind != "command" or not self._shortcuts.of(entry.name):
+        if entry is None or entry.kind != "command" or not self._shortcuts.keys_of(entry.name):
             return
-        if entry.name == STOP and len(self._shortcuts.of(STOP)) == 1:
+        if entry.name == STOP and len(self._shortcuts.keys_of(STOP)) == 1:
             self._set_status(_("F12 can't be removed: it always triggers Stop."))
             return
-        said = _("“{command}” no longer has a shortcut.").format(command=entry.words)
-        self._stop_waiting(_("Stop has only the shortcut F12 now.") if entry.name == STOP else said)
-        self._shortcuts.give(entry.name, "")
+        said = _("“{command}” no longer has a shortcut.").format(command=entry.text)
+        self._stop_recording(_("Stop has only the shortcut F12 now.") if entry.name == STOP else said)
+        self._shortcuts.assign(entry.name, "")
 
     def _reset(self) -> None:
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
-            self._stop_waiting(_("Reset the shortcut of “{command}”.").format(command=entry.words))
+            self._stop_recording(_("Reset the shortcut of “{command}”.").format(command=entry.text))
             self._shortcuts.reset(entry.name)
             self.field.setFocus(Qt.FocusReason.OtherFocusReason)

@@ -8,18 +8,18 @@ from pathlib import Path
 from PySide6.QtWidgets import QWidget
 
 from app.core.storage.settings import RecentFile, Settings, home
-from app.ui.shell.dialogs.file_sheet import FileQuestion, FileSheet, FolderPlace, known_places
+from app.ui.shell.dialogs.file_sheet import FileQuestion, FileSheet, FolderLocation, known_locations
 from app.ui.theme.theme import Theme
 from app.ui.widgets.file_dialogs import LAYOUTS, FileKind, pictures_folder
 from nep.i18n import lazy
 
 RECORDING = FileQuestion(
     lazy("Open a recording"), lazy("Open"), lazy("No recordings or folders here."),
-    endings=(".mcap",), icon="film",
+    suffixes=(".mcap",), icon="film",
 )  # fmt: skip
 LAYOUT = FileQuestion(
     lazy("Open a layout"), lazy("Open"), lazy("No layouts or folders here."),
-    endings=(LAYOUTS[1].lstrip("*"),), icon="layout-panel-left",
+    suffixes=(LAYOUTS[1].lstrip("*"),), icon="layout-panel-left",
 )  # fmt: skip
 
 
@@ -32,11 +32,11 @@ class StudioDialogs:
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a behaviour to open."""
-        self._made().ask_open(Path(folder or Path.home()), take)
+        self._get_sheet().ask_open(Path(folder or Path.home()), take)
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
         """Ask for place and name to save a behaviour."""
-        self._made().ask_save(Path(suggestion), take)
+        self._get_sheet().ask_save(Path(suggestion), take)
 
     def save_as(
         self,
@@ -46,35 +46,35 @@ class StudioDialogs:
         take: Callable[[Path, FileKind], None],
     ) -> None:
         """Ask for place, name and format to save another kind of file."""
-        self._made().ask_save_as(title, suggestion, kinds, take)
+        self._get_sheet().ask_save_as(title, suggestion, kinds, take)
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for an image file."""
-        self._made().ask_picture(Path(folder or pictures_folder()), take)
+        self._get_sheet().ask_picture(Path(folder or pictures_folder()), take)
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a recording to open."""
-        self._made().ask_open(_nearest(folder), take, RECORDING)
+        self._get_sheet().ask_open(_nearest_folder(folder), take, RECORDING)
 
     def open_layout(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a layout file to import."""
-        self._made().ask_open(_nearest(folder), take, LAYOUT)
+        self._get_sheet().ask_open(_nearest_folder(folder), take, LAYOUT)
 
-    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+    def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a folder."""
-        self._made().ask_folder(_nearest(folder), take)
+        self._get_sheet().ask_folder(_nearest_folder(folder), take)
 
-    def _made(self) -> FileSheet:
+    def _get_sheet(self) -> FileSheet:
         if self._sheet is None:
-            self._sheet = FileSheet(self._theme, self._window, self._places)
+            self._sheet = FileSheet(self._theme, self._window, self._locations)
         return self._sheet
 
-    def _places(self) -> tuple[FolderPlace, ...]:
+    def _locations(self) -> tuple[FolderLocation, ...]:
         recent: list[RecentFile] = self._settings.recent
-        return known_places(home() / "kept", [file.path for file in recent])
+        return known_locations(home() / "kept", [file.path for file in recent])
 
 
-def _nearest(folder: str) -> Path:
+def _nearest_folder(folder: str) -> Path:
     # Nearest existing ancestor of a missing folder.
     wanted = Path(folder)
     return next((each for each in (wanted, *wanted.parents) if each.is_dir()), Path.home())

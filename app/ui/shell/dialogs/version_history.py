@@ -17,8 +17,8 @@ from app.core.documents.file_format import read_file
 from app.core.documents.versions import Version, namesakes_of, versions_of
 from app.errors import DocumentError
 from app.ui.shell.dialogs.overlay import Overlay
-from app.ui.text.dates import when_words
-from app.ui.text.numbers import grouped
+from app.ui.text.dates import date_time_text
+from app.ui.text.numbers import group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, EmptyAction, EmptyState, label, paint
 from app.ui.widgets.lists.entry_list import EntryList, Heading, Line
@@ -27,7 +27,7 @@ from nep.i18n import _, day_text, lazy, ngettext
 
 WIDTH, MAX_HEIGHT, EMPTY_HEIGHT = 680, 560, 330
 HINT = lazy("Opens a copy in a new tab. Your file doesn't change.")
-WHEN_CREATED = lazy(
+NO_VERSIONS_TEXT = lazy(
     "Studio keeps the previous version of a file each time it is saved, saved under another "
     "name, or closed with unsaved work."
 )
@@ -36,7 +36,7 @@ SAVE_FIRST = lazy(
 )
 
 
-def difference_words(found: Difference) -> str:
+def difference_text(found: Difference) -> str:
     """Format a difference, such as "14 blocks; since then 3 added, 1 removed"."""
     counts = (
         (found.added, ngettext("{count} added", "{count} added", found.added)),
@@ -44,10 +44,12 @@ def difference_words(found: Difference) -> str:
         (found.changed, ngettext("{count} changed", "{count} changed", found.changed)),
     )
     changes = ", ".join(words.format(count=count) for count, words in counts if count)
-    blocks = ngettext("{count} block", "{count} blocks", found.blocks).format(count=grouped(found.blocks))
+    blocks = ngettext("{count} block", "{count} blocks", found.block_count).format(
+        count=group_digits(found.block_count)
+    )
     if changes:
         return _("{blocks}, {changes} since").format(blocks=blocks, changes=changes)
-    same = _("{blocks}, reordered") if found.moved else _("{blocks}, unchanged since")
+    same = _("{blocks}, reordered") if found.is_rearranged else _("{blocks}, unchanged since")
     return same.format(blocks=blocks)
 
 
@@ -83,11 +85,11 @@ class VersionHistorySheet(Overlay):
         self._reading.timeout.connect(self._read_one)
         self._lay_out()
         self.rows.installEventFilter(self)
-        self.rows.doubleClicked.connect(lambda _index: self.open_chosen())
-        self.button.clicked.connect(self.open_chosen)
+        self.rows.doubleClicked.connect(lambda _index: self.open_selected())
+        self.button.clicked.connect(self.open_selected)
 
     def _lay_out(self) -> None:
-        head = self.head(self.heading)
+        head = self.make_header(self.heading)
         head.setContentsMargins(19, 0, 19, 0)
         self._foot = QWidget()
         self._foot.setProperty("bare", "true")
@@ -131,36 +133,36 @@ class VersionHistorySheet(Overlay):
             ]
         self.heading.setText(_("Earlier versions of {name}").format(name=title or name))
         self.setAccessibleName(self.heading.text())
-        self._say_nothing(name, path)
+        self._show_empty_state(name, path)
         for widget, shown in ((self.rows, True), (self._foot, True), (self.empty, False)):
             paint.show_when(widget, shown == bool(lines))
         self.rows.show_lines(lines)
         self._reading.start(0)
         self.open()
 
-    def _say_nothing(self, name: str, path: Path | None) -> None:
+    def _show_empty_state(self, name: str, path: Path | None) -> None:
         if path is None:
             self.empty.set_texts(_("{name} is not saved to a file yet").format(name=name), _(SAVE_FIRST))
-            self.empty.set_actions([EmptyAction(_("Save"), self._save_it, "save", primary=True)])
+            self.empty.set_actions([EmptyAction(_("Save"), self._save_behaviour, "save", is_primary=True)])
         else:
-            self.empty.set_texts(_("No earlier versions yet"), _(WHEN_CREATED))
-            self.empty.set_actions([EmptyAction(_("Close"), self.shut)])
+            self.empty.set_texts(_("No earlier versions yet"), _(NO_VERSIONS_TEXT))
+            self.empty.set_actions([EmptyAction(_("Close"), self.dismiss)])
 
     def _line(self, version: Version, now: dt.datetime) -> Match:
         then = dt.datetime.fromtimestamp(version.written_s, tz=now.tzinfo)
-        return Match(Entry(f"version:{version.copy}", when_words(then, now), "history"))
+        return Match(Entry(f"version:{version.copy}", date_time_text(then, now), "history"))
 
     def first(self) -> QWidget:
         return self.rows if self._versions else self.empty.findChild(Button) or self
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         scaled = self.theme.scaled
         wide = min(room.width(), round(scaled(WIDTH)))
         layout = self.layout()
         if not self._versions or layout is None:
             return QSize(wide, min(room.height(), round(scaled(EMPTY_HEIGHT))))
         rest = layout.totalHeightForWidth(wide) - self.rows.sizeHint().height()
-        high = rest + self.rows.height_of_all() + 8
+        high = rest + self.rows.content_height() + 8
         return QSize(wide, min(room.height(), round(scaled(MAX_HEIGHT)), high))
 
     def _read_one(self) -> None:
@@ -171,7 +173,7 @@ class VersionHistorySheet(Overlay):
         note = reason = ""
         try:
             version = self._versions[id]
-            note = difference_words(difference(read_file(version.copy, version.name).workspace, self._now))
+            note = difference_text(difference(read_file(version.copy, version.name).workspace, self._now))
         except DocumentError as error:
             reason = error.reason
         self.rows.update_entry(id, note, reason)
@@ -185,24 +187,24 @@ class VersionHistorySheet(Overlay):
         if watched is self.rows and event.type() == QEvent.Type.KeyPress:
             key = cast("QKeyEvent", event).key()
             if key in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
-                self.open_chosen()
+                self.open_selected()
                 return True
             return self.rows.handle(key)
         return super().eventFilter(watched, event)
 
-    def open_chosen(self) -> None:
+    def open_selected(self) -> None:
         """Open the selected version as a copy, unless it is unreadable."""
         entry = self.rows.entry
         if entry is None or entry.reason:
             return
         version = self._versions[entry.id]
         then = dt.datetime.fromtimestamp(version.written_s).astimezone()
-        self.shut()
+        self.dismiss()
         name = _("{name}, {day} {clock}").format(
             name=self._name, day=day_text(then.day, then.month), clock=f"{then.hour}.{then.minute:02d}"
         )
         self._open_copy(version.copy, name)
 
-    def _save_it(self) -> None:
-        self.shut()
+    def _save_behaviour(self) -> None:
+        self.dismiss()
         self._save()

@@ -20,13 +20,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.core.faults import IN_CONSOLE, error_words
-from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelContext, PanelWidget, numbered
+from app.core.faults import CONSOLE_EXTRA, error_text
+from app.ui.panels.base import ANY_TYPE, Density, Panel, PanelContext, PanelWidget, numbered_title
 from app.ui.shell.docking.dock_title import DockTitle
 from app.ui.theme.theme import Theme
 from app.ui.widgets import EmptyAction, EmptyState, paint
-from app.ui.widgets.keyboard import proxy_of, tab_stops
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.keyboard import focus_proxy, tab_stops
+from app.ui.widgets.menus import Menu, open_below
 from nep.i18n import _
 
 MIN_BODY_SIZE = QSize(160, 60)
@@ -34,7 +34,7 @@ SUSPEND_DELAY_S = 2.0
 """Time in s after which a hidden panel is suspended, so that quick tab changes don't resubscribe."""
 CAUGHT_ERRORS = (Exception, SystemExit)
 """Exceptions of panels that are caught. A plug-in's panel may call `sys.exit`."""
-MAX_SENTENCE_LENGTH = 400
+MAX_MESSAGE_LENGTH = 400
 
 _log = logging.getLogger(__name__)
 
@@ -90,7 +90,7 @@ class DockBody(QWidget):
         left.raise_()
         right.raise_()
 
-    def fail(self, sentence: str, again: Callable[[], object]) -> None:
+    def show_error(self, sentence: str, again: Callable[[], object]) -> None:
         """Show an error in place of the panel, with a button to try again."""
         if self._failure is None:
             self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), sentence)
@@ -148,14 +148,14 @@ class Dock(QDockWidget):
     A `failed` panel is not refreshed.
     """
 
-    another_wanted = Signal(str)
+    another_requested = Signal(str)
     closed = Signal(str)
 
     def __init__(
         self, theme: Theme, description: Panel, panel: PanelWidget, density: Density, number: int = 1
     ) -> None:
         # `number` distinguishes docks of the same kind; `key` is the unique name in a workbench.
-        super().__init__(numbered(_(description.title), number))
+        super().__init__(numbered_title(_(description.title), number))
         self.description, self.panel = description, panel
         self.number, self.key = number, key_of(description.name, number)
         self.failed = False
@@ -164,16 +164,16 @@ class Dock(QDockWidget):
         self._theme, self._density = theme, density
         self.setObjectName(f"panel.{self.key}")
         self.setAccessibleName(self.windowTitle())
-        self._hold(panel)
+        self._set_panel(panel)
         self.visibilityChanged.connect(self._visibility)
         theme.changed.connect(self._restyle)
 
-    def _hold(self, panel: PanelWidget) -> None:
+    def _set_panel(self, panel: PanelWidget) -> None:
         panel.set_number(self.number)
         title, body = DockTitle(self._theme, panel, self._density), DockBody(self._theme, panel)
         panel.set_density(self._density)
         panel.setFont(panel.text_font())
-        title.menu_wanted.connect(self._show_menu)
+        title.menu_requested.connect(self._show_menu)
         self.panel, self.title, self.body = panel, title, body
         self.setTitleBarWidget(title)
         self.setWidget(body)
@@ -181,7 +181,7 @@ class Dock(QDockWidget):
     def replace(self, panel: PanelWidget) -> None:
         """Replace the placeholder by the panel."""
         old = (self.title, self.body)
-        self._hold(panel)
+        self._set_panel(panel)
         for each in old:
             each.deleteLater()
         self.visibilityChanged.emit(self.front)  # the new title needs the tabs, too
@@ -193,25 +193,25 @@ class Dock(QDockWidget):
     def _visibility(self, visible: bool) -> None:
         self.front = visible
 
-    def shown(self) -> bool:
+    def is_displayed(self) -> bool:
         """Return True if the panel is visible: open, in front, and in a window on the screen."""
-        return self.front and self.isVisible() and on_screen(self.window())
+        return self.front and self.isVisible() and is_on_screen(self.window())
 
-    def follow(self, now: float) -> str | None:
+    def update_suspension(self, now: float) -> str | None:
         """Suspend a panel that was hidden for two seconds, or resume a visible one; called on every tick.
 
         ``now`` is monotonic time in s. Return the error message if the panel has just failed.
         """
         if self.failed:
             return None
-        if self.shown():
+        if self.is_displayed():
             self._seen_s = now
             return self._try(self.panel.resume)
         return self._try(self.panel.suspend) if now - self._seen_s >= SUSPEND_DELAY_S else None
 
     def refresh(self) -> str | None:
         """Refresh the panel if it is visible. Return the error message if the panel has just failed."""
-        if self.failed or not self.shown():
+        if self.failed or not self.is_displayed():
             return None
         return self._try(self.panel.refresh)
 
@@ -230,15 +230,15 @@ class Dock(QDockWidget):
             self.failed = True
             with suppress(*CAUGHT_ERRORS):  # a failed panel needs no subscriptions
                 self.panel.suspend()
-            sentence = error_words(error)[:MAX_SENTENCE_LENGTH]
+            sentence = error_text(error)[:MAX_MESSAGE_LENGTH]
             said = ("the panel '%s' stopped: %s", self.description.name, sentence)
-            _log.error(*said, exc_info=error, extra=IN_CONSOLE)
+            _log.error(*said, exc_info=error, extra=CONSOLE_EXTRA)
             traceback.clear_frames(error.__traceback__)
-            self.body.fail(sentence, self.try_again)
+            self.body.show_error(sentence, self.retry)
             return sentence
         return None
 
-    def try_again(self) -> None:
+    def retry(self) -> None:
         """Show a failed panel again, beginning with the next refresh. Has no effect on other panels."""
         if self.failed:
             self.failed = False
@@ -257,14 +257,14 @@ class Dock(QDockWidget):
             return {}
         return found
 
-    def give_back(self, state: Mapping[str, object]) -> None:
+    def restore_state(self, state: Mapping[str, object]) -> None:
         """Restore the panel's state. An error is logged, so that the rest of the layout is restored."""
         try:
             self.panel.restore_state(state)
         except CAUGHT_ERRORS:
             _log.exception("restoring panel '%s' failed", self.description.name)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         """Close the panel before the window closes; an error is logged."""
         try:
             self.panel.dispose()
@@ -293,18 +293,18 @@ class Dock(QDockWidget):
         menu.addActions(own)
         if own:
             menu.addSeparator()
-        if self.description.several:
+        if self.description.allows_multiple:
             more = menu.addAction(self._theme.icon("plus"), _("Open another panel to the side"))
-            more.triggered.connect(lambda: self.another_wanted.emit(self.key))
+            more.triggered.connect(lambda: self.another_requested.emit(self.key))
         icon = self._theme.icon("picture-in-picture-2")
         floating = menu.addAction(icon, _("Dock") if self.isFloating() else _("Float"))
         floating.triggered.connect(self._float)
         menu.addAction(self._theme.icon("x"), _("Close")).triggered.connect(self.close)
         return menu
 
-    def first_stop(self) -> QWidget:
+    def focus_target(self) -> QWidget:
         """Return the widget that gets the focus: the panel's main widget, else its first focusable one."""
-        about = proxy_of(self.panel)
+        about = focus_proxy(self.panel)
         if about is not None and about.isVisible():
             return about
         stops = tab_stops(self.panel, self.panel)
@@ -315,18 +315,18 @@ class Dock(QDockWidget):
         return first
 
     def _float(self) -> None:
-        self._let_go()
+        self._clear_focus()
         self.setFloating(not self.isFloating())
         self.activateWindow()
-        self.first_stop().setFocus(Qt.FocusReason.OtherFocusReason)
+        self.focus_target().setFocus(Qt.FocusReason.OtherFocusReason)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        self._let_go()
+        self._clear_focus()
         super().closeEvent(event)
         if event.isAccepted():
             self.closed.emit(self.key)
 
-    def _let_go(self) -> None:
+    def _clear_focus(self) -> None:
         # Clears the focus first: otherwise Qt would move it as by Tab, and the editor would open a category.
         focus = QApplication.focusWidget()
         if focus is not None and self.isAncestorOf(focus):
@@ -336,7 +336,7 @@ class Dock(QDockWidget):
         menu = self.menu()
         menu.aboutToHide.connect(lambda: QTimer.singleShot(0, menu.deleteLater))
         if anchor is not None:
-            drop_below(menu, anchor)
+            open_below(menu, anchor)
         else:
             menu.popup(QCursor.pos())
 
@@ -346,7 +346,7 @@ def key_of(name: str, number: int) -> str:
     return name if number < 2 else f"{name}#{number}"
 
 
-def kind_of(key: str) -> tuple[str, int]:
+def parse_key(key: str) -> tuple[str, int]:
     """Split a key into name and number. Text in another format is a name with the number 1."""
     name, _sign, number = key.rpartition("#")
     if name and number.isascii() and number.isdigit() and key_of(name, int(number[:9])) == key:
@@ -366,12 +366,12 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
     return dock
 
 
-def on_screen(window: QWidget) -> bool:
+def is_on_screen(window: QWidget) -> bool:
     """Return False if a window is minimised, on another desktop, or (where known) completely covered."""
     return not window.isMinimized() and window.windowHandle().isExposed()
 
 
-def fitting(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:
+def dock_for_kinds(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:
     """Return the first dock whose panel accepts one of the kinds. Specific panels precede general ones."""
     there = [docks[name] for name in names]
     for wanted in (kinds, {ANY_TYPE}):

@@ -28,7 +28,7 @@ class TitleTab(PaintedButton):
     status.
     """
 
-    shortens = True
+    elides_text = True
 
     def __init__(self, theme: Theme, text: str, icon: str, chosen: bool) -> None:
         super().__init__(theme, text, checkable=True)
@@ -38,7 +38,7 @@ class TitleTab(PaintedButton):
         self.setChecked(chosen)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
-    def set_bare(self, bare: bool) -> None:
+    def set_icon_only(self, bare: bool) -> None:
         """Show only the icon if `bare`, else the name too."""
         if bare != self._bare:
             self._bare = bare
@@ -64,16 +64,16 @@ class TitleTab(PaintedButton):
         words = self.badge[0] if self.badge else ""
         return max(self._theme.scaled(BADGE), paint.width_of(self._theme.font("caption"), words) + 10)
 
-    def bare_width(self) -> int:
+    def icon_only_width(self) -> int:
         """Return the width in px with the icon only."""
         return round(self._theme.scaled(ICON) + 16 + self._badge_room())
 
     def sizeHint(self) -> QSize:
         high = max(26, round(paint.height_of(self._theme.font("title"))) + 6)
-        return QSize(self.bare_width() if self._bare else self.full_width(), high)
+        return QSize(self.icon_only_width() if self._bare else self.full_width(), high)
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(min(self.bare_width(), self.full_width()), self.sizeHint().height())
+        return QSize(min(self.icon_only_width(), self.full_width()), self.sizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -94,7 +94,7 @@ class TitleTab(PaintedButton):
             if room.width() >= side or not self.badge:  # a badge is preferred over a clipped icon
                 paint_icon(painter, square, self._icon, ink)
         else:
-            paint.words(painter, room, self.text(), theme.font("title"), ink, paint.CENTRE)
+            paint.text_line(painter, room, self.text(), theme.font("title"), ink, paint.CENTRE)
         if self.badge:
             self._paint_badge(painter, rect, *self.badge)
 
@@ -104,25 +104,25 @@ class TitleTab(PaintedButton):
         place = QRectF(left, rect.center().y() - high / 2, min(wide, rect.width() - 2), high)
         look = theme.status(status)
         paint.box(painter, place, high / 2, theme.colour(look.tint or "sunken"), theme.colour(look.colour))
-        paint.words(painter, place, words, theme.font("caption"), theme.colour(look.colour), paint.CENTRE)
+        paint.text_line(painter, place, words, theme.font("caption"), theme.colour(look.colour), paint.CENTRE)
 
 
 class DockTitle(QWidget):
     """Title bar of a dock. Also paints the upper part of the panel's frame."""
 
-    menu_wanted = Signal(object)
+    menu_requested = Signal(object)
 
     def __init__(self, theme: Theme, panel: PanelWidget, density: Density) -> None:
         super().__init__()
         self._theme, self._panel, self._density = theme, panel, density
         self._least = theme.size("panelTitle", density)  # cached, because layouts read it often
-        self._whole = panel.replaces_title()
+        self._whole = panel.title_widget()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.name = ElidedLabel("titleLarge" if density == "comfortable" else "title", "textSecondary", 120)
         self._subtitle = ElidedLabel("code", "textTertiary")
         self._tabs: list[TitleTab] = []
         self.more = IconButton(theme, "ellipsis", _("Options of {panel}").format(panel=panel.title()))
-        self.more.clicked.connect(lambda: self.menu_wanted.emit(self.more))
+        self.more.clicked.connect(lambda: self.menu_requested.emit(self.more))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
@@ -222,26 +222,26 @@ class DockTitle(QWidget):
         As a last step, the front panel is shown as an icon too. Chips with an unspecific icon keep their
         text.
         """
-        chips = [chip for chip in self._others() if isinstance(chip, Chip) and chip.status != "off"]
+        chips = [chip for chip in self._other_widgets() if isinstance(chip, Chip) and chip.status != "off"]
         if not self._tabs:
             for chip in chips:
-                chip.set_bare(False)
+                chip.set_icon_only(False)
             return
         room = self._room_for_tabs()
-        words = sum(chip.full_width() - chip.bare_width() for chip in chips)
+        words = sum(chip.full_width() - chip.icon_only_width() for chip in chips)
         whole = sum(tab.full_width() for tab in self._tabs)
-        behind = sum(tab.bare_width() for tab in self._tabs if not tab.isChecked())
+        behind = sum(tab.icon_only_width() for tab in self._tabs if not tab.isChecked())
         front = behind + sum(tab.full_width() for tab in self._tabs if tab.isChecked())
         silent = whole > room and (whole <= room + words or front > room)
         room += words if silent else 0
         bare = whole > room
         least = room - behind < self._theme.scaled(MIN_NAME_WIDTH)
         for chip in chips:
-            chip.set_bare(silent)
+            chip.set_icon_only(silent)
         for tab in self._tabs:
-            tab.set_bare(bare and (not tab.isChecked() or least))
+            tab.set_icon_only(bare and (not tab.isChecked() or least))
 
-    def _others(self) -> list[QWidget]:
+    def _other_widgets(self) -> list[QWidget]:
         row = self._tab_row
         items = (row.itemAt(place) for place in range(row.count()))
         widgets = (item.widget() for item in items if item is not None)
@@ -249,7 +249,7 @@ class DockTitle(QWidget):
 
     def _room_for_tabs(self) -> int:
         # Width in px with the full text of all chips.
-        row, others = self._tab_row, self._others()
+        row, others = self._tab_row, self._other_widgets()
         margins, taken = row.contentsMargins(), 0
         for each in others:
             if isinstance(each, Chip):
@@ -288,7 +288,7 @@ class DockTitle(QWidget):
         return tuple(tab.text() for tab in self._tabs)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        self.menu_wanted.emit(None)
+        self.menu_requested.emit(None)
         event.accept()
 
     def paintEvent(self, _event: QPaintEvent) -> None:

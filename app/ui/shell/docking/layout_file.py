@@ -10,7 +10,7 @@ import orjson
 
 from app.core.storage import deep_json
 from app.errors import AppError
-from app.ui.shell.docking.dock import kind_of
+from app.ui.shell.docking.dock import parse_key
 from app.ui.shell.docking.layouts import LAYOUTS
 from app.ui.shell.docking.saved_layouts import MAX_LENGTH
 from nep.i18n import _
@@ -85,13 +85,13 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     if told.get("sum") != _sum(saved):
         raise LayoutFileError(_("it is damaged"))
     keys = list(dict.fromkeys(key for key in opened if isinstance(key, str)))
-    known = [key for key in keys if kind_of(key)[0] in panels]
-    unknown = tuple(dict.fromkeys(kind_of(key)[0] for key in keys if key not in known))
+    known = [key for key in keys if parse_key(key)[0] in panels]
+    unknown = tuple(dict.fromkeys(parse_key(key)[0] for key in keys if key not in known))
     about = saved.get("panels")
     kept = {
         key: each
         for key, each in (about if isinstance(about, dict) else {}).items()
-        if kind_of(key)[0] in panels and isinstance(each, dict)
+        if parse_key(key)[0] in panels and isinstance(each, dict)
     }
     return LayoutFile(_name(told.get("name"), stem), base, {**saved, "open": known, "panels": kept}, unknown)
 

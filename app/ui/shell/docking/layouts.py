@@ -20,7 +20,7 @@ class DockColumn:
 
     width: int
     rows: tuple[tuple[tuple[str, ...], int], ...]
-    most: float = 1.0
+    max_share: float = 1.0
     share: float = 0.0
 
 
@@ -31,12 +31,12 @@ class Fold:
     The first panel identifies the fold within its layout.
     """
 
-    into: str
+    target: str
     panels: tuple[str, ...]
     below_width: int = 0
     below_height: int = 0
 
-    def wanted(self, width: float, height: float) -> bool:
+    def applies(self, width: float, height: float) -> bool:
         """Return True if the panels are folded in a workbench of this size (px at 100 % text)."""
         return width < self.below_width or height < self.below_height
 
@@ -59,21 +59,21 @@ class Layout:
     density: Density
     columns: tuple[DockColumn, ...]
     folds: tuple[Fold, ...]
-    homes: Mapping[str, str]
-    brings: Mapping[str, str] = field(default_factory=dict)
-    taller: Mapping[str, int] = field(default_factory=dict)
-    below: Mapping[str, int] = field(default_factory=lambda: {"timeline": 324})
+    tab_targets: Mapping[str, str]
+    companions: Mapping[str, str] = field(default_factory=dict)
+    min_heights: Mapping[str, int] = field(default_factory=dict)
+    bottom_heights: Mapping[str, int] = field(default_factory=lambda: {"timeline": 324})
 
     @property
-    def at_first(self) -> tuple[str, ...]:
+    def default_panels(self) -> tuple[str, ...]:
         """Panels that are open by default."""
         names = (name for column in self.columns for names, _height in column.rows for name in names)
-        return tuple(name for name in names if name not in self.later)
+        return tuple(name for name in names if name not in self.deferred_panels)
 
     @property
-    def later(self) -> frozenset[str]:
+    def deferred_panels(self) -> frozenset[str]:
         """Panels whose rows don't exist by default."""
-        return frozenset(self.brings.values())
+        return frozenset(self.companions.values())
 
 
 BEHAVIOUR = Layout(
@@ -86,7 +86,7 @@ BEHAVIOUR = Layout(
         DockColumn(
             384,
             ((("robot",), 327), (("camera",), 275), (("sensors",), 140), (("health",), 190)),
-            most=0.36,
+            max_share=0.36,
         ),
     ),
     (
@@ -120,8 +120,8 @@ DEVELOPER = Layout(
     "activity",
     "compact",
     (
-        DockColumn(640, ((("topics",), 780),), most=0.62, share=0.43),
-        DockColumn(330, ((("inspector",), 780),), most=0.28, share=0.22),
+        DockColumn(640, ((("topics",), 780),), max_share=0.62, share=0.43),
+        DockColumn(330, ((("inspector",), 780),), max_share=0.28, share=0.22),
         DockColumn(0, ((("image",), 380), (("console", "alerts", "nodes"), 394))),
     ),
     (

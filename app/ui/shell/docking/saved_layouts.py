@@ -14,12 +14,12 @@ from app.ui.shell.docking.workbench import Workbench
 from app.ui.shell.window_state import WindowState
 from nep.i18n import _
 
-OWN_PREFIX = "own:"
+CUSTOM_PREFIX = "own:"
 MAX_LENGTH = 40
 
 
 @dataclass(frozen=True, slots=True)
-class OwnLayout:
+class CustomLayout:
     """Custom layout, with the built-in layout that it is based on."""
 
     name: str
@@ -34,28 +34,28 @@ class SavedLayouts:
         self._state, self._complain = state, complain
         self._current: dict[str, str] = {}
 
-    def all(self) -> tuple[OwnLayout, ...]:
+    def all(self) -> tuple[CustomLayout, ...]:
         """Return the custom layouts, sorted by name."""
         bases = {layout.name for layout in LAYOUTS}
         found = []
         for key, kept in self._state.layouts().items():
-            if key.startswith(OWN_PREFIX) and isinstance(kept, Mapping) and kept.get("base") in bases:
-                found.append(OwnLayout(key.removeprefix(OWN_PREFIX), str(kept["base"])))
+            if key.startswith(CUSTOM_PREFIX) and isinstance(kept, Mapping) and kept.get("base") in bases:
+                found.append(CustomLayout(key.removeprefix(CUSTOM_PREFIX), str(kept["base"])))
         return tuple(sorted(found, key=lambda own: own.name.lower()))
 
-    def named(self, name: str) -> OwnLayout | None:
+    def named(self, name: str) -> CustomLayout | None:
         """Return the custom layout with this name, or None."""
         return next((own for own in self.all() if own.name == name), None)
 
-    def own(self, base: str) -> str:
+    def custom_name(self, base: str) -> str:
         """Return the name of the custom layout that a workbench shows, or "" for the built-in one."""
         chosen = self._current.get(base)
         if chosen is None:
-            chosen = self._current[base] = self._state.chosen(base)
+            chosen = self._current[base] = self._state.selected_layout(base)
         found = self.named(chosen) if chosen else None
         return chosen if found is not None and found.base == base else ""
 
-    def refusal(self, name: str, but: str = "") -> str:
+    def rejection_reason(self, name: str, but: str = "") -> str:
         """Return the reason why a name is invalid, as a sentence, or ""."""
         name = name.strip()
         if not name:
@@ -66,12 +66,12 @@ class SavedLayouts:
         is_taken = name.lower() in taken - {but.lower()}
         return _("“{name}” already exists.").format(name=name) if is_taken else ""
 
-    def bring_back(self, bench: Workbench, base: str) -> None:
+    def restore(self, bench: Workbench, base: str) -> None:
         """Restore the last arrangement of a workbench, or the default if there is none or it is damaged."""
-        own = self.own(base)
-        saved = self._state.of_layout(OWN_PREFIX + own if own else base)
+        own = self.custom_name(base)
+        saved = self._state.layout_state(CUSTOM_PREFIX + own if own else base)
         if not saved:
-            bench.arrange()
+            bench.reset_layout()
             return
         try:
             well = bench.restore(saved)
@@ -79,65 +79,65 @@ class SavedLayouts:
             well = False
             self._complain(f"{type(error).__name__}: {error}")
         if not well:
-            bench.arrange()
+            bench.reset_layout()
             words = _("Can't restore the layout “{name}”; using its default.")
             self._complain(words.format(name=own or _(layout_named(base).title)))
 
-    def keep(self, bench: Workbench, base: str) -> None:
+    def save(self, bench: Workbench, base: str) -> None:
         """Save the arrangement of a workbench under the name of its current layout."""
-        own = self.own(base)
-        self._state.keep_layouts({OWN_PREFIX + own if own else base: {**bench.save(), "base": base}})
+        own = self.custom_name(base)
+        self._state.save_layouts({CUSTOM_PREFIX + own if own else base: {**bench.save(), "base": base}})
 
-    def use(self, bench: Workbench, base: str, own: str) -> None:
+    def switch(self, bench: Workbench, base: str, own: str) -> None:
         """Save the current layout, then show another one ("" for the built-in one)."""
-        if own == self.own(base):
+        if own == self.custom_name(base):
             return
-        self.keep(bench, base)
-        self._choose(base, own)
-        self.bring_back(bench, base)
+        self.save(bench, base)
+        self._set_current(base, own)
+        self.restore(bench, base)
 
-    def keep_as(self, bench: Workbench, base: str, name: str) -> bool:
+    def save_as(self, bench: Workbench, base: str, name: str) -> bool:
         """Save the current arrangement as a new custom layout and show that. The old layout keeps its state.
 
         Return False if the layout couldn't be saved and will be lost when Studio ends.
         """
-        kept = self._state.keep_layouts({OWN_PREFIX + name.strip(): {**bench.save(), "base": base}})
-        self._choose(base, name.strip())
+        kept = self._state.save_layouts({CUSTOM_PREFIX + name.strip(): {**bench.save(), "base": base}})
+        self._set_current(base, name.strip())
         return kept
 
-    def fits(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
+    def can_restore(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
         """Return True if an imported arrangement can be restored; tries that before anything is saved."""
-        self.keep(bench, base)
+        self.save(bench, base)
         try:
             return bench.restore(saved)
         except Exception as error:  # noqa: BLE001  whatever was in the file, the window stays
             self._complain(f"{type(error).__name__}: {error}")
             return False
         finally:
-            self.bring_back(bench, base)
+            self.restore(bench, base)
 
-    def take_in(self, name: str, base: str, saved: Mapping[str, object]) -> tuple[str, bool]:
+    def import_layout(self, name: str, base: str, saved: Mapping[str, object]) -> tuple[str, bool]:
         """Save an imported arrangement. Return its name, and False if it couldn't be saved.
 
         A number is appended if the name is taken or invalid.
         """
         name = name.strip()[:MAX_LENGTH].strip()
         free, number = name, 2
-        while self.refusal(free):
+        while self.rejection_reason(free):
             ending = f" {number}"
             free, number = f"{name[: MAX_LENGTH - len(ending)]}{ending}", number + 1
-        return free, self._state.keep_layouts({OWN_PREFIX + free: {**saved, "base": base}})
+        return free, self._state.save_layouts({CUSTOM_PREFIX + free: {**saved, "base": base}})
 
     def rename(self, old: str, new: str) -> None:
         """Rename a custom layout."""
         found = self.named(old)
         if found is None or new.strip() == old:
             return
-        shown = self.own(found.base) == old
-        self._state.keep_layouts({OWN_PREFIX + new.strip(): self._state.of_layout(OWN_PREFIX + old)})
-        self._state.forget_layout(OWN_PREFIX + old)
+        shown = self.custom_name(found.base) == old
+        self._state.save_layouts({CUSTOM_PREFIX + new.strip(): self._state.layout_state(CUSTOM_PREFIX + old)})
+        self._state.delete_layout(CUSTOM_PREFIX + old)
         if shown:
-            self._choose(found.base, new.strip())
+            self._set_current(found.base, new.strip())
 
     def delete(self, bench: Workbench | None, name: str) -> tuple[bool, Callable[[], None]]:
         """Delete a custom layout; its workbench then shows the built-in layout.
@@ -148,19 +148,19 @@ class SavedLayouts:
         found = self.named(name)
         if found is None:
             return True, lambda: None
-        base, shown = found.base, self.own(found.base) == name
+        base, shown = found.base, self.custom_name(found.base) == name
         if shown and bench is not None:
-            self.use(bench, base, "")
-        saved = dict(self._state.of_layout(OWN_PREFIX + name))
-        kept = self._state.forget_layout(OWN_PREFIX + name)
+            self.switch(bench, base, "")
+        saved = dict(self._state.layout_state(CUSTOM_PREFIX + name))
+        kept = self._state.delete_layout(CUSTOM_PREFIX + name)
 
         def undo() -> None:
-            self._state.keep_layouts({OWN_PREFIX + name: saved})
+            self._state.save_layouts({CUSTOM_PREFIX + name: saved})
             if shown and bench is not None:
-                self.use(bench, base, name)
+                self.switch(bench, base, name)
 
         return kept, undo
 
-    def _choose(self, base: str, own: str) -> None:
+    def _set_current(self, base: str, own: str) -> None:
         self._current[base] = own
-        self._state.keep_chosen(base, own)
+        self._state.save_selected_layout(base, own)

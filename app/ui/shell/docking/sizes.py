@@ -65,10 +65,10 @@ def fit(
                 shared = [dock, *bench.tabifiedDockWidgets(dock)]
                 tall = [
                     least
-                    for each, least in layout.taller.items()
+                    for each, least in layout.min_heights.items()
                     if docks.get(each) in shared and not docks[each].isHidden()
                 ]
-                there.append((dock, max([height, *tall]), set(names) <= layout.later))
+                there.append((dock, max([height, *tall]), set(names) <= layout.deferred_panels))
         if there:
             columns.append((column, there))
     if not columns:
@@ -77,7 +77,7 @@ def fit(
     wide = bench.width() - margins.left() - margins.right() - gap * (len(columns) - 1)
     high = bench.height() - margins.top() - margins.bottom() - below
     wanted = [
-        round(min(max(column.width * scale, column.share * wide), column.most * wide))
+        round(min(max(column.width * scale, column.share * wide), column.max_share * wide))
         if column.width
         else MIN_SIZE_PX
         for column, _ in columns

@@ -10,21 +10,21 @@ from PySide6.QtCore import QByteArray, QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QMouseEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow
 
-from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered
-from app.ui.shell.docking.dock import Dock, key_of, kind_of, make_dock
+from app.ui.panels.base import Panel, PanelContext, PanelWidget, numbered_title
+from app.ui.shell.docking.dock import Dock, key_of, make_dock, parse_key
 from app.ui.shell.docking.layouts import Fold, Layout
 from app.ui.shell.docking.sizes import fit, shrink_above
 from app.ui.theme.theme import Theme
 from nep.i18n import _
 
-ACROSS = Qt.Orientation.Horizontal
-DOWN = Qt.Orientation.Vertical
-AREA = Qt.DockWidgetArea.LeftDockWidgetArea
-BELOW = Qt.DockWidgetArea.BottomDockWidgetArea
+HORIZONTAL = Qt.Orientation.Horizontal
+VERTICAL = Qt.Orientation.Vertical
+MAIN_AREA = Qt.DockWidgetArea.LeftDockWidgetArea
+BOTTOM_AREA = Qt.DockWidgetArea.BottomDockWidgetArea
 MAX_BELOW_SHARE = 0.42
 """Maximum height of panels below all others, as a share of the window's height."""
 STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
-MAX_OF_A_KIND = 8
+MAX_PER_KIND = 8
 
 
 class Workbench(QMainWindow):
@@ -67,55 +67,55 @@ class Workbench(QMainWindow):
         gap = theme.size("gap", layout.density)
         self.setContentsMargins(gap, gap, gap, gap)
         self.setDockOptions(QMainWindow.DockOption.AllowNestedDocks | QMainWindow.DockOption.AllowTabbedDocks)
-        self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, self.tabPosition(AREA))
+        self.setTabPosition(Qt.DockWidgetArea.AllDockWidgetAreas, self.tabPosition(MAIN_AREA))
         self._tabs_timer = QTimer(self)
         self._tabs_timer.setSingleShot(True)
-        self._tabs_timer.timeout.connect(self._show_tabs)
+        self._tabs_timer.timeout.connect(self._update_tabs)
         self._size_timer = QTimer(self)  # resizing works only after Qt has laid out the docks
         self._size_timer.setSingleShot(True)
-        self._size_timer.timeout.connect(self._size)
+        self._size_timer.timeout.connect(self._resize_docks)
         self._fold_timer = QTimer(self)
         self._fold_timer.setSingleShot(True)
-        self._fold_timer.timeout.connect(self._adapt)
+        self._fold_timer.timeout.connect(self._update_folds)
         theme.changed.connect(self._text_changed)
 
-    def make_ahead(self, name: str) -> None:
+    def preload(self, name: str) -> None:
         """Create a panel before it is opened, to avoid a delay then. It is suspended until visible."""
         description = self._panels.get(name)
         if description is not None and name not in self.docks and name not in self._ahead:
             self._ahead[name] = made = make_dock(description, self._context, self._layout.density)
-            made.follow(0.0)
+            made.update_suspension(0.0)
 
-    def arrange(self) -> None:
+    def reset_layout(self) -> None:
         """Restore the default arrangement and discard the user's changes."""
         for old in list(self.docks.values()):
             old.setFloating(False)
             self.removeDockWidget(old)
-            if old.description.several and old.key not in self._layout.at_first:
+            if old.description.allows_multiple and old.key not in self._layout.default_panels:
                 if old.number == 1:
                     self._set_aside[old.key] = old.saved_state()
-                self._end(old)  # otherwise a plot would keep its subscriptions
+                self._delete_dock(old)  # otherwise a plot would keep its subscriptions
         self._halves = None
         # All columns first, then the rows of each: otherwise the rows would extend across the columns.
         waiting: list[tuple[Dock, list[tuple[str, ...]]]] = []
         last: Dock | None = None
         for column in self._layout.columns:
             rows = [names for names, _ in column.rows if any(n in self._panels for n in names)]
-            rows = [names for names in rows if not set(names) <= self._layout.later]
-            head = self._put(rows[0], None, last) if rows else None
+            rows = [names for names in rows if not set(names) <= self._layout.deferred_panels]
+            head = self._add_docks(rows[0], None, last) if rows else None
             if head is not None:
                 waiting.append((head, rows[1:]))
                 last = head
         for head, rows in waiting:
             above = head
             for names in rows:
-                above = self._put(names, above, None) or above
+                above = self._add_docks(names, above, None) or above
         self._arranged, self._moved, self._folded = True, False, ()
-        self._size()
+        self._resize_docks()
         self._size_timer.start(0)
-        self._adapt()
+        self._update_folds()
 
-    def _put(self, names: Sequence[str], above: Dock | None, left: Dock | None) -> Dock | None:
+    def _add_docks(self, names: Sequence[str], above: Dock | None, left: Dock | None) -> Dock | None:
         # `names` share a place below "above" or right of "left".
         first: Dock | None = None
         for name in names:
@@ -125,42 +125,55 @@ class Workbench(QMainWindow):
             if first is not None:
                 self.tabifyDockWidget(first, dock)
             elif above is not None:
-                self.splitDockWidget(above, dock, DOWN)
+                self.splitDockWidget(above, dock, VERTICAL)
             elif left is not None:
-                self.splitDockWidget(left, dock, ACROSS)
+                self.splitDockWidget(left, dock, HORIZONTAL)
             else:
-                self.addDockWidget(AREA, dock)
+                self.addDockWidget(MAIN_AREA, dock)
             dock.show()
             first = first or dock
         if first is not None:
             first.raise_()
         return first
 
-    def _size(self) -> None:
+    def _resize_docks(self) -> None:
         # Has no effect if the user has moved a separator.
         halves, self._halves = self._halves, None
         if halves is not None:
-            way = ACROSS if halves[0].y() == halves[1].y() else DOWN
+            way = HORIZONTAL if halves[0].y() == halves[1].y() else VERTICAL
             self.resizeDocks(halves, [1, 1], way)
         reopened, self._reopened = self._reopened, None
         if reopened is not None and self._moved:
             gap = self._theme.size("gap", self._layout.density)
-            below = self._size_below(self._theme.scaled(1))
-            shrink_above(self, self.docks.values(), AREA, gap, below=below + gap)
+            below = self._resize_bottom_dock(self._theme.scaled(1))
+            shrink_above(self, self.docks.values(), MAIN_AREA, gap, below=below + gap)
         if self._arranged and not self._moved and not self._fold_timer.isActive():
             gap, scale = self._theme.size("gap", self._layout.density), self._theme.scaled(1)
-            below = self._size_below(scale)
-            fit(self, self._layout, self.docks, gap, scale, self._behind(), below=below + gap if below else 0)
+            below = self._resize_bottom_dock(scale)
+            fit(
+                self,
+                self._layout,
+                self.docks,
+                gap,
+                scale,
+                self._folded_names(),
+                below=below + gap if below else 0,
+            )
 
-    def _size_below(self, scale: float) -> int:
+    def _resize_bottom_dock(self, scale: float) -> int:
         # Returns the height.
-        for name, height in self._layout.below.items():
+        for name, height in self._layout.bottom_heights.items():
             dock = self.docks.get(name)
-            if dock is None or dock.isHidden() or dock.isFloating() or self.dockWidgetArea(dock) != BELOW:
+            if (
+                dock is None
+                or dock.isHidden()
+                or dock.isFloating()
+                or self.dockWidgetArea(dock) != BOTTOM_AREA
+            ):
                 continue
             high = self._heights.get(name) if self._moved else None
             high = high or round(min(height * scale, MAX_BELOW_SHARE * self.height()))
-            self.resizeDocks([dock], [high], DOWN)
+            self.resizeDocks([dock], [high], VERTICAL)
             return high
         return 0
 
@@ -173,22 +186,22 @@ class Workbench(QMainWindow):
         # Creates the dock on first use.
         if key in self.docks:
             return self.docks[key]
-        name, number = kind_of(key)
+        name, number = parse_key(key)
         description = self._panels.get(name)
-        if description is None or number > (MAX_OF_A_KIND if description.several else 1):
+        if description is None or number > (MAX_PER_KIND if description.allows_multiple else 1):
             return None
         dock = self._ahead.pop(key, None)
         dock = dock or make_dock(description, self._context, self._layout.density, number)
-        dock.another_wanted.connect(self.open_another)
-        dock.closed.connect(self._closed)
-        dock.dockLocationChanged.connect(self._tabs_soon)
-        dock.topLevelChanged.connect(self._tabs_soon)
-        dock.visibilityChanged.connect(self._tabs_soon)
-        if name in self._layout.taller:
+        dock.another_requested.connect(self.open_another)
+        dock.closed.connect(self._on_dock_closed)
+        dock.dockLocationChanged.connect(self._schedule_tabs)
+        dock.topLevelChanged.connect(self._schedule_tabs)
+        dock.visibilityChanged.connect(self._schedule_tabs)
+        if name in self._layout.min_heights:
             dock.visibilityChanged.connect(lambda: self._size_timer.start(0))
         self.docks[key] = dock
         if key in self._set_aside:
-            dock.give_back(self._set_aside.pop(key))
+            dock.restore_state(self._set_aside.pop(key))
         return dock
 
     def open(self, name: str) -> Dock | None:
@@ -196,37 +209,37 @@ class Workbench(QMainWindow):
 
         When opened for the first time, the panel opens its associated panel too.
         """
-        brought = self._layout.brings.get(name, "")
+        brought = self._layout.companions.get(name, "")
         if brought and name not in self.docks and brought not in self.docks:
             self.open(brought)
         dock = self._dock(name)
         if dock is None:
             return None
         if dock.parent() is not self or self.dockWidgetArea(dock) == Qt.DockWidgetArea.NoDockWidgetArea:
-            join(self, self._layout, self.docks, dock)
+            insert_dock(self, self._layout, self.docks, dock)
             self._size_timer.start(0)
         # otherwise Qt gives the dock half of its previous height
-        if dock.isHidden() and name in self._layout.below:
+        if dock.isHidden() and name in self._layout.bottom_heights:
             self._reopened = dock
             self._size_timer.start(0)
-        dock.try_again()
+        dock.retry()
         dock.show()
         dock.raise_()
-        self._tabs_soon()
+        self._schedule_tabs()
         return dock
 
     def open_latest(self, name: str) -> Dock | None:
         """Show the last used open panel of a kind, or else the first one."""
-        return self.open(next((key for key in self.by_use() if kind_of(key)[0] == name), name))
+        return self.open(next((key for key in self.recently_used() if parse_key(key)[0] == name), name))
 
     def open_another(self, key: str) -> Dock | None:
         """Open an additional panel of a kind next to an existing one. Return None if the maximum is open."""
-        name = kind_of(key)[0]
-        free = (number for number in range(1, MAX_OF_A_KIND + 1) if not self._is_open(key_of(name, number)))
+        name = parse_key(key)[0]
+        free = (number for number in range(1, MAX_PER_KIND + 1) if not self._is_open(key_of(name, number)))
         number = next(free, 0)
         if not number:
             said = _("The maximum of {count} panels of this kind is already open")
-            self._context.toast(said.format(count=MAX_OF_A_KIND))
+            self._context.toast(said.format(count=MAX_PER_KIND))
             return None
         if number == 1:
             return self.open(name)
@@ -234,53 +247,53 @@ class Workbench(QMainWindow):
         if dock is None:
             return None
         old = self.docks.get(key)
-        put_beside(self, self._layout, self.docks, dock, old)
+        insert_beside(self, self._layout, self.docks, dock, old)
         self._moved, self._halves = True, (old, dock) if old is not None else None
         self._size_timer.start(0)
         dock.show()
         dock.raise_()
-        self._tabs_soon()
+        self._schedule_tabs()
         self.focus_panel(dock)
         return dock
 
     def _is_open(self, key: str) -> bool:
         return key in self.docks and not self.docks[key].isHidden()
 
-    def source_changed(self) -> None:
+    def notify_source_changed(self) -> None:
         """Notify all panels, also closed ones, that the source has changed."""
         for dock in (*self.docks.values(), *self._ahead.values()):
             dock.panel.source_changed()
 
-    def used(self, dock: Dock) -> None:
+    def record_use(self, dock: Dock) -> None:
         """Record that a panel got the focus."""
         if self._used[-1:] != [dock.key]:
             self._used = [*(key for key in self._used if key != dock.key), dock.key]
 
-    def by_use(self) -> tuple[str, ...]:
+    def recently_used(self) -> tuple[str, ...]:
         """Return the open panels, last focused first."""
         opened = self.open_names()
         return tuple(sorted(opened, key=lambda key: -self._used.index(key) if key in self._used else 1))
 
-    def _closed(self, key: str) -> None:
+    def _on_dock_closed(self, key: str) -> None:
         # An additional panel is deleted unless it is reopened immediately.
         dock = self.docks.get(key)
-        if dock is not None and key in self._layout.below and not dock.isFloating():
+        if dock is not None and key in self._layout.bottom_heights and not dock.isFloating():
             self._heights[key] = dock.height()
         if dock is None or dock.number == 1:
             return
         state = dock.saved_state()
-        self._end(dock)
-        self._tabs_soon()
+        self._delete_dock(dock)
+        self._schedule_tabs()
 
-        def bring_back() -> None:
+        def reopen() -> None:
             again = self.open(key)
             if again is not None:
-                again.give_back(state)
+                again.restore_state(state)
 
-        title = numbered(_(dock.description.title), dock.number)
-        self._context.toast(_("Closed {panel}").format(panel=title), _("Undo"), bring_back)
+        title = numbered_title(_(dock.description.title), dock.number)
+        self._context.toast(_("Closed {panel}").format(panel=title), _("Undo"), reopen)
 
-    def _end(self, dock: Dock) -> None:
+    def _delete_dock(self, dock: Dock) -> None:
         self.docks.pop(dock.key, None)
         self._sharing.pop(dock, None)
         for together in self._sharing.values():
@@ -289,7 +302,7 @@ class Workbench(QMainWindow):
         self._used = [key for key in self._used if key != dock.key]
         self._floating = [each for each in self._floating if each is not dock]
         self._halves = None
-        dock.shut()
+        dock.dispose()
         self.removeDockWidget(dock)
         dock.deleteLater()
 
@@ -297,10 +310,10 @@ class Workbench(QMainWindow):
         """Return the open panels, including those behind other tabs."""
         return tuple(name for name, dock in self.docks.items() if not dock.isHidden())
 
-    def _tabs_soon(self, *_what: object) -> None:
+    def _schedule_tabs(self, *_what: object) -> None:
         self._tabs_timer.start(0)
 
-    def _show_tabs(self) -> None:
+    def _update_tabs(self) -> None:
         later = {name: place for place, name in enumerate(n for f in self._folded for n in f.panels)}
         order = sorted(self.docks.values(), key=lambda dock: later.get(dock.key, -1))
         for dock in order:
@@ -323,19 +336,19 @@ class Workbench(QMainWindow):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._adapt()
-        self._size()
+        self._update_folds()
+        self._resize_docks()
 
     def _text_changed(self) -> None:
         # Larger text leaves less room.
-        self._adapt()
+        self._update_folds()
         self._size_timer.start(0)
 
-    def _adapt(self) -> None:
+    def _update_folds(self) -> None:
         # Folds or unfolds panels depending on the available space.
         scale = self._theme.scaled(1)
         room = self.width() / scale, self.height() / scale
-        wanted = tuple(fold for fold in self._layout.folds if fold.wanted(*room) and self._can(fold))
+        wanted = tuple(fold for fold in self._layout.folds if fold.applies(*room) and self._can_fold(fold))
         if not self._arranged or wanted == self._folded or self._fold_timer.isActive():
             return
         if set(self._folded) - set(wanted):
@@ -349,18 +362,18 @@ class Workbench(QMainWindow):
                 self._fold(fold)
         self._folded = wanted
         self._size_timer.start(0)
-        self._tabs_soon()
+        self._schedule_tabs()
 
-    def _can(self, fold: Fold) -> bool:
+    def _can_fold(self, fold: Fold) -> bool:
         # A fold that was active stays valid wherever its panels were moved.
         if fold in self._folded:
             return True
-        docks = [self.docks.get(name) for name in (fold.into, *fold.panels)]
+        docks = [self.docks.get(name) for name in (fold.target, *fold.panels)]
         return all(dock is not None and not dock.isFloating() for dock in docks)
 
     def _fold(self, fold: Fold) -> None:
         # Moves the panels with those that share their places; the target panel stays in front.
-        into = self.docks[fold.into]
+        into = self.docks[fold.target]
         for name in fold.panels:
             dock = self.docks[name]
             if dock in self.tabifiedDockWidgets(into):
@@ -369,12 +382,12 @@ class Workbench(QMainWindow):
                 self.tabifyDockWidget(into, each)
         into.raise_()
 
-    def _behind(self) -> set[str]:
+    def _folded_names(self) -> set[str]:
         return {
             name
             for fold in self._folded
             for name in fold.panels
-            if self.docks[name] in self.tabifiedDockWidgets(self.docks[fold.into])
+            if self.docks[name] in self.tabifiedDockWidgets(self.docks[fold.target])
         }
 
     def _unfold(self) -> None:
@@ -382,14 +395,14 @@ class Workbench(QMainWindow):
         self._folded = ()
         opened = self.open_names()
         if not self.restoreState(self._wide, STATE_VERSION):
-            self.arrange()
+            self.reset_layout()
         for name, dock in list(self.docks.items()):
             if name not in opened:
                 dock.close()
             elif dock.isHidden():
                 self.open(name)
         self._size_timer.start(0)
-        self._tabs_soon()
+        self._schedule_tabs()
 
     def hideEvent(self, event: QHideEvent) -> None:
         self._floating = [dock for dock in self.docks.values() if dock.isFloating() and dock.isVisible()]
@@ -403,40 +416,40 @@ class Workbench(QMainWindow):
             dock.show()
         self._floating = []
 
-    def follow(self, now: float) -> None:
+    def update_suspension(self, now: float) -> None:
         """Suspend hidden panels and resume visible ones.
 
         Called on every tick, even while the workbench is hidden.
         """
         for name, dock in list(self.docks.items()):
-            self._tell_failure(name, dock.follow(now))
+            self._report_failure(name, dock.update_suspension(now))
 
-    def shown_panels(self) -> list[PanelWidget]:
+    def visible_panels(self) -> list[PanelWidget]:
         """Return the visible panels."""
-        return [dock.panel for dock in self.docks.values() if dock.shown()]
+        return [dock.panel for dock in self.docks.values() if dock.is_displayed()]
 
-    def shows_pictures(self) -> bool:
+    def shows_video(self) -> bool:
         """Return True if a panel with images is visible, which is refreshed at twice the rate."""
-        return any(dock.panel.shows_pictures and dock.shown() for dock in self.docks.values())
+        return any(dock.panel.shows_video and dock.is_displayed() for dock in self.docks.values())
 
     def refresh(self, *, pictures: bool = False) -> None:
         """Refresh all visible panels, or with ``pictures`` only those with images."""
         for name, dock in list(self.docks.items()):
-            if pictures and not dock.panel.shows_pictures:
+            if pictures and not dock.panel.shows_video:
                 continue
-            self._tell_failure(name, dock.refresh())
-            if dock.shown():
+            self._report_failure(name, dock.refresh())
+            if dock.is_displayed():
                 dock.title.show_badges([other.badge() for other in self._sharing.get(dock, ())])
 
-    def _tell_failure(self, name: str, sentence: str | None) -> None:
+    def _report_failure(self, name: str, sentence: str | None) -> None:
         if sentence is not None:
             self.panel_failed.emit(name, sentence)
 
-    def focus_home(self) -> None:
+    def focus_main_panel(self) -> None:
         """Focus the main panel of the layout, which is the first open one."""
         dock = next((dock for dock in self.docks.values() if not dock.isHidden()), None)
         if dock is not None:
-            dock.first_stop().setFocus(Qt.FocusReason.OtherFocusReason)
+            dock.focus_target().setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_panel(self, dock: Dock) -> None:
         """Bring a panel to the front and focus it."""
@@ -444,7 +457,7 @@ class Workbench(QMainWindow):
         dock.raise_()
         if dock.isFloating():
             dock.activateWindow()
-        dock.first_stop().setFocus(Qt.FocusReason.ShortcutFocusReason)
+        dock.focus_target().setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def save(self) -> dict[str, object]:
         """Return the arrangement in the format of `restore`."""
@@ -452,8 +465,8 @@ class Workbench(QMainWindow):
             "open": [
                 name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
             ],
-            "docks": state_text(self.saveState(STATE_VERSION)),
-            "wide": state_text(self._wide),
+            "docks": encode_state(self.saveState(STATE_VERSION)),
+            "wide": encode_state(self._wide),
             "panels": {name: dock.saved_state() for name, dock in self.docks.items()},
             "folds": [fold.panels[0] for fold in self._folded],
             "moved": self._moved,
@@ -461,25 +474,25 @@ class Workbench(QMainWindow):
 
     def restore(self, saved: Mapping[str, object]) -> bool:
         """Restore an arrangement returned by `save`. If it doesn't fit, show the default and return False."""
-        self.arrange()
+        self.reset_layout()
         names, panels = saved.get("open"), saved.get("panels")
         if not isinstance(names, list):
             return False
         for name in names:
             if isinstance(name, str) and name not in self.docks:
                 self.open(name)
-        if not self.restoreState(state_of(saved.get("docks")), STATE_VERSION):
-            self.arrange()
+        if not self.restoreState(decode_state(saved.get("docks")), STATE_VERSION):
+            self.reset_layout()
             return False
         self._size_timer.stop()  # keep the saved sizes instead of those of `arrange`
-        self._wide = state_of(saved.get("wide"))
+        self._wide = decode_state(saved.get("wide"))
         self._folded, self._moved = self._folds_of(saved), saved.get("moved") is True
         for name, dock in self.docks.items():
             kept = panels.get(name) if isinstance(panels, Mapping) else None
             if isinstance(kept, Mapping):
-                dock.give_back(kept)
-        self._adapt()  # the size of window or text may have changed
-        self._tabs_soon()
+                dock.restore_state(kept)
+        self._update_folds()  # the size of window or text may have changed
+        self._schedule_tabs()
         return True
 
     def _folds_of(self, saved: Mapping[str, object]) -> tuple[Fold, ...]:
@@ -489,10 +502,10 @@ class Workbench(QMainWindow):
             return self._layout.folds[:1] if saved.get("narrow") is True else ()
         return tuple(fold for fold in self._layout.folds if fold.panels[0] in names)
 
-    def shut(self) -> None:
+    def dispose(self) -> None:
         """Close all panels before the window closes."""
         for dock in (*self.docks.values(), *self._ahead.values()):
-            dock.shut()
+            dock.dispose()
 
 
 def _raiser(dock: Dock) -> Callable[[], object]:
@@ -503,7 +516,7 @@ def _raiser(dock: Dock) -> Callable[[], object]:
     return bring
 
 
-def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
+def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
     """Place a new panel: below the row above its own, as a tab of its home, or next to the last panel."""
     name = dock.description.name
     placed = {
@@ -513,27 +526,27 @@ def join(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Do
         and not other.isFloating()
         and bench.dockWidgetArea(other) != Qt.DockWidgetArea.NoDockWidgetArea
     }
-    if name in layout.below:
-        bench.addDockWidget(BELOW, dock)
+    if name in layout.bottom_heights:
+        bench.addDockWidget(BOTTOM_AREA, dock)
         return
     above = _above(layout, name)
-    home = name if dock.number > 1 else layout.homes.get(name, "")
+    home = name if dock.number > 1 else layout.tab_targets.get(name, "")
     if above in placed and not placed[above].isHidden() and not bench.tabifiedDockWidgets(placed[above]):
         bench.splitDockWidget(placed[above], dock, Qt.Orientation.Vertical)
     elif placed:
         bench.tabifyDockWidget(placed[home] if home in placed else list(placed.values())[-1], dock)
     else:
-        bench.addDockWidget(AREA, dock)
+        bench.addDockWidget(MAIN_AREA, dock)
 
 
-def put_beside(
+def insert_beside(
     bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock, other: Dock | None
 ) -> None:
     """Give a panel half the place of another one, split along the longer side, even if that has tabs."""
     if other is None or other.isHidden() or other.isFloating():
-        join(bench, layout, docks, dock)
+        insert_dock(bench, layout, docks, dock)
         return
-    ways = (ACROSS, DOWN) if other.width() >= other.height() else (DOWN, ACROSS)
+    ways = (HORIZONTAL, VERTICAL) if other.width() >= other.height() else (VERTICAL, HORIZONTAL)
     # Qt adds a tab when a tabbed dock is split, so the place is reduced to one panel for a moment. In one
     # direction Qt may still see tabs; if in both, an additional tab is the result.
     together = [each for each in bench.tabifiedDockWidgets(other) if isinstance(each, Dock)]
@@ -556,7 +569,7 @@ def put_beside(
 
 def _above(layout: Layout, name: str) -> str:
     # Panel in the row above that of a panel which opens later.
-    if name in layout.later:
+    if name in layout.deferred_panels:
         for column in layout.columns:
             for (names, _), (below, _) in zip(column.rows, column.rows[1:], strict=False):
                 if name in below:
@@ -564,12 +577,12 @@ def _above(layout: Layout, name: str) -> str:
     return ""
 
 
-def state_text(state: QByteArray) -> str:
+def encode_state(state: QByteArray) -> str:
     """Encode Qt's dock state as text for the settings."""
     return base64.b64encode(state.data()).decode("ascii")
 
 
-def state_of(text: object) -> QByteArray:
+def decode_state(text: object) -> QByteArray:
     """Decode a state encoded by `state_text`; empty if the text is invalid."""
     if not isinstance(text, str):
         return QByteArray()

@@ -61,9 +61,9 @@ class RobotArt(Art):
 
     def picture(self, painter: QPainter, area: QRectF) -> None:
         room = QRectF(area.left(), area.top() - 55, area.width(), ROOM_HEIGHT)
-        painter.drawPixmap(area.topLeft(), self._still(room, area))
+        painter.drawPixmap(area.topLeft(), self._cached_pixmap(room, area))
 
-    def _still(self, room: QRectF, area: QRectF) -> QPixmap:
+    def _cached_pixmap(self, room: QRectF, area: QRectF) -> QPixmap:
         # Cached for each size and theme, in a pixmap because the drawing sets its own clip.
         ratio = self.devicePixelRatioF()
         key = (area.width(), area.height(), ratio, self._theme.dark)
@@ -99,7 +99,7 @@ class EmptyPageArt(Art):
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(theme.block_colour("events"))
         painter.drawPath(block_path(block, radius=5, notch=12))
-        paint.words(painter, block.adjusted(14, 0, 0, 0), words, font, theme.block_text("events"))
+        paint.text_line(painter, block.adjusted(14, 0, 0, 0), words, font, theme.block_text("events"))
         quiet = theme.font("body")
         quiet.setWeight(quiet.Weight.Medium)
         words = _("drop a block here")
@@ -109,7 +109,7 @@ class EmptyPageArt(Art):
         painter.setPen(QPen(theme.colour("controlBorder"), 1.25, Qt.PenStyle.DashLine))
         painter.drawPath(block_path(place, radius=5, notch=12))
         colour = theme.colour("textSecondary")
-        paint.words(painter, place, words, quiet, colour, paint.CENTRE)
+        paint.text_line(painter, place, words, quiet, colour, paint.CENTRE)
         self._mouse(painter, QPointF(place.right() - 18, place.bottom() + 8))
 
     def _mouse(self, painter: QPainter, tip: QPointF) -> None:
@@ -150,7 +150,7 @@ class StepsArt(Art):
                     painter, mark.adjusted(1, 1, -1, -1), side / 2, None, theme.colour("controlBorder"), 1.5
                 )
                 number = theme.font("caption")
-                paint.words(painter, mark, "3", number, theme.colour("textSecondary"), paint.CENTRE)
+                paint.text_line(painter, mark, "3", number, theme.colour("textSecondary"), paint.CENTRE)
             line = QRectF(mark.right() + 12, middle - 12, area.right() - mark.right() - 24, 24)
             ink = theme.colour("textSecondary" if done else "text")
-            paint.words(painter, line, said, font if done else strong, ink)
+            paint.text_line(painter, line, said, font if done else strong, ink)

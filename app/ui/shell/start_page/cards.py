@@ -13,7 +13,7 @@ from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import Art, upper_corners
 from app.ui.shell.start_page.preview import Row, paint_rows
 from app.ui.text import plain
-from app.ui.text.dates import day_words
+from app.ui.text.dates import relative_day_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, Card, Chip, ElidedLabel, label, paint
@@ -114,9 +114,9 @@ class ExampleCard(PaintedButton):
         paint.hairline(painter, art, Qt.Edge.BottomEdge, theme.colour("border"))
         title, text = self._fonts()
         line = QRectF(17, art.bottom() + 14, rect.width() - 34, title)
-        paint.words(painter, line, self.text(), theme.font("button"), theme.colour("text"))
+        paint.text_line(painter, line, self.text(), theme.font("button"), theme.colour("text"))
         line = QRectF(17, line.bottom() + 2, line.width(), text)
-        paint.words(painter, line, self._text, theme.font("body"), theme.colour("textSecondary"))
+        paint.text_line(painter, line, self._text, theme.font("body"), theme.colour("textSecondary"))
 
 
 class RecentRow(PaintedButton):
@@ -126,7 +126,7 @@ class RecentRow(PaintedButton):
         super().__init__(theme, radius="panel")
         self.path = recent.path
         then = dt.datetime.fromtimestamp(recent.opened_s, tz=now.tzinfo)
-        self._when = day_words(then, now)
+        self._when = relative_day_text(then, now)
         self.set_text(recent.name, _("Open {name}, {day}").format(name=recent.name, day=self._when))
         self.setToolTip(plain.tip(str(recent.path)))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -145,9 +145,9 @@ class RecentRow(PaintedButton):
         small = theme.font("body")
         when = paint.width_of(small, self._when) + 12
         area = rect.adjusted(54, 0, -when - 8, 0)
-        paint.words(painter, area, self.text(), theme.font("label"), theme.colour("text"))
+        paint.text_line(painter, area, self.text(), theme.font("label"), theme.colour("text"))
         area = rect.adjusted(54, 0, -12, 0)
-        paint.words(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
+        paint.text_line(painter, area, self._when, small, theme.colour("textTertiary"), paint.RIGHT)
 
 
 class _Key(QWidget):
@@ -168,7 +168,7 @@ class _Key(QWidget):
         theme = self._theme
         paint.box(painter, QRectF(self.rect()), theme.radius("key"), theme.colour("sunken"))
         ink = theme.colour("textSecondary")
-        paint.words(painter, QRectF(self.rect()), self._text, theme.font("code"), ink, paint.CENTRE)
+        paint.text_line(painter, QRectF(self.rect()), self._text, theme.font("code"), ink, paint.CENTRE)
         painter.end()
 
 

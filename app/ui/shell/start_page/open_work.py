@@ -28,8 +28,8 @@ class OpenWork:
 
     key: str
     name: str
-    unsaved: bool = False
-    runs: bool = False
+    is_unsaved: bool = False
+    is_running: bool = False
     path: str = ""
 
 
@@ -46,7 +46,7 @@ def open_work(session: Session) -> tuple[OpenWork, ...]:
             str(each.path) if each.path is not None else "",
         )
         for each in documents
-        if not each.blank
+        if not each.is_blank
     )
 
 
@@ -56,7 +56,7 @@ class OpenRow(PaintedButton):
     def __init__(self, theme: Theme, work: OpenWork) -> None:
         super().__init__(theme, radius="panel")
         self.work = work
-        self._state = state_words(work)
+        self._state = state_text(work)
         self.set_text(work.name, _("Continue with {name}, {state}").format(name=work.name, state=self._state))
         self.setToolTip(plain.tip(work.path or self._state))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -79,35 +79,35 @@ class OpenRow(PaintedButton):
         side = theme.scaled(14)
         wide = paint.width_of(link, words) + 6 + side
         room = QRectF(LEFT, rect.top(), rect.width() - LEFT - wide - 26, rect.height())
-        self._paint_words(painter, room)
+        self._paint_text(painter, room)
         accent = theme.colour("accentText")
         area = QRectF(rect.right() - 14 - wide, rect.top(), wide - side - 6, rect.height())
-        paint.words(painter, area, words, link, accent)
+        paint.text_line(painter, area, words, link, accent)
         arrow = QRectF(rect.right() - 14 - side, rect.center().y() - side / 2, side, side)
         paint_icon(painter, arrow, "arrow-right", accent)
 
-    def _paint_words(self, painter: QPainter, room: QRectF) -> None:
+    def _paint_text(self, painter: QPainter, room: QRectF) -> None:
         theme, work = self._theme, self.work
         name, state = theme.font("label"), theme.font("body")
         high = paint.height_of(name)
         top = room.center().y() - (high + paint.height_of(state)) / 2
-        line = QRectF(room.left(), top, room.width() - (DOT + 8 if work.unsaved else 0), high)
-        paint.words(painter, line, work.name, name, theme.colour("text"))
-        if work.unsaved:
+        line = QRectF(room.left(), top, room.width() - (DOT + 8 if work.is_unsaved else 0), high)
+        paint.text_line(painter, line, work.name, name, theme.colour("text"))
+        if work.is_unsaved:
             left = room.left() + min(paint.width_of(name, work.name), line.width()) + 8
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(theme.colour("textSecondary"))
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.drawEllipse(QRectF(left, line.center().y() - DOT / 2, DOT, DOT))
         line = QRectF(room.left(), top + high, room.width(), paint.height_of(state))
-        paint.words(painter, line, self._state, state, theme.colour("textTertiary"))
+        paint.text_line(painter, line, self._state, state, theme.colour("textTertiary"))
 
 
-def state_words(work: OpenWork) -> str:
+def state_text(work: OpenWork) -> str:
     """Return the saved state as text. An unchanged example doesn't need to be saved."""
-    if work.runs:
+    if work.is_running:
         return _("running")
-    if work.unsaved:
+    if work.is_unsaved:
         return _("not saved yet")
     return _("saved") if work.path else _("no changes yet")
 
@@ -115,7 +115,7 @@ def state_words(work: OpenWork) -> str:
 class OpenWorkList(QWidget):
     """Heading and rows of the open behaviours; hidden if there are none."""
 
-    chosen = Signal(str)
+    selected = Signal(str)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -139,19 +139,19 @@ class OpenWorkList(QWidget):
         if tuple(work) == self._shown:
             return
         self._shown = tuple(work)
-        had = self._with_focus(self.rows)
+        had = self._focused_key(self.rows)
         for row in self.rows:
             self._grid.removeWidget(row)
             row.hide()
             row.deleteLater()
         self.rows = [OpenRow(self._theme, each) for each in work]
         for place, row in enumerate(self.rows):
-            row.clicked.connect(lambda _on=False, key=row.work.key: self.chosen.emit(key))
+            row.clicked.connect(lambda _on=False, key=row.work.key: self.selected.emit(key))
             self._grid.addWidget(row, place // COLUMNS, place % COLUMNS)
         paint.show_when(self, bool(self.rows))
         for row in self.rows:
             if row.work.key == had:
                 row.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _with_focus(self, rows: Iterable[OpenRow]) -> str:
+    def _focused_key(self, rows: Iterable[OpenRow]) -> str:
         return next((row.work.key for row in rows if row.hasFocus()), "")

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.documents.examples import ABOUT, NAME
-from app.core.storage.atomic_file import read_whole
+from app.core.storage.atomic_file import read_regular_file
 from app.core.storage.settings import RecentFile
 from app.ui.shell.start_page.art import EmptyPageArt, RobotArt, StepsArt
 from app.ui.shell.start_page.cards import BigCard, DevelopersLine, ExampleCard, RecentRow
@@ -42,9 +42,9 @@ BANNER_ROOM, HIGH, BANNER_GAP, BANNER_LINE = 40, 640, 6, 29
 
 Values are in px at 100 % text.
 """
-EXAMPLES_SHOWN = 4
+EXAMPLES_PER_ROW = 4
 EXAMPLES_MARGIN = 60  # margin in px when scrolling to the examples, so that their heading is visible
-ALL_WORDS = {
+ALL_EXAMPLES_TEXTS = {
     5: lazy("All five examples"),
     6: lazy("All six examples"),
     7: lazy("All seven examples"),
@@ -53,7 +53,7 @@ ALL_WORDS = {
     10: lazy("All ten examples"),
 }
 """Texts of the link to all examples, by their number, which is spelled out for readability."""
-RECENT_SHOWN = 3
+MAX_RECENT = 3
 FIRST, OTHER = 408, 318  # relative widths of the first card and the others
 LEARN = (
     lazy("Learn in five minutes"),
@@ -80,7 +80,7 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
     found = []
     for path in sorted(folder.glob("*.nepb")) if folder.is_dir() else []:
         try:
-            data = json.loads(read_whole(path))
+            data = json.loads(read_regular_file(path))
             workspace = data["workspace"]
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             continue
@@ -91,39 +91,39 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
     return tuple(found)
 
 
-def all_words(count: int) -> str:
+def all_examples_text(count: int) -> str:
     """Return the text of the link that shows all examples."""
-    if count in ALL_WORDS:
-        return _(ALL_WORDS[count])
+    if count in ALL_EXAMPLES_TEXTS:
+        return _(ALL_EXAMPLES_TEXTS[count])
     return ngettext("The only example", "All {count} examples", count).format(count=count)
 
 
 class StartPage(QWidget):
     """Page shown at startup, with ways to start or continue work."""
 
-    virtual_robot = Signal()
-    new_behaviour = Signal()
-    example_chosen = Signal(object)
-    file_chosen = Signal(object)
+    virtual_robot_pressed = Signal()
+    new_behaviour_pressed = Signal()
+    example_selected = Signal(object)
+    file_selected = Signal(object)
     learn_pressed = Signal()
     open_pressed = Signal()
     developer_pressed = Signal()
-    work_chosen = Signal(str)
-    left = Signal()  # Esc was pressed
+    work_selected = Signal(str)
+    exited = Signal()  # Esc was pressed
 
     def __init__(self, theme: Theme, examples: Sequence[Example]) -> None:
         super().__init__()
         self._theme, self.examples = theme, tuple(examples)
         self.setAccessibleName(_("Start"))
         self.open_work = OpenWorkList(theme)
-        self.open_work.chosen.connect(self.work_chosen)
+        self.open_work.selected.connect(self.work_selected)
         leave = QShortcut(QKeySequence(Qt.Key.Key_Escape), self)
         leave.setContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
-        leave.activated.connect(self.left)
+        leave.activated.connect(self.exited)
         self._use = Button(theme, _("Use the virtual robot"), "bot", kind="primary", size="large")
-        self._use.clicked.connect(self.virtual_robot)
+        self._use.clicked.connect(self.virtual_robot_pressed)
         self._new = Button(theme, _("New behaviour"), size="large")
-        self._new.clicked.connect(self.new_behaviour)
+        self._new.clicked.connect(self.new_behaviour_pressed)
         self.robot_card = BigCard(
             theme,
             RobotArt(theme),
@@ -182,7 +182,7 @@ class StartPage(QWidget):
             cards.addWidget(card, OTHER if place else FIRST)
         column.addLayout(cards)
         column.addSpacing(26)
-        self._all = LinkButton(self._theme, all_words(len(examples)), "arrow-right")
+        self._all = LinkButton(self._theme, all_examples_text(len(examples)), "arrow-right")
         self._all.clicked.connect(lambda: self.show_all(not self._shows_all))
         head = self._head(label(_("Open an example"), "heading"), self._open)
         head.addSpacing(8)
@@ -307,10 +307,10 @@ class StartPage(QWidget):
         self.example_cards: list[ExampleCard] = []
         for index, example in enumerate(examples):
             card = ExampleCard(self._theme, example.path, example.name, example.text, example.rows)
-            card.clicked.connect(lambda _on=False, path=example.path: self.example_chosen.emit(path))
-            grid.addWidget(card, index // EXAMPLES_SHOWN, index % EXAMPLES_SHOWN)
+            card.clicked.connect(lambda _on=False, path=example.path: self.example_selected.emit(path))
+            grid.addWidget(card, index // EXAMPLES_PER_ROW, index % EXAMPLES_PER_ROW)
             self.example_cards.append(card)
-        for place in range(EXAMPLES_SHOWN):
+        for place in range(EXAMPLES_PER_ROW):
             grid.setColumnStretch(place, 1)
         self.show_all(False)
         return grid
@@ -318,11 +318,11 @@ class StartPage(QWidget):
     def show_all(self, shown: bool) -> None:
         """Show all examples, or only their first row."""
         self._shows_all = shown
-        for card in self.example_cards[EXAMPLES_SHOWN:]:
+        for card in self.example_cards[EXAMPLES_PER_ROW:]:
             paint.show_when(card, shown)
-        paint.show_when(self._all, len(self.example_cards) > EXAMPLES_SHOWN)
-        words = _("Fewer examples") if shown else all_words(len(self.example_cards))
-        self._all.set_word(words, None if shown else "arrow-right")
+        paint.show_when(self._all, len(self.example_cards) > EXAMPLES_PER_ROW)
+        words = _("Fewer examples") if shown else all_examples_text(len(self.example_cards))
+        self._all.set_label(words, None if shown else "arrow-right")
 
     def focus_examples(self) -> None:
         """Show all examples and focus the first one."""
@@ -360,12 +360,12 @@ class StartPage(QWidget):
         row = QHBoxLayout(holder)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
-        for file in recent[:RECENT_SHOWN]:
+        for file in recent[:MAX_RECENT]:
             shown = RecentRow(self._theme, file, moment)
-            shown.clicked.connect(lambda _on=False, path=file.path: self.file_chosen.emit(path))
+            shown.clicked.connect(lambda _on=False, path=file.path: self.file_selected.emit(path))
             row.addWidget(shown, 1)
             self.recent_rows.append(shown)
-        for _place in range(RECENT_SHOWN - len(recent[:RECENT_SHOWN])):
+        for _place in range(MAX_RECENT - len(recent[:MAX_RECENT])):
             row.addStretch(1)
         layout.addWidget(holder)
 

@@ -17,7 +17,7 @@ INDENT = 16.0
 MAX_DEPTH = 6
 MAX_ROWS = 12
 STATEMENTS = frozenset({"DO", "DO0", "ELSE", "STACK", "BODY", "THEN"})
-_LAST_WORD = {"do": "robot", "get": "sensors", "when": "events"}
+_CATEGORY_BY_WORD = {"do": "robot", "get": "sensors", "when": "events"}
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Row:
 
     depth: int
     category: str
-    words: int
+    text_length: int
     values: int
 
 
@@ -34,7 +34,7 @@ def category_of(block_type: str) -> str:
     """Return the category of a block type, such as "robot" for ``robot_pepper_do_say``."""
     parts = block_type.split("_")
     if parts[0] == "robot":
-        return next((_LAST_WORD[part] for part in parts[1:] if part in _LAST_WORD), "robot")
+        return next((_CATEGORY_BY_WORD[part] for part in parts[1:] if part in _CATEGORY_BY_WORD), "robot")
     return parts[0]
 
 
@@ -109,20 +109,20 @@ def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, 
         if top > area.bottom():
             break
         left = area.left() + row.depth * INDENT
-        width = 58.0 + 8.0 * row.words + 38.0 * row.values
+        width = 58.0 + 8.0 * row.text_length + 38.0 * row.values
         rect = QRectF(left, top, min(width, area.right() - left), ROW)
         painter.setPen(QPen(theme.block_colour(row.category, "tertiary"), 0.75))
         painter.setBrush(theme.block_colour(row.category))
         painter.drawPath(block_path(rect))
-        _paint_words(painter, rect, theme, row)
+        _paint_content(painter, rect, theme, row)
         top += ROW + GAP
 
 
-def _paint_words(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> None:
+def _paint_content(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> None:
     ink = theme.block_text(row.category)
     middle = rect.center().y() + 1
     paint.box(painter, QRectF(rect.left() + 9, middle - 4, 8, 8), 2, ink)
-    words = QRectF(rect.left() + 24, middle - 2.5, 10 + 5.0 * row.words, 5)
+    words = QRectF(rect.left() + 24, middle - 2.5, 10 + 5.0 * row.text_length, 5)
     faint = theme.block_text(row.category)
     faint.setAlphaF(0.75)
     paint.box(painter, words, 2.5, faint)

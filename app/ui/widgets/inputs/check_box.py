@@ -16,7 +16,7 @@ SIDE, GAP, MIN_HEIGHT = 18, 8, 26
 class CheckBox(PaintedButton):
     """Box with a check mark if it is checked, and a label."""
 
-    shortens = True
+    elides_text = True
 
     def __init__(self, theme: Theme, text: str, on: bool = False) -> None:
         super().__init__(theme, text, checkable=True)
@@ -41,4 +41,4 @@ class CheckBox(PaintedButton):
             fill = theme.colour("hover" if self.is_highlighted else "sunken" if theme.dark else "panel")
             paint.box(painter, square, theme.radius("key"), fill, theme.colour("controlBorder"))
         ink = theme.colour("text" if self.isEnabled() else "textDisabled")
-        paint.words(painter, rect.adjusted(side + GAP + 1, 0, 0, 0), self.text(), theme.font("body"), ink)
+        paint.text_line(painter, rect.adjusted(side + GAP + 1, 0, 0, 0), self.text(), theme.font("body"), ink)

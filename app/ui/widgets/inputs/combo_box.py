@@ -13,7 +13,7 @@ from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
 from app.ui.widgets.menus import cut, make_round
 
-SHOWN_AT_ONCE = 12
+MAX_VISIBLE_ITEMS = 12
 
 
 class ComboBox(QComboBox):
@@ -30,7 +30,7 @@ class ComboBox(QComboBox):
         for value, words in options:
             self.addItem(words, value)
         self.setItemDelegate(QStyledItemDelegate(self))  # lets the style sheet set the padding of items
-        self.setMaxVisibleItems(SHOWN_AT_ONCE)
+        self.setMaxVisibleItems(MAX_VISIBLE_ITEMS)
         make_round(self.view().window())
 
     @property
@@ -71,7 +71,7 @@ class ComboBox(QComboBox):
         fill = theme.colour("hover" if self.underMouse() else "sunken" if theme.dark else "panel")
         paint.box(painter, rect, theme.radius("control"), fill, theme.colour("controlBorder"))
         ink = theme.colour("text" if self.isEnabled() else "textDisabled")
-        paint.words(painter, rect.adjusted(10, 0, -30, 0), self.currentText(), self.font(), ink)
+        paint.text_line(painter, rect.adjusted(10, 0, -30, 0), self.currentText(), self.font(), ink)
         square = QRectF(rect.right() - 26, rect.center().y() - 8, 16, 16)
         paint_icon(painter, square, "chevron-down", theme.colour("textSecondary"))
         painter.end()

@@ -54,7 +54,7 @@ class SearchField(QLineEdit):
 class FilterField(SearchField):
     """Filter of a list: Down and Return move the focus to the list (`leave`), Esc clears the filter."""
 
-    leave = Signal()
+    exited = Signal()
 
     def __init__(self, theme: Theme, name: str) -> None:
         # `name` is the accessible name, such as "Filter topics".
@@ -67,7 +67,7 @@ class FilterField(SearchField):
         if event.key() == Qt.Key.Key_Escape and self.text():
             self.clear()
         elif event.key() in {Qt.Key.Key_Down, Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
-            self.leave.emit()
+            self.exited.emit()
         else:
             super().keyPressEvent(event)
 
@@ -79,8 +79,8 @@ class NumberEdit(QLineEdit):
     """
 
     number = Signal(float)
-    emptied = Signal()
-    problem = Signal(str)
+    cleared = Signal()
+    problem_changed = Signal(str)
 
     def __init__(
         self,
@@ -110,49 +110,51 @@ class NumberEdit(QLineEdit):
 
     def show_number(self, value: float) -> None:
         """Show a number and clear the error state."""
-        self.setText(self.written(value))
-        self._judge("")
+        self.setText(self.format_number(value))
+        self._set_problem("")
 
-    def written(self, value: float) -> str:
+    def format_number(self, value: float) -> str:
         """Format a number in the format of the field."""
         return number_text(value, f".{self._decimals}f")
 
     def _read(self) -> None:
         if self._may_be_empty and not self.text().strip():
-            self._judge("")
-            self.emptied.emit()
+            self._set_problem("")
+            self.cleared.emit()
             return
         try:
             value = parse_number(self.text())
         except ValueError as error:
-            self._judge(str(error))
+            self._set_problem(str(error))
             return
         if self._minimum is not None and value < self._minimum:
-            self._judge(_("The minimum is {value}.").format(value=self._limit(self._minimum)))
+            self._set_problem(_("The minimum is {value}.").format(value=self._limit(self._minimum)))
         elif self._maximum is not None and value > self._maximum:
-            self._judge(_("The maximum is {value}.").format(value=self._limit(self._maximum)))
+            self._set_problem(_("The maximum is {value}.").format(value=self._limit(self._maximum)))
         else:
-            self._judge("")
+            self._set_problem("")
             self.number.emit(value)
 
     def _limit(self, value: float) -> str:
         return f"{number_text(value)} {self._unit}".rstrip()
 
-    def _judge(self, sentence: str) -> None:
+    def _set_problem(self, sentence: str) -> None:
         if sentence == self.sentence:
             return
         self.sentence = sentence
         self.setProperty("wrong", "true" if sentence else "false")
         self.style().unpolish(self)
         self.style().polish(self)
-        self.problem.emit(sentence)
+        self.problem_changed.emit(sentence)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         theme = self._theme
         painter = QPainter(self)
         rect = QRectF(self.rect()).adjusted(8, 0, -10, 0)
-        paint.words(painter, rect, self._unit, theme.font("body"), theme.colour("textTertiary"), paint.RIGHT)
+        paint.text_line(
+            painter, rect, self._unit, theme.font("body"), theme.colour("textTertiary"), paint.RIGHT
+        )
         if self.sentence:
             square = QRectF(7, self.height() / 2 - 7, 14, 14)
             paint_icon(painter, square, theme.status("error").icon, theme.colour("error"))
@@ -162,7 +164,7 @@ class NumberEdit(QLineEdit):
 class _Text(QPlainTextEdit):
     """Multi-line text edit that is left with Tab."""
 
-    left = Signal()
+    exited = Signal()
     entered = Signal()
 
     def __init__(self) -> None:
@@ -182,7 +184,7 @@ class _Text(QPlainTextEdit):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self.left.emit()
+        self.exited.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.MetaModifier)
@@ -214,8 +216,8 @@ class LongText(QWidget):
         row.addWidget(self.edit)
         self.edit.textChanged.connect(self._grow)
         self.edit.textChanged.connect(self.changed)
-        self.edit.left.connect(self.finished)
-        self.edit.left.connect(self.update)
+        self.edit.exited.connect(self.finished)
+        self.edit.exited.connect(self.update)
         self.edit.entered.connect(self.update)
         theme.changed.connect(self._grow)
         self._grow()
@@ -230,11 +232,11 @@ class LongText(QWidget):
             self.edit.setPlainText(text)
 
     @property
-    def wrong(self) -> bool:
+    def is_invalid(self) -> bool:
         """True if the text is shown as invalid."""
         return self._wrong
 
-    def mark(self, *, wrong: bool) -> None:
+    def set_invalid(self, *, wrong: bool) -> None:
         """Show the text as invalid or valid."""
         if wrong != self._wrong:
             self._wrong = wrong

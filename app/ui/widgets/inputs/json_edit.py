@@ -35,7 +35,7 @@ _RULES: tuple[tuple[str, str], ...] = (
     ("changed", r"\b(?:true|false|null)\b"),
     ("warn", r"-?\b\d+(?:\.\d+)?(?:[eE][+-]?\d+)?\b"),
 )
-_TOGETHER = re.compile("|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_RULES)))
+_PATTERN = re.compile("|".join(f"(?P<r{place}>{rule})" for place, (_role, rule) in enumerate(_RULES)))
 
 
 class _JsonColours(QSyntaxHighlighter):
@@ -47,7 +47,7 @@ class _JsonColours(QSyntaxHighlighter):
     def highlightBlock(self, text: str) -> None:
         if not self.is_on:
             return
-        for found in _TOGETHER.finditer(text):
+        for found in _PATTERN.finditer(text):
             role = _RULES[int((found.lastgroup or "r0")[1:])][0]
             shown = QTextCharFormat()
             shown.setForeground(self._theme.colour(role))
@@ -70,7 +70,7 @@ class _JsonLines(QWidget):
 class JsonLinesEdit(QPlainTextEdit):
     """Text edit for JSON. Enter keeps the indentation; Tab leaves; Ctrl+Enter emits `sent`."""
 
-    sent = Signal()
+    submitted = Signal()
     focus_changed = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -133,7 +133,7 @@ class JsonLinesEdit(QPlainTextEdit):
         if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or self.isReadOnly():
             super().keyPressEvent(event)
         elif held:
-            self.sent.emit()
+            self.submitted.emit()
         else:
             before = self.textCursor().block().text()[: self.textCursor().positionInBlock()]
             deep = len(before) - len(before.lstrip(" "))
@@ -175,14 +175,14 @@ class JsonLinesEdit(QPlainTextEdit):
             painter.fillRect(row, theme.colour("errorTint"))
             paint_icon(painter, QRectF(2, area.center().y() - 7, 14, 14), theme.status("error").icon, ink)
         box = QRectF(0, area.top(), self._numbers.width() - 10, area.height())
-        paint.words(painter, box, str(number), self.font(), ink, paint.RIGHT)
+        paint.text_line(painter, box, str(number), self.font(), ink, paint.RIGHT)
 
 
 class JsonEdit(QWidget):
     """JSON editor in the frame of a field. Emits `changed` on each edit, and `sent` on Ctrl+Enter."""
 
     changed = Signal()
-    sent = Signal()
+    submitted = Signal()
 
     def __init__(self, theme: Theme, name: str, *, least_lines: int = 6) -> None:
         # `name` is the accessible name; `least_lines` determines the minimum height.
@@ -197,7 +197,7 @@ class JsonEdit(QWidget):
         column.setContentsMargins(2, 2, 2, 2)
         column.addWidget(self.edit)
         self.edit.textChanged.connect(self.changed)
-        self.edit.sent.connect(self.sent)
+        self.edit.submitted.connect(self.submitted)
         self.edit.focus_changed.connect(self.update)
 
     def text(self) -> str:
@@ -241,14 +241,14 @@ class JsonEdit(QWidget):
         """Line that is shown as invalid, or 0."""
         return self.edit.wrong_line
 
-    def _high(self, lines: int) -> int:
+    def _height_for(self, lines: int) -> int:
         return round(lines * paint.height_of(self.edit.font())) + 12
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(150, self._high(self._least))
+        return QSize(150, self._height_for(self._least))
 
     def sizeHint(self) -> QSize:
-        return QSize(320, self._high(max(self._least, 12)))
+        return QSize(320, self._height_for(max(self._least, 12)))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         theme, painter = self._theme, QPainter(self)

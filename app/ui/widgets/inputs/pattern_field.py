@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.core.recording.choice import NOT, read_patterns
+from app.core.recording.choice import EXCLUDE_KEYWORD, parse_patterns
 from app.ui.widgets.inputs.token_field import Token, TokenField
 from nep.i18n import _
 
@@ -19,7 +19,7 @@ class PatternField(TokenField):
         """Return the included and the excluded patterns."""
         wanted = [each.entry for each in self._tokens if not each.is_left_out]
         unwanted = [each.entry for each in self._tokens if each.is_left_out]
-        more, less = read_patterns(self.edit.text())
+        more, less = parse_patterns(self.edit.text())
         return tuple(dict.fromkeys((*wanted, *more))), tuple(dict.fromkeys((*unwanted, *less)))
 
     def show_patterns(self, wanted: Sequence[str], unwanted: Sequence[str]) -> None:
@@ -27,19 +27,19 @@ class PatternField(TokenField):
         if (tuple(wanted), tuple(unwanted)) == self.patterns():
             return
         for each in list(self._tokens):
-            self._drop(each)
+            self._delete_token(each)
         self.edit.clear()
         self._add(wanted, unwanted)
 
-    def _edited(self, text: str) -> None:
+    def _on_edited(self, text: str) -> None:
         # A space completes a pattern; "not" is combined with the pattern that follows.
         plain = text.replace(",", " ")
         finished, blank, rest = plain.rpartition(" ")
         words = finished.split()
-        if words and words[-1].casefold() in {NOT, _(NOT).casefold()}:
+        if words and words[-1].casefold() in {EXCLUDE_KEYWORD, _(EXCLUDE_KEYWORD).casefold()}:
             rest = f"{words.pop()} {rest}"
         if blank and words:
-            self._add(*read_patterns(" ".join(words)))
+            self._add(*parse_patterns(" ".join(words)))
             self.edit.setText(rest)
         self.changed.emit()
         if not self.edit.text().strip():
@@ -49,7 +49,7 @@ class PatternField(TokenField):
         text = self.edit.text()
         if not text.strip():
             return
-        wanted, unwanted = read_patterns(text)
+        wanted, unwanted = parse_patterns(text)
         self.edit.clear()
         self._add(wanted, unwanted)
         self.changed.emit()

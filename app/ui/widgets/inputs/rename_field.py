@@ -16,7 +16,7 @@ from app.ui.widgets.menus import EditMenu
 class RenameField(QLineEdit):
     """Text field for a name. ``take`` is called with the new name and returns False to reject it."""
 
-    ended = Signal()
+    closed = Signal()
 
     def __init__(
         self, theme: Theme, place: QWidget, rect: QRect, name: str, take: Callable[[str], bool], said: str
@@ -34,10 +34,10 @@ class RenameField(QLineEdit):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
-            self.leave()
+            self.close_field()
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_plain(event):
             if self._take(self.text()):
-                self.leave()
+                self.close_field()
         else:
             super().keyPressEvent(event)
 
@@ -45,12 +45,12 @@ class RenameField(QLineEdit):
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.PopupFocusReason and not self._is_over:
             self._take(self.text())
-            self.leave()
+            self.close_field()
 
-    def leave(self) -> None:
+    def close_field(self) -> None:
         """Close the field. The last accepted name is kept."""
         if not self._is_over:
             self._is_over = True
             self.hide()
-            self.ended.emit()
+            self.closed.emit()
             self.deleteLater()

@@ -26,7 +26,7 @@ GAP = 8
 
 
 class _Segment(PaintedButton):
-    shortens = True
+    elides_text = True
 
     def __init__(self, theme: Theme, label: str, icon: str | None, size: str, check: bool) -> None:
         self._icon, self._check = icon, check
@@ -35,7 +35,7 @@ class _Segment(PaintedButton):
         super().__init__(theme, label, checkable=True)
         self.setAutoExclusive(True)
 
-    def set_bare(self, bare: bool) -> None:
+    def set_icon_only(self, bare: bool) -> None:
         # The text becomes the tooltip.
         self._bare = bare and self._icon is not None
         self.updateGeometry()
@@ -49,7 +49,7 @@ class _Segment(PaintedButton):
             self.setAccessibleName(words.format(choice=self.text()))
             self.update()
 
-    def shown_word(self) -> str:
+    def displayed_text(self) -> str:
         return "" if self._bare else self.text()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -71,7 +71,7 @@ class _Segment(PaintedButton):
         return round((self._side() + GAP) * shown) - (GAP if self._bare else 0)
 
     def sizeHint(self) -> QSize:
-        width = paint.width_of(self._font(), self.shown_word()) + 2 * self._padding + self._icons_width()
+        width = paint.width_of(self._font(), self.displayed_text()) + 2 * self._padding + self._icons_width()
         return QSize(round(width) + 1, max(self._height, round(paint.height_of(self._font())) + 6))
 
     def minimumSizeHint(self) -> QSize:
@@ -87,14 +87,14 @@ class _Segment(PaintedButton):
             paint.box(painter, rect, theme.radius("small"), theme.colour("pressed"))
         ink = theme.colour("text" if chosen else "textSecondary" if self.isEnabled() else "textDisabled")
         shown = [name for name in ("check" if self._check and chosen else None, self._icon) if name]
-        text_width = paint.width_of(self._font(), self.shown_word()) - (GAP if self._bare else 0)
+        text_width = paint.width_of(self._font(), self.displayed_text()) - (GAP if self._bare else 0)
         side = self._side()
         dot = (side + GAP) / 2 if self._dot else 0.0
         left = max(6.0, rect.center().x() - (text_width + len(shown) * (side + GAP) + dot) / 2)
         for name in shown:
             paint_icon(painter, QRectF(left, rect.center().y() - side / 2, side, side), name, ink)
             left += side + GAP
-        paint.words(painter, rect.adjusted(left, 0, 2 - dot, 0), self.shown_word(), self._font(), ink)
+        paint.text_line(painter, rect.adjusted(left, 0, 2 - dot, 0), self.displayed_text(), self._font(), ink)
         if self._dot:
             square = QRectF(left + text_width + GAP - 2, rect.center().y() - dot / 2, dot, dot)
             paint_icon(painter, square, "dot", theme.colour("ok"))
@@ -140,10 +140,10 @@ class Segments(QWidget):
             segment.clicked.connect(lambda _on=False, key=key: self.changed.emit(key))
         self.set_value(value if value is not None else next(iter(self._segments), ""))
 
-    def set_bare(self, bare: bool) -> None:
+    def set_icon_only(self, bare: bool) -> None:
         """Show only the icons if `bare`, where space is scarce."""
         for segment in self._segments.values():
-            segment.set_bare(bare)
+            segment.set_icon_only(bare)
 
     def set_dot(self, value: str, shown: bool) -> None:
         """Show or hide a dot after the text of an option, which means that the option is active."""
@@ -154,7 +154,7 @@ class Segments(QWidget):
         """Selected value, or "" if there are no options."""
         return next((key for key, segment in self._segments.items() if segment.isChecked()), "")
 
-    def chosen_button(self) -> QAbstractButton | None:
+    def selected_button(self) -> QAbstractButton | None:
         """Return the selected segment, to give it the focus."""
         return self._segments.get(self.value)
 
@@ -163,7 +163,7 @@ class Segments(QWidget):
         if value in self._segments:
             self._segments[value].setChecked(True)
 
-    def choose_none(self) -> None:
+    def clear_selection(self) -> None:
         """Deselect all segments until the user selects one."""
         for segment in self._segments.values():
             segment.setAutoExclusive(False)

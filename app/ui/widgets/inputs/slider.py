@@ -141,14 +141,14 @@ class SliderWithUnit(QWidget):
         grid.addWidget(self.track, 0, 0)
         grid.addWidget(self.field, 0, 1)
         grid.addWidget(self._sentence, 1, 0, 1, 2)
-        self._name(name)
+        self._set_name(name)
         self.set_value(value if value is not None else self._default)
-        self.track.valueChanged.connect(self._from_track)
-        self.track.reset.connect(lambda: self._choose(self._default))
-        self.field.number.connect(self._choose)
-        self.field.problem.connect(self._show_problem)
+        self.track.valueChanged.connect(self._on_track_changed)
+        self.track.reset.connect(lambda: self._change_value(self._default))
+        self.field.number.connect(self._change_value)
+        self.field.problem_changed.connect(self._show_problem)
 
-    def _name(self, name: str) -> None:
+    def _set_name(self, name: str) -> None:
         self.setAccessibleName(name)
         self.track.setAccessibleName(name)
         self.field.setAccessibleName(name)
@@ -167,10 +167,10 @@ class SliderWithUnit(QWidget):
         self.track.update()
         self.field.show_number(value)
 
-    def _from_track(self, steps: int) -> None:
-        self._choose(round(self._minimum + steps * self._step, max(self._digits, 6)))
+    def _on_track_changed(self, steps: int) -> None:
+        self._change_value(round(self._minimum + steps * self._step, max(self._digits, 6)))
 
-    def _choose(self, value: float) -> None:
+    def _change_value(self, value: float) -> None:
         if value != self._value:
             self.set_value(value)
             self.changed.emit(value)

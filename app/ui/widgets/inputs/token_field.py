@@ -8,7 +8,7 @@ from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QLineEdit, QWidget
 
-from app.core.recording.choice import NOT
+from app.core.recording.choice import EXCLUDE_KEYWORD
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -35,7 +35,7 @@ class Token(PaintedButton):
         theme = self._theme
         wide = 2 * PAD + paint.width_of(theme.font("code"), self.entry) + GAP + theme.scaled(CROSS)
         if self.is_left_out:
-            wide += paint.width_of(theme.font("small"), _(NOT)) + GAP
+            wide += paint.width_of(theme.font("small"), _(EXCLUDE_KEYWORD)) + GAP
         return QSize(round(wide) + 1, round(theme.scaled(HIGH)))
 
     def minimumSizeHint(self) -> QSize:
@@ -57,13 +57,13 @@ class Token(PaintedButton):
         rest = whole.adjusted(PAD, 0, -PAD, 0)
         if self.is_left_out:
             font = theme.font("small")
-            paint.words(painter, rest, _(NOT), font, theme.colour("textSecondary"))
-            rest.setLeft(rest.left() + paint.width_of(font, _(NOT)) + GAP)
+            paint.text_line(painter, rest, _(EXCLUDE_KEYWORD), font, theme.colour("textSecondary"))
+            rest.setLeft(rest.left() + paint.width_of(font, _(EXCLUDE_KEYWORD)) + GAP)
         side = theme.scaled(CROSS)
         square = QRectF(rest.right() - side, rest.center().y() - side / 2, side, side)
         paint_icon(painter, square, "x", ink)
         rest.setRight(square.left() - GAP + 1)
-        paint.words(painter, rest, self.entry, theme.font("code"), ink)
+        paint.text_line(painter, rest, self.entry, theme.font("code"), ink)
         painter.end()
 
 
@@ -73,9 +73,9 @@ class _TokenEdit(QLineEdit):
     Enter completes it, Backspace at its start removes the last token.
     """
 
-    ended = Signal()
+    completed = Signal()
     back = Signal()
-    focused = Signal()
+    focus_changed = Signal()
 
     def sizeHint(self) -> QSize:
         words = self.text() or self.placeholderText()
@@ -88,7 +88,7 @@ class _TokenEdit(QLineEdit):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         plain = is_plain(event)
         if plain and event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and self.text().strip():
-            self.ended.emit()
+            self.completed.emit()
         elif plain and event.key() == Qt.Key.Key_Backspace and not self.text():
             self.back.emit()
         else:
@@ -96,13 +96,13 @@ class _TokenEdit(QLineEdit):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
-        self.focused.emit()
+        self.focus_changed.emit()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.PopupFocusReason:
-            self.ended.emit()
-        self.focused.emit()
+            self.completed.emit()
+        self.focus_changed.emit()
 
 
 class TokenField(QWidget):
@@ -132,11 +132,11 @@ class TokenField(QWidget):
         self.edit.setProperty("bare", "true")
         self.edit.setProperty("ownFocus", True)
         EditMenu(theme, self.edit)
-        self.edit.textEdited.connect(self._edited)
+        self.edit.textEdited.connect(self._on_edited)
         self.edit.textChanged.connect(self.edit.updateGeometry)
-        self.edit.ended.connect(self._end_typing)
+        self.edit.completed.connect(self._end_typing)
         self.edit.back.connect(self._remove_last)
-        self.edit.focused.connect(self.update)
+        self.edit.focus_changed.connect(self.update)
         self.setFocusProxy(self.edit)
         self._flow = Flow(self, gap=GAP, row_gap=4)
         self._flow.setContentsMargins(PAD, 5, PAD, 5)
@@ -147,14 +147,14 @@ class TokenField(QWidget):
         """Tokens of the completed entries, in their order."""
         return tuple(self._tokens)
 
-    def set_wrong(self, is_wrong: bool) -> None:
+    def set_invalid(self, is_wrong: bool) -> None:
         """Show or remove the outline of an invalid value."""
         self._is_wrong = is_wrong
         self.update()
 
     # ---- input
 
-    def _edited(self, text: str) -> None:
+    def _on_edited(self, text: str) -> None:
         """Handle a change of the typed text."""
 
     def _end_typing(self) -> None:
@@ -166,7 +166,7 @@ class TokenField(QWidget):
 
     def _remove(self, token: Token) -> None:
         self.edit.setFocus(Qt.FocusReason.OtherFocusReason)
-        self._drop(token)
+        self._delete_token(token)
         self.changed.emit()
         self.settled.emit()
 
@@ -176,7 +176,7 @@ class TokenField(QWidget):
         token.clicked.connect(lambda _on=False: self._remove(token))
         self._tokens.append(token)
 
-    def _drop(self, token: Token) -> None:
+    def _delete_token(self, token: Token) -> None:
         self._tokens.remove(token)
         token.hide()
         self._flow.removeWidget(token)

@@ -11,7 +11,7 @@ from PySide6.QtGui import QFont, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QAbstractItemView, QListView, QStyle, QStyledItemDelegate, QStyleOptionViewItem
 
 from app.ui.text import plain
-from app.ui.text.numbers import spoken_key
+from app.ui.text.numbers import shortcut_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -27,7 +27,7 @@ Index = QModelIndex | QPersistentModelIndex
 class Heading:
     """Heading of a group of rows."""
 
-    words: str
+    text: str
 
 
 Line = Heading | Match
@@ -60,14 +60,14 @@ class EntryModel(QAbstractListModel):
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         line = self.lines[index.row()]
         if isinstance(line, Heading):
-            return line.words if role == Qt.ItemDataRole.DisplayRole else None
+            return line.text if role == Qt.ItemDataRole.DisplayRole else None
         entry = line.entry
         if role == Qt.ItemDataRole.DisplayRole:
-            return entry.words
+            return entry.text
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            return spoken(entry)
+            return accessible_text(entry)
         if role == Qt.ItemDataRole.ToolTipRole:
-            return plain.tip(entry.reason or entry.words)
+            return plain.tip(entry.reason or entry.text)
         return None
 
     def flags(self, index: Index) -> Qt.ItemFlag:
@@ -76,10 +76,10 @@ class EntryModel(QAbstractListModel):
         return Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
 
 
-def spoken(entry: Entry) -> str:
+def accessible_text(entry: Entry) -> str:
     """Return the text of an entry for screen readers."""
-    key = _("key {key}").format(key=spoken_key(entry.key)) if entry.key else ""
-    return ", ".join(part for part in (entry.words, entry.note, key, entry.reason) if part)
+    key = _("key {key}").format(key=shortcut_text(entry.key)) if entry.key else ""
+    return ", ".join(part for part in (entry.text, entry.note, key, entry.reason) if part)
 
 
 class EntryDelegate(QStyledItemDelegate):
@@ -106,13 +106,13 @@ class EntryDelegate(QStyledItemDelegate):
             font = self._theme.font("small")
             font.setWeight(QFont.Weight.DemiBold)
             area = rect.adjusted(INSET + ICON_LEFT, 2, -INSET, 0)
-            paint.words(painter, area, line.words, font, self._theme.colour("textSecondary"))
+            paint.text_line(painter, area, line.text, font, self._theme.colour("textSecondary"))
         else:
             chosen = bool(option.state & QStyle.StateFlag.State_Selected)
-            self._row(painter, rect.adjusted(INSET, 0, -INSET, 0), line, chosen=chosen)
+            self._paint_row(painter, rect.adjusted(INSET, 0, -INSET, 0), line, chosen=chosen)
         painter.restore()
 
-    def _row(self, painter: QPainter, rect: QRectF, found: Match, *, chosen: bool) -> None:
+    def _paint_row(self, painter: QPainter, rect: QRectF, found: Match, *, chosen: bool) -> None:
         theme, entry = self._theme, found.entry
         if chosen:
             edge = theme.colour("controlBorder") if theme.high_contrast else None
@@ -124,13 +124,15 @@ class EntryDelegate(QStyledItemDelegate):
         if entry.icon:
             dim = ink if chosen or entry.reason else "textSecondary"
             paint_icon(painter, square, entry.icon, theme.colour(dim))
-        right = self._right(painter, rect, entry, quiet, chosen=chosen)
+        right = self._paint_right(painter, rect, entry, quiet, chosen=chosen)
         left = rect.left() + (TEXT_LEFT if entry.icon else ICON_LEFT) + (side - 16 if entry.icon else 0)
         area = QRectF(left, rect.top(), max(20.0, right - left - 12), rect.height())
         marked = ink if chosen or entry.reason else "accentText"
-        self._words(painter, area, found, ink, marked)
+        self._paint_text(painter, area, found, ink, marked)
 
-    def _right(self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, chosen: bool) -> float:
+    def _paint_right(
+        self, painter: QPainter, rect: QRectF, entry: Entry, quiet: str, *, chosen: bool
+    ) -> float:
         # Paints note, shortcut and Enter sign; returns their left edge.
         theme, right, middle = self._theme, rect.right() - RIGHT, rect.center().y()
         if entry.id == self.waiting:
@@ -139,7 +141,7 @@ class EntryDelegate(QStyledItemDelegate):
             words = _("Press the new shortcut")
             width = paint.width_of(font, words)
             area = QRectF(right - width, rect.top(), width, rect.height())
-            paint.words(painter, area, words, font, theme.colour(quiet))
+            paint.text_line(painter, area, words, font, theme.colour(quiet))
             return right - width
         if chosen and not entry.reason:
             side = theme.scaled(15)
@@ -147,17 +149,17 @@ class EntryDelegate(QStyledItemDelegate):
             paint_icon(painter, square, "corner-down-left", theme.colour("selectedText"))
             right -= side + 12
         for key in reversed(entry.key.split("\n") if entry.key else ()):
-            right = paint.key_cap(painter, theme, right, middle, spoken_key(key)).left() - 8
+            right = paint.key_cap(painter, theme, right, middle, shortcut_text(key)).left() - 8
         text = entry.reason or entry.note
         if text:
             font = theme.font("body")
             room = min(paint.width_of(font, text), rect.width() * 0.55)
             right -= room + 4
             area = QRectF(right, rect.top(), room, rect.height())
-            paint.words(painter, area, text, font, theme.colour(quiet), paint.RIGHT)
+            paint.text_line(painter, area, text, font, theme.colour(quiet), paint.RIGHT)
         return right
 
-    def _words(self, painter: QPainter, area: QRectF, found: Match, ink: str, marked: str) -> None:
+    def _paint_text(self, painter: QPainter, area: QRectF, found: Match, ink: str, marked: str) -> None:
         # Paints the text with matching letters in bold.
         theme = self._theme
         plain = theme.font("code" if found.entry.kind == "topic" else "bodyLarge")
@@ -166,8 +168,8 @@ class EntryDelegate(QStyledItemDelegate):
         bold = QFont(plain)
         bold.setWeight(QFont.Weight.Bold)
         room = area.width() - 4 * len(found.spans)
-        shown = QFontMetricsF(plain).elidedText(found.entry.words, Qt.TextElideMode.ElideRight, room)
-        end = len(shown) - 1 if shown != found.entry.words else len(shown)
+        shown = QFontMetricsF(plain).elidedText(found.entry.text, Qt.TextElideMode.ElideRight, room)
+        end = len(shown) - 1 if shown != found.entry.text else len(shown)
         cuts = sorted({0, len(shown), *(min(place, end) for span in found.spans for place in span)})
         inside = [range(*span) for span in found.spans]
         for begin, stop in itertools.pairwise(cuts):
@@ -186,8 +188,8 @@ class EntryList(QListView):
     Emits `moved` when the selection changes, and `pressed_row` on activation.
     """
 
-    moved = Signal()
-    pressed_row = Signal()
+    selection_moved = Signal()
+    row_activated = Signal()
 
     def __init__(self, theme: Theme, name: str) -> None:
         super().__init__()
@@ -209,7 +211,7 @@ class EntryList(QListView):
         self.lines.show_lines(lines)
         rows = [row for row, line in enumerate(lines) if isinstance(line, Match)]
         wanted = (row for row in rows if chosen and _id(lines[row]) == chosen)
-        self._choose(next(wanted, rows[0] if rows else -1))
+        self._select_row(next(wanted, rows[0] if rows else -1))
         if not chosen:
             self.scrollToTop()
 
@@ -224,7 +226,7 @@ class EntryList(QListView):
         line = self.lines.lines[row] if 0 <= row < len(self.lines.lines) else None
         return line.entry if isinstance(line, Match) else None
 
-    def height_of_all(self) -> int:
+    def content_height(self) -> int:
         """Return the height in px of all lines."""
         heights = {Heading: self._theme.scaled(HEADING), Match: self._theme.scaled(ROW)}
         return sum(round(heights[type(line)]) for line in self.lines.lines)
@@ -235,7 +237,7 @@ class EntryList(QListView):
         if rows:
             current = self.currentIndex().row()
             place = rows.index(current) if current in rows else 0
-            self._choose(rows[max(0, min(len(rows) - 1, place + steps))])
+            self._select_row(rows[max(0, min(len(rows) - 1, place + steps))])
 
     def handle(self, key: int) -> bool:
         """Handle Up, Down, Page up, Page down, Home and End. Return False for other keys."""
@@ -254,18 +256,18 @@ class EntryList(QListView):
         self.step(steps)
         return True
 
-    def _choose(self, row: int) -> None:
+    def _select_row(self, row: int) -> None:
         index = self.lines.index(row) if row >= 0 else QModelIndex()
         self.setCurrentIndex(index)
         if row >= 1 and isinstance(self.lines.lines[row - 1], Heading):
             self.scrollTo(self.lines.index(row - 1))
         self.scrollTo(index)
-        self.moved.emit()
+        self.selection_moved.emit()
 
     def _clicked(self, index: QModelIndex) -> None:
         if isinstance(self.lines.lines[index.row()], Match):
-            self._choose(index.row())
-            self.pressed_row.emit()
+            self._select_row(index.row())
+            self.row_activated.emit()
 
 
 def _id(line: Line) -> str:

@@ -14,9 +14,9 @@ from operator import attrgetter
 
 WHOLE, WORD, INITIALS, INSIDE, SPREAD = 100.0, 80.0, 70.0, 55.0, 40.0
 MIN_SPREAD = 0.8  # minimum share of letters that begin a word or follow the previous letter
-PER_LETTER = 0.05
-MANY = 400  # maximum number of entries of a kind that are matched letter by letter
-LATER = 5.0  # penalty of entries that are unavailable now
+LETTER_PENALTY = 0.05
+MAX_FUZZY_ENTRIES = 400  # maximum number of entries of a kind that are matched letter by letter
+UNAVAILABLE_PENALTY = 5.0  # penalty of entries that are unavailable now
 Span = tuple[int, int]
 
 
@@ -33,7 +33,7 @@ class Entry:
     """
 
     id: str
-    words: str
+    text: str
     icon: str = ""
     note: str = ""
     key: str = ""
@@ -70,15 +70,15 @@ def match(query: str, words: str) -> tuple[float, tuple[Span, ...]] | None:
     score, spans = 0.0, []
     pieces = query.lower().split()
     for piece in pieces:
-        found = _piece(piece, lower)
+        found = _match_piece(piece, lower)
         if found is None:
             return None
         score += found[0]
         spans.extend(found[1])
-    return score / max(1, len(pieces)) - PER_LETTER * len(words), _merged(spans)
+    return score / max(1, len(pieces)) - LETTER_PENALTY * len(words), _merge(spans)
 
 
-def _piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
+def _match_piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
     place = text.find(piece)
     if place == 0:
         return WHOLE, [(0, len(piece))]
@@ -89,10 +89,10 @@ def _piece(piece: str, text: str) -> tuple[float, list[Span]] | None:
         place = text.find(piece, place + 1)
     if first > 0:
         return INSIDE - min(10.0, first / 10), [(first, first + len(piece))]
-    return _spread(piece, text)
+    return _match_spread(piece, text)
 
 
-def _spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
+def _match_spread(piece: str, text: str) -> tuple[float, list[Span]] | None:
     # Matches letters in order, preferably contiguous or at the start of a word.
     places: list[int] = []
     good, at = 0, 0
@@ -122,7 +122,7 @@ def _word_beginning(letter: str, text: str, start: int) -> int:
     return place
 
 
-def _merged(spans: Iterable[Span]) -> tuple[Span, ...]:
+def _merge(spans: Iterable[Span]) -> tuple[Span, ...]:
     # Merges adjacent spans.
     merged: list[Span] = []
     for begin, end in sorted(spans):
@@ -144,7 +144,7 @@ class Finder:
         self.entries = entries
         self._kinds: dict[str, list[tuple[str, Entry]]] = {}
         for entry in entries:
-            self._kinds.setdefault(entry.kind, []).append((entry.words.lower(), entry))
+            self._kinds.setdefault(entry.kind, []).append((entry.text.lower(), entry))
 
     def find(self, query: str, most: int) -> tuple[list[Match], int]:
         """Return the best matches (at most ``most`` per kind, best first) and the number of all."""
@@ -153,30 +153,33 @@ class Finder:
         count = 0
         for pairs in self._kinds.values():
             few = [entry for _lower, entry in pairs]
-            if len(pairs) > MANY:
+            if len(pairs) > MAX_FUZZY_ENTRIES:
                 whole = [pair for pair in pairs if all(piece in pair[0] for piece in pieces)]
-                count += len(whole) - min(len(whole), MANY)
-                few = [entry for _lower, entry in heapq.nsmallest(MANY, whole, key=_by_position(pieces))]
-            found = [each for each in (_fitting(query, entry) for entry in few) if each is not None]
+                count += len(whole) - min(len(whole), MAX_FUZZY_ENTRIES)
+                few = [
+                    entry
+                    for _lower, entry in heapq.nsmallest(MAX_FUZZY_ENTRIES, whole, key=_by_position(pieces))
+                ]
+            found = [each for each in (_match_entry(query, entry) for entry in few) if each is not None]
             count += len(found)
             if found:
                 best.append(heapq.nlargest(most, found, key=attrgetter("score")))
-        best.sort(key=lambda found: (not _says_initials(query, found), -found[0].score))
+        best.sort(key=lambda found: (not _matches_initials(query, found), -found[0].score))
         return [each for found in best for each in found], count
 
 
-def _fitting(query: str, entry: Entry) -> Match | None:
-    fits = match(query, entry.words)
+def _match_entry(query: str, entry: Entry) -> Match | None:
+    fits = match(query, entry.text)
     if fits is None:
         return None
     score, spans = fits
-    if is_initials(query, entry.words):
-        score = max(score, INITIALS - PER_LETTER * len(entry.words))
-    return Match(entry, score - (LATER if entry.reason else 0.0), spans)
+    if is_initials(query, entry.text):
+        score = max(score, INITIALS - LETTER_PENALTY * len(entry.text))
+    return Match(entry, score - (UNAVAILABLE_PENALTY if entry.reason else 0.0), spans)
 
 
-def _says_initials(query: str, found: Sequence[Match]) -> bool:
-    return found[0].entry.kind == "command" and is_initials(query, found[0].entry.words)
+def _matches_initials(query: str, found: Sequence[Match]) -> bool:
+    return found[0].entry.kind == "command" and is_initials(query, found[0].entry.text)
 
 
 def is_initials(query: str, words: str) -> bool:

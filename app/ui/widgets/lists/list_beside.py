@@ -13,7 +13,7 @@ NO_LIMIT = 16_777_215
 """Qt's maximum widget size (QWIDGETSIZE_MAX)."""
 
 
-class ListBeside(QWidget):
+class ListDetailView(QWidget):
     """Widget with a list and the details of the selected entry.
 
     The list is ``list_px`` wide, at most two fifths of the width. In a widget narrower than ``narrow_px`` it

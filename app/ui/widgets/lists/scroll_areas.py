@@ -13,10 +13,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.ui.widgets.keyboard import stops_of
+from app.ui.widgets.keyboard import tab_stops_of
 
 
-class Scrolled(QScrollArea):
+class ContentScrollArea(QScrollArea):
     """Scroll area whose size hint is the height of its contents."""
 
     def __init__(self, inside: QWidget) -> None:
@@ -64,11 +64,11 @@ class RowsLayout(QVBoxLayout):
         before = self._before
         above = (item.widget() for number in reversed(range(place)) if (item := self.itemAt(number)))
         for other in above:
-            stops = stops_of(other) if other is not None else []
+            stops = tab_stops_of(other) if other is not None else []
             if stops:
                 before = stops[-1]
                 break
-        for stop in stops_of(row):
+        for stop in tab_stops_of(row):
             QWidget.setTabOrder(before, stop)
             before = stop
 
@@ -103,12 +103,12 @@ class PanelRows(QStackedWidget):
         self.addWidget(empty)
         self.addWidget(scroll)
 
-    def put(self, place: int, row: QWidget) -> None:
+    def insert_row(self, place: int, row: QWidget) -> None:
         """Show a row at a position; the row is moved if necessary."""
         if self._column.indexOf(row) != place:
             self._column.insertWidget(place, row)
 
-    def drop(self, row: QWidget) -> None:
+    def remove_row(self, row: QWidget) -> None:
         """Remove and delete a row."""
         self._column.removeWidget(row)
         row.deleteLater()

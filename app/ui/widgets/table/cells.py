@@ -10,7 +10,7 @@ from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QPointF, QRect, Q
 from PySide6.QtGui import QFont, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QHeaderView, QStyle, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
-from app.ui.theme.icons import paint_icon, paint_icon_again
+from app.ui.theme.icons import paint_cached_icon, paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets.indicators import SPARK, paint_sparkline
 from app.ui.widgets.paint import box as paint_box
@@ -19,7 +19,7 @@ from app.ui.widgets.table.model import Cell, Column, Order
 Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
 # maximum number of cached cells: some screens, so that the cache does not grow by scrolling
-REMEMBERED = 4000
+MAX_CACHED_CELLS = 4000
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
@@ -31,11 +31,11 @@ class TableAppearance(Protocol):
     last_shown: int  # index of the last visible column
 
     @property
-    def shown_columns(self) -> Sequence[Column[Any]]:
+    def all_columns(self) -> Sequence[Column[Any]]:
         """All columns."""
 
     @property
-    def shown_order(self) -> Order[Any]:
+    def sort_order(self) -> Order[Any]:
         """Sort order."""
 
     def cell_font(self, cell: Cell) -> QFont:
@@ -48,7 +48,7 @@ class TableAppearance(Protocol):
         """Return the width of a column in px; 0 if it is hidden."""
 
 
-def padded(rect: QRect, column: int, last: int) -> QRectF:
+def padded_rect(rect: QRect, column: int, last: int) -> QRectF:
     """Return the inner rectangle of a cell. The outer columns have more padding."""
     left = EDGE if column == 0 else PADDING
     right = EDGE if column == last else PADDING
@@ -78,7 +78,7 @@ class CellDelegate(QStyledItemDelegate):
 
     def changed(self, row: int, columns: Sequence[int]) -> list[int]:
         """Return the columns of a row whose contents differ from those painted last."""
-        if len(self._painted) > REMEMBERED:
+        if len(self._painted) > MAX_CACHED_CELLS:
             self._painted.clear()
         at = self._view.cell_at
         return [column for column in columns if self._painted.get((row, column)) != at(row, column)]
@@ -98,9 +98,9 @@ class CellDelegate(QStyledItemDelegate):
             painter.fillRect(rect, theme.colour("hover"))
         if chosen and column == 0:
             painter.fillRect(QRect(rect.left(), rect.top(), 2, rect.height()), theme.colour("accent"))
-        figures = self._view.shown_columns[column].figures
-        inside = padded(rect, column, self._view.last_shown)
-        if cell.spills:
+        figures = self._view.all_columns[column].is_numeric
+        inside = padded_rect(rect, column, self._view.last_shown)
+        if cell.overflows_left:
             inside.setLeft(inside.left() - self._blank_before(row, column))
         role = "selectedText" if chosen and cell.role == "text" else cell.role
         if chosen and role == "textTertiary":
@@ -135,13 +135,13 @@ class CellDelegate(QStyledItemDelegate):
         text, room = cell.text, max(0.0, box.width() - taken)
         advance = metrics.horizontalAdvance(text)
         if advance > room:
-            shorten = Qt.TextElideMode.ElideMiddle if cell.middle else Qt.TextElideMode.ElideRight
+            shorten = Qt.TextElideMode.ElideMiddle if cell.elide_middle else Qt.TextElideMode.ElideRight
             text = metrics.elidedText(text, shorten, room)
             advance = metrics.horizontalAdvance(text)
         x = box.right() - advance - taken if figures else box.left()
         if cell.icon:
             top = box.center().y() - ICON / 2
-            paint_icon_again(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
+            paint_cached_icon(painter, QRectF(x, top, ICON, ICON), cell.icon, colour)
             x += ICON + 5.0
         if cell.tint and text:
             high = metrics.height() + 2
@@ -186,7 +186,7 @@ class TableHeader(QHeaderView):
         return QSize(super().sizeHint().width(), self._view.row_height + 1)
 
     def paintSection(self, painter: QPainter, rect: QRect, section: int) -> None:
-        columns = self._view.shown_columns
+        columns = self._view.all_columns
         if not rect.isValid() or section >= len(columns):
             return
         theme, column = self._theme, columns[section]
@@ -195,18 +195,18 @@ class TableHeader(QHeaderView):
         painter.setPen(theme.colour("border"))
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
         font = head_font(theme)
-        box = padded(rect, section, self._view.last_shown)
-        ordered = self._view.shown_order.column is column
+        box = padded_rect(rect, section, self._view.last_shown)
+        ordered = self._view.sort_order.column is column
         metrics = QFontMetricsF(font)
         arrow = 16.0 if ordered else 0.0
         text = metrics.elidedText(column.head, Qt.TextElideMode.ElideRight, max(0.0, box.width() - arrow))
         advance = metrics.horizontalAdvance(text)
-        x = box.right() - advance - arrow if column.figures else box.left()
+        x = box.right() - advance - arrow if column.is_numeric else box.left()
         painter.setFont(font)
         painter.setPen(theme.colour("text" if ordered else "textTertiary"))
         painter.drawText(QRectF(x, box.top(), advance + 2, box.height()), LEFT, text)
         if ordered:
-            name = "chevron-up" if self._view.shown_order.falling else "chevron-down"
+            name = "chevron-up" if self._view.sort_order.is_descending else "chevron-down"
             at = QRectF(x + advance + 3, box.center().y() - 6.5, 13, 13)
             paint_icon(painter, at, name, theme.colour("textSecondary"))
         painter.restore()

@@ -21,18 +21,18 @@ class ColumnChoice:
         self._columns = tuple(columns)
         self._chosen: dict[str, bool] = {}
 
-    def wanted(self, column: Column[Any]) -> bool:
+    def should_show(self, column: Column[Any]) -> bool:
         """Return True if the column should be shown, provided that there is space."""
-        if column.when is not None and not column.when():
+        if column.is_available is not None and not column.is_available():
             return False
-        return self._chosen.get(column.name, not column.off) or column is self._columns[0]
+        return self._chosen.get(column.name, not column.is_hidden_by_default) or column is self._columns[0]
 
     def show(self, name: str, shown: bool) -> None:
         """Show or hide a column."""
         for column in self._columns[1:]:
             if column.name == name:
                 self._chosen.pop(name, None)
-                if shown is column.off:
+                if shown is column.is_hidden_by_default:
                     self._chosen[name] = shown
 
     def reset(self) -> None:
@@ -44,16 +44,16 @@ class ColumnChoice:
         """True if the choice differs from the default."""
         return bool(self._chosen)
 
-    def fit(self, widths: Sequence[int], room: int) -> set[int]:
+    def fitting_columns(self, widths: Sequence[int], room: int) -> set[int]:
         """Return the indexes of the columns that fit into ``room`` px. Columns that yield are hidden first.
 
         Columns that the user chose are included even if they do not fit.
         """
-        shown = {place for place, column in enumerate(self._columns) if self.wanted(column)}
+        shown = {place for place, column in enumerate(self._columns) if self.should_show(column)}
         yielding = sorted(
-            (self._columns[place].yields, place)
+            (self._columns[place].hide_order, place)
             for place in shown
-            if self._columns[place].yields and not self._chosen.get(self._columns[place].name)
+            if self._columns[place].hide_order and not self._chosen.get(self._columns[place].name)
         )
         while yielding and sum(widths[place] for place in shown) > room:
             shown.discard(yielding.pop()[1])
@@ -72,27 +72,27 @@ class ColumnChoice:
         """
         menu.clear()
 
-        def choose(name: str, shown: bool) -> None:
+        def set_shown(name: str, shown: bool) -> None:
             self.show(name, shown)
             changed()
 
-        def begin_anew() -> None:
+        def restore_defaults() -> None:
             self.reset()
             changed()
 
         for column in self._columns[1:]:
-            if column.when is not None and not column.when():
+            if column.is_available is not None and not column.is_available():
                 continue
-            action = menu.addAction(column.called)
+            action = menu.addAction(column.display_name)
             action.setCheckable(True)
-            action.setChecked(self.wanted(column))
-            action.toggled.connect(lambda on, name=column.name: choose(name, on))
+            action.setChecked(self.should_show(column))
+            action.toggled.connect(lambda on, name=column.name: set_shown(name, on))
         menu.addSeparator()
         again = menu.addAction(_("Default columns"))
         again.setEnabled(self.changed)
-        again.triggered.connect(lambda _on=False: begin_anew())
+        again.triggered.connect(lambda _on=False: restore_defaults())
 
-    def saved(self) -> dict[str, bool]:
+    def saved_state(self) -> dict[str, bool]:
         """Return the choices as JSON values for a layout."""
         return dict(self._chosen)
 

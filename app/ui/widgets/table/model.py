@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Row = TypeVar("Row")
 Index = QModelIndex | QPersistentModelIndex
 CELL_ROLE = int(Qt.ItemDataRole.UserRole)
-RUNS_AT_MOST = 40  # with more runs of removed rows, a reset is cheaper than a signal for each
+MAX_RUNS = 40  # with more runs of removed rows, a reset is cheaper than a signal for each
 _ROOT = QModelIndex()
 
 
@@ -57,13 +57,13 @@ class Cell:
     bold: bool = False
     struck: bool = False
     chip: str | None = None
-    middle: bool = False
+    elide_middle: bool = False
     curve: Sequence[float] = ()
     indent: int = 0
     tint: str = ""
-    spills: bool = False
+    overflows_left: bool = False
     mark: CellMark | None = None
-    said: str = ""
+    accessible_text: str = ""
 
     @property
     def is_blank(self) -> bool:
@@ -92,13 +92,13 @@ class Column(Generic[Row]):
     width: int
     cell: Callable[[Row], Cell]
     key: Callable[[Row], object] | None = None
-    figures: bool = False
+    is_numeric: bool = False
     stretch: bool = False
     tip: Callable[[Row], str] | None = None
-    yields: int = 0
-    off: bool = False
-    words: str = ""
-    when: Callable[[], bool] | None = None
+    hide_order: int = 0
+    is_hidden_by_default: bool = False
+    label: str = ""
+    is_available: Callable[[], bool] | None = None
     verbatim: bool = False
 
     @property
@@ -107,9 +107,9 @@ class Column(Generic[Row]):
         return self.title if self.verbatim else _(self.title) if self.title else ""
 
     @property
-    def called(self) -> str:
+    def display_name(self) -> str:
         """Translated name, also for a column with an empty title."""
-        return _(self.words) if self.words else self.head
+        return _(self.label) if self.label else self.head
 
 
 @dataclass(slots=True)
@@ -117,7 +117,7 @@ class Order(Generic[Row]):
     """Sort order: column and direction. A column of None keeps the original order."""
 
     column: Column[Row] | None = None
-    falling: bool = False
+    is_descending: bool = False
 
     def sort(self, rows: list[Row]) -> list[Row]:
         """Return the sorted rows. The sort is stable; rows with unknown values are last."""
@@ -126,13 +126,13 @@ class Order(Generic[Row]):
             return rows
         known = [(key(row), row) for row in rows]
         good = [pair for pair in known if pair[0] is not None]
-        good.sort(key=lambda pair: pair[0], reverse=self.falling)  # type: ignore[arg-type, return-value]
+        good.sort(key=lambda pair: pair[0], reverse=self.is_descending)  # type: ignore[arg-type, return-value]
         return [row for _key, row in good] + [row for value, row in known if value is None]
 
 
 @dataclass(slots=True)
 class _Rows(Generic[Row]):
-    shown: list[Row] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
     keys: list[str] = field(default_factory=list)
 
 
@@ -149,7 +149,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
     # -- overrides of QAbstractTableModel -------------------------------------------------------------
 
     def rowCount(self, parent: Index = _ROOT) -> int:
-        return 0 if parent.isValid() else len(self._rows.shown)
+        return 0 if parent.isValid() else len(self._rows.rows)
 
     def columnCount(self, parent: Index = _ROOT) -> int:
         return 0 if parent.isValid() else len(self.columns)
@@ -157,7 +157,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         if not index.isValid():
             return None
-        column, row = self.columns[index.column()], self._rows.shown[index.row()]
+        column, row = self.columns[index.column()], self._rows.rows[index.row()]
         if role == CELL_ROLE:
             return column.cell(row)
         if role == Qt.ItemDataRole.DisplayRole:
@@ -165,10 +165,10 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if role == Qt.ItemDataRole.ToolTipRole:
             return plain.tip(column.tip(row)) if column.tip is not None else None
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            cell, head = column.cell(row), column.head or column.called
-            return ", ".join(part for part in (head, cell.text or cell.said, cell.chip) if part)
+            cell, head = column.cell(row), column.head or column.display_name
+            return ", ".join(part for part in (head, cell.text or cell.accessible_text, cell.chip) if part)
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _alignment(column.figures)
+            return _alignment(column.is_numeric)
         return None
 
     def headerData(
@@ -180,16 +180,16 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if role == Qt.ItemDataRole.DisplayRole:
             return column.head
         if role == Qt.ItemDataRole.ToolTipRole:  # shown if the title is cut off
-            return plain.tip(column.called) or None
+            return plain.tip(column.display_name) or None
         if role == Qt.ItemDataRole.TextAlignmentRole:
-            return _alignment(column.figures)
+            return _alignment(column.is_numeric)
         return None
 
     # -- interface of panels --------------------------------------------------------------------------
 
     def row_at(self, index: Index) -> Row | None:
         """Return the row of an index, or None."""
-        return self._rows.shown[index.row()] if index.isValid() else None
+        return self._rows.rows[index.row()] if index.isValid() else None
 
     def key_of(self, row: Row) -> str:
         """Return the key of a row."""
@@ -197,7 +197,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
 
     def cell_at(self, row: int, column: int) -> Cell:
         """Return a cell's contents directly, without Qt's roles."""
-        return self.columns[column].cell(self._rows.shown[row])
+        return self.columns[column].cell(self._rows.rows[row])
 
     def index_of(self, key: str) -> QModelIndex:
         """Return the first cell of the row with this key; an invalid index if the row is not shown."""
@@ -208,27 +208,27 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         """Set the rows in this order. The selected row stays selected if it still exists."""
         keys = [self._key(row) for row in rows]
         if keys == self._rows.keys:
-            self._rows.shown = list(rows)
+            self._rows.rows = list(rows)
             return
         wanted = set(keys)
         runs = _runs([place for place, key in enumerate(self._rows.keys) if key not in wanted])
-        if len(runs) > RUNS_AT_MOST:
+        if len(runs) > MAX_RUNS:
             self.beginResetModel()
             self._rows = _Rows(list(rows), keys)
             self.endResetModel()
             return
         for first, last in reversed(runs):
             self.beginRemoveRows(_ROOT, first, last)
-            del self._rows.shown[first : last + 1], self._rows.keys[first : last + 1]
+            del self._rows.rows[first : last + 1], self._rows.keys[first : last + 1]
             self.endRemoveRows()
         self._append(rows, keys)
         if keys != self._rows.keys:
             self._reorder(rows, keys)
-        self._rows.shown = list(rows)
+        self._rows.rows = list(rows)
 
-    def tell_changed(self, first: int, last: int) -> None:
+    def notify_changed(self, first: int, last: int) -> None:
         """Emit one signal for changed values of these rows."""
-        last = min(last, len(self._rows.shown) - 1)
+        last = min(last, len(self._rows.rows) - 1)
         if 0 <= first <= last:
             corner = self.index(last, len(self.columns) - 1)
             self.dataChanged.emit(self.index(first, 0), corner, [Qt.ItemDataRole.DisplayRole])
@@ -239,7 +239,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         if fresh:
             first = len(self._rows.keys)
             self.beginInsertRows(_ROOT, first, first + len(fresh) - 1)
-            self._rows.shown.extend(row for row, _key in fresh)
+            self._rows.rows.extend(row for row, _key in fresh)
             self._rows.keys.extend(key for _row, key in fresh)
             self.endInsertRows()
 

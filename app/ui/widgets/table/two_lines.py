@@ -33,6 +33,6 @@ class TwoLines:
         first, second = paint.height_of(name), paint.height_of(below)
         top = box.center().y() - (first + second + 2) / 2
         row = QRectF(box.left(), top, box.width(), first)
-        paint.words(painter, row, self.name, name, theme.colour("text"))
+        paint.text_line(painter, row, self.name, name, theme.colour("text"))
         row = QRectF(box.left(), top + first + 2, box.width(), second)
-        paint.words(painter, row, self.below, below, theme.colour("textSecondary"))
+        paint.text_line(painter, row, self.below, below, theme.colour("textSecondary"))

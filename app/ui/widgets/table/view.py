@@ -45,7 +45,7 @@ Index = QModelIndex | QPersistentModelIndex
 EDGE, PADDING, ICON = 12, 6, 14
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-KEYBOARD = frozenset(
+KEYBOARD_REASONS = frozenset(
     {
         Qt.FocusReason.TabFocusReason,
         Qt.FocusReason.BacktabFocusReason,
@@ -62,8 +62,8 @@ class TableView(QTableView, Generic[Row]):
     """
 
     opened = Signal(str)
-    menu_wanted = Signal(str, QPoint)
-    filter_wanted = Signal()
+    menu_requested = Signal(str, QPoint)
+    filter_requested = Signal()
     order_changed = Signal()
 
     def __init__(self, theme: Theme, model: TableModel[Row], key: str = "") -> None:
@@ -103,12 +103,12 @@ class TableView(QTableView, Generic[Row]):
         self.fit_columns()
 
     @property
-    def shown_columns(self) -> Sequence[Column[Row]]:
+    def all_columns(self) -> Sequence[Column[Row]]:
         """All columns."""
         return self.columns
 
     @property
-    def shown_order(self) -> Order[Row]:
+    def sort_order(self) -> Order[Row]:
         """Sort order."""
         return self.order
 
@@ -151,10 +151,10 @@ class TableView(QTableView, Generic[Row]):
         last = self.rowAt(self.viewport().height() - 1)
         return first, last if last >= 0 else self._model.rowCount() - 1
 
-    def tell_visible_changed(self) -> None:
+    def refresh_visible(self) -> None:
         """Repaint the visible cells whose values changed, with one signal."""
         first, last = self.visible_rows()
-        self._model.tell_changed(first, last)
+        self._model.notify_changed(first, last)
 
     def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
         """Repaint only the changed cells; Qt would repaint all rows."""
@@ -169,9 +169,9 @@ class TableView(QTableView, Generic[Row]):
                 dirty += QRect(x, self.rowViewportPosition(row), wide, self.row_height)
         if not dirty.isEmpty():
             self.viewport().update(dirty)
-            self._tell_screen_reader(first.row(), last.row())
+            self._notify_screen_reader(first.row(), last.row())
 
-    def _tell_screen_reader(self, first: int, last: int) -> None:
+    def _notify_screen_reader(self, first: int, last: int) -> None:
         if QAccessible.isActive():
             event = QAccessibleTableModelChangeEvent(
                 self, QAccessibleTableModelChangeEvent.ModelChangeType.DataChanged
@@ -182,12 +182,12 @@ class TableView(QTableView, Generic[Row]):
             event.setLastColumn(len(self.columns) - 1)
             QAccessible.updateAccessibility(event)
 
-    def chosen_key(self) -> str | None:
+    def selected_key(self) -> str | None:
         """Return the key of the selected row."""
         row = self._model.row_at(self.currentIndex())
         return self._model.key_of(row) if row is not None else None
 
-    def choose(self, key: str) -> None:
+    def select_key(self, key: str) -> None:
         """Select the row with this key without opening it. Has no effect if the row is not shown."""
         index = self._model.index_of(key)
         if index.isValid() and index.row() != self.currentIndex().row():
@@ -199,7 +199,7 @@ class TableView(QTableView, Generic[Row]):
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self._open(self.currentIndex())
         elif event.text() == "/":
-            self.filter_wanted.emit()
+            self.filter_requested.emit()
         else:
             super().keyPressEvent(event)
 
@@ -210,12 +210,12 @@ class TableView(QTableView, Generic[Row]):
         if row is None:
             return
         key = self._model.key_of(row)
-        self.choose(key)
+        self.select_key(key)
         at = self.visualRect(index).bottomLeft() if by_keys else event.pos()
-        self.menu_wanted.emit(key, self.viewport().mapToGlobal(at))
+        self.menu_requested.emit(key, self.viewport().mapToGlobal(at))
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        self.keyboard = event.reason() in KEYBOARD
+        self.keyboard = event.reason() in KEYBOARD_REASONS
         super().focusInEvent(event)
         if self.keyboard and not self.currentIndex().isValid() and self._model.rowCount():
             self.setCurrentIndex(self._model.index(0, 0))
@@ -239,7 +239,7 @@ class TableView(QTableView, Generic[Row]):
         """Give the stretch column the remaining width, but at least its own; columns may be hidden."""
         scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
         room = self.viewport().width()
-        shown = self.choice.fit(scaled, room)
+        shown = self.choice.fitting_columns(scaled, room)
         spare = room - sum(scaled[place] for place in shown)
         for place in sorted(shown):  # translations may be longer; they get the remaining space
             more = head_width(self.theme, self.columns[place]) - scaled[place]
@@ -273,15 +273,15 @@ class TableView(QTableView, Generic[Row]):
         order = self.order
         return {
             "sort": order.column.name if order.column else "",
-            "falling": order.falling,
-            "columns": self.choice.saved(),
+            "falling": order.is_descending,
+            "columns": self.choice.saved_state(),
         }
 
     def restore(self, state: Mapping[str, object]) -> None:
         """Restore a state returned by `saved_state`; invalid values are replaced by defaults."""
         chosen = (column for column in self.columns if column.name == state.get("sort"))
         self.order.column = next(chosen, self.columns[0])
-        self.order.falling = state.get("falling") is True
+        self.order.is_descending = state.get("falling") is True
         self.choice.restore(state.get("columns"))
         self.fit_columns()
         self.order_changed.emit()
@@ -314,6 +314,6 @@ class TableView(QTableView, Generic[Row]):
         if column.key is None:
             return
         same = self.order.column is column
-        self.order = Order(column, not self.order.falling if same else column.figures)
+        self.order = Order(column, not self.order.is_descending if same else column.is_numeric)
         self.horizontalHeader().viewport().update()
         self.order_changed.emit()

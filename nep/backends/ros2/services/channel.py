@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 from nep.backends.ros2.library import has_forked
 from nep.backends.ros2.matches import PREFIX_BYTES
-from nep.backends.ros2.names import dds_service, dds_type, user_data
-from nep.backends.ros2.participant import DdsEndpoint, Participant, policy
-from nep.backends.ros2.services.definitions import answer_of, request_of
-from nep.backends.ros2.topics import sample_of
+from nep.backends.ros2.names import dds_service, dds_type, encode_user_data
+from nep.backends.ros2.participant import DdsEndpoint, Participant, policy_classes
+from nep.backends.ros2.services.definitions import request_type_of, response_type_of
+from nep.backends.ros2.topics import create_sample
 from nep.backends.services import CALLS_MAX
 from nep.backends.typed_services import TypedService
 from nep.errors import DecodeError, WireError
@@ -28,14 +28,14 @@ from nep.protocol.service_wire import CallKind, Reply
 
 _HEAD_BYTES, _CDR_BYTES = 20, 4
 _FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
-_FAILED = struct.Struct("<QqB")
-_BATCH = 256
+_FAILURE_HEADER = struct.Struct("<QqB")
+_BATCH_SIZE = 256
 _MAX_WRITERS = 1024
 """Maximum number of clients that are tracked."""
-_BLOCKING_NS = 100_000_000
+_MAX_BLOCKING_NS = 100_000_000
 _READY_DELAY_S = 0.1
 """Time in seconds that programs without nep need after discovery until they can receive."""
-_KINDS = (CallKind.ERROR, CallKind.REFUSED)
+_FAILURE_KINDS = (CallKind.ERROR, CallKind.REFUSED)
 
 
 class CallId(NamedTuple):
@@ -45,7 +45,7 @@ class CallId(NamedTuple):
     number: int
 
 
-class ReceivedPart(NamedTuple):
+class ReceivedSample(NamedTuple):
     """Received request or response: its CDR without the call id, and its writer (None if unknown)."""
 
     id: CallId
@@ -76,7 +76,7 @@ class ServiceChannel:
         entry_id: int,
         *,
         guid: int | None = None,
-        on_part: Callable[[ReceivedPart], None],
+        on_part: Callable[[ReceivedSample], None],
         on_failure: Callable[[CallId, Reply], None] | None = None,
     ) -> None:
         self.kind = kind
@@ -100,7 +100,7 @@ class ServiceChannel:
             "nepnode": node_id,
             "nepid": f"{entry_id:x}",
         }
-        request, answer = request_of(kind.name), answer_of(kind.name)
+        request, answer = request_type_of(kind.name), response_type_of(kind.name)
         self._topics = ((rr, answer), (rq, request)) if is_server else ((rq, request), (rr, answer))
         self._hashes = {name: types.type_hash(name) for name in (request, answer)}
         self._readers: list[Any] = []
@@ -111,11 +111,11 @@ class ServiceChannel:
             self._add_writer(participant.topics.service_topic(out_topic, out_type), out_type)
             self._add_reader(participant.topics.service_topic(in_topic, in_type), in_type, self._read)
             if not kind.is_nep:
-                self._add_failures(rq)
+                self._add_failure_topic(rq)
 
     # ---- owned objects; call with the participant's lock held
 
-    def _add_failures(self, rq: str) -> None:
+    def _add_failure_topic(self, rq: str) -> None:
         name = f"nep_failures/{rq.removeprefix('rq/')}"
         topic = self.participant.topics.topic(name, _FAILURE_TYPE)
         self._failure_class = self.participant.topics.sample_class(_FAILURE_TYPE)
@@ -125,14 +125,14 @@ class ServiceChannel:
             self._add_reader(topic, _FAILURE_TYPE, self._read_failures)
 
     def _qos(self, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        policies = policy(self.participant.dds)
+        policies = policy_classes(self.participant.dds)
         type_hash = self._hashes.get(ros_type) or self.participant.types.type_hash(ros_type)
         return self.participant.qos(
-            policies.Reliability.Reliable(_BLOCKING_NS),
+            policies.Reliability.Reliable(_MAX_BLOCKING_NS),
             policies.Durability.Volatile,
             policies.History.KeepLast(CALLS_MAX),
             policies.DataRepresentation(use_cdrv0_representation=True),
-            policies.Userdata(user_data({"typehash": type_hash} | self._user_data)),
+            policies.Userdata(encode_user_data({"typehash": type_hash} | self._user_data)),
         )
 
     def _add_writer(self, topic: Any, ros_type: str) -> None:  # noqa: ANN401 - cyclonedds is not typed
@@ -157,20 +157,20 @@ class ServiceChannel:
     # ---- receiving, in the participant's thread, with its lock held
 
     def _read(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        while samples := reader.take(_BATCH, ready):
+        while samples := reader.take(_BATCH_SIZE, ready):
             for sample in samples:
                 cdr = getattr(sample, "cdr", None)
                 if cdr is None or len(cdr) < _CDR_BYTES + 16 or cdr[0] != 0 or cdr[1] > 1:
                     continue  # a disposed writer, or not CDR
                 guid, number = struct.unpack_from(f"{'<' if cdr[1] else '>'}Qq", cdr, _CDR_BYTES)
                 call = CallId(guid, number)
-                if self._is_wanted(call):
+                if self._is_own_call(call):
                     writer = self._writer_of(reader, sample.sample_info.publication_handle)
-                    self._on_part(ReceivedPart(call, bytes(cdr[:_CDR_BYTES] + cdr[_HEAD_BYTES:]), writer))
-            if len(samples) < _BATCH:
+                    self._on_part(ReceivedSample(call, bytes(cdr[:_CDR_BYTES] + cdr[_HEAD_BYTES:]), writer))
+            if len(samples) < _BATCH_SIZE:
                 return
 
-    def _is_wanted(self, call: CallId) -> bool:
+    def _is_own_call(self, call: CallId) -> bool:
         # All clients receive all responses.
         return self._guid is None or call.guid == self._guid
 
@@ -182,11 +182,11 @@ class ServiceChannel:
                 return None
             if len(self._known_writers) >= _MAX_WRITERS:
                 self._known_writers.pop(next(iter(self._known_writers)))
-            known = self._known_writers[handle] = self.participant.described(found)
+            known = self._known_writers[handle] = self.participant.to_endpoint(found)
         return known
 
     def _read_failures(self, reader: Any, ready: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        for sample in reader.take(_BATCH, ready):
+        for sample in reader.take(_BATCH_SIZE, ready):
             cdr = getattr(sample, "cdr", None)
             if cdr is None or self._on_failure is None:
                 continue  # a disposed writer
@@ -195,11 +195,11 @@ class ServiceChannel:
             except DecodeError:
                 continue
             data: bytes = announced["data"]
-            if len(data) >= _FAILED.size:
-                guid, number, kind = _FAILED.unpack_from(data)
-                found = next((each for each in _KINDS if each == kind), None)
-                if found is not None and self._is_wanted(CallId(guid, number)):
-                    self._on_failure(CallId(guid, number), Reply(found, data[_FAILED.size :]))
+            if len(data) >= _FAILURE_HEADER.size:
+                guid, number, kind = _FAILURE_HEADER.unpack_from(data)
+                found = next((each for each in _FAILURE_KINDS if each == kind), None)
+                if found is not None and self._is_own_call(CallId(guid, number)):
+                    self._on_failure(CallId(guid, number), Reply(found, data[_FAILURE_HEADER.size :]))
 
     # ---- sending, without the participant's lock
 
@@ -209,7 +209,7 @@ class ServiceChannel:
         whole = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
         codes = self.participant.dds.core.DDSException
         try:
-            self._writers[0].write(sample_of(self._sample_class, whole))
+            self._writers[0].write(create_sample(self._sample_class, whole))
         except codes as error:
             if error.code == codes.DDS_RETCODE_TIMEOUT:
                 raise WireError(_("the other side is too slow to receive it"), len(cdr)) from error
@@ -217,53 +217,56 @@ class ServiceChannel:
 
     def send_failure(self, call: CallId, reply: Reply) -> None:
         """Send an error to nep programs. Raises as `send` does."""
-        data = _FAILED.pack(*call, reply.kind) + bytes(reply.data)
+        data = _FAILURE_HEADER.pack(*call, reply.kind) + bytes(reply.data)
         cdr = self.participant.types.encode(_FAILURE_TYPE, {"data": data})
-        self._writers[1].write(sample_of(self._failure_class, cdr))
+        self._writers[1].write(create_sample(self._failure_class, cdr))
 
     # ---- matched endpoints; call with the participant's lock held
 
     @property
-    def discovered(self) -> list[DdsEndpoint]:
+    def discovered_peers(self) -> list[DdsEndpoint]:
         """Discovered endpoints of the peers: clients for a server, servers for a client."""
         (out_topic, out_type), (in_topic, in_type) = self._topics
         found = [(each, out_type) for each in self.participant.endpoints("reader", out_topic)] + [
             (each, in_type) for each in self.participant.endpoints("writer", in_topic)
         ]
-        return [each for each, ros_type in found if each.is_of(dds_type(ros_type), self._hashes[ros_type])]
+        return [each for each, ros_type in found if each.has_type(dds_type(ros_type), self._hashes[ros_type])]
 
     @property
     def entities(self) -> Sequence[Any]:
         """This channel's writer and reader of requests and responses."""
         return (self._writers[0], self._readers[0])
 
-    def _matched(self, entity: Any) -> list[DdsEndpoint]:  # noqa: ANN401 - cyclonedds is not typed
+    def _matched_endpoints(self, entity: Any) -> list[DdsEndpoint]:  # noqa: ANN401 - cyclonedds is not typed
         if hasattr(entity, "get_matched_subscriptions"):
             handles, get_data = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
         else:
             handles, get_data = entity.get_matched_publications(), entity.get_matched_publication_data
-        return [self.participant.described(data) for data in map(get_data, handles) if data is not None]
+        return [self.participant.to_endpoint(data) for data in map(get_data, handles) if data is not None]
 
     def ready_servers(self) -> frozenset[bytes]:
         """Return the response writers of servers that can be called. Used by clients."""
         if self.is_closed:
             return frozenset()
-        found_here = self._handles()
+        found_here = self._match_handles()
         if found_here != self._ready_there:
-            self._ready = self._find_ready()
+            self._ready = self._find_ready_servers()
             self._ready_there = found_here if self._is_all_ready else ()
         return self._ready
 
-    def _handles(self) -> tuple[int, ...]:
+    def _match_handles(self) -> tuple[int, ...]:
         # Changes whenever the set of matches changes.
         readers = (each.get_matched_publications() for each in self._readers)
         return (*self._writers[0].get_matched_subscriptions(), -1, *(one for each in readers for one in each))
 
-    def _find_ready(self) -> frozenset[bytes]:
+    def _find_ready_servers(self) -> frozenset[bytes]:
         self._is_all_ready = True
         now = time.monotonic()
-        readers, writers = self._matched(self._writers[0]), self._matched(self._readers[0])
-        failing = [self._matched(each) for each in self._readers[1:]]
+        readers, writers = (
+            self._matched_endpoints(self._writers[0]),
+            self._matched_endpoints(self._readers[0]),
+        )
+        failing = [self._matched_endpoints(each) for each in self._readers[1:]]
         ready: set[bytes] = set()
         for reader in readers:
             found = [each for each in writers if each.participant == reader.participant]
@@ -296,14 +299,20 @@ class ServiceChannel:
             for own, others in pairs
         )
 
-    def servers(self) -> frozenset[bytes]:
+    def matched_servers(self) -> frozenset[bytes]:
         """Return the response writers of all matched servers. Used by clients."""
-        return frozenset() if self.is_closed else frozenset(e.gid for e in self._matched(self._readers[0]))
+        return (
+            frozenset()
+            if self.is_closed
+            else frozenset(e.gid for e in self._matched_endpoints(self._readers[0]))
+        )
 
     def can_reply_to(self, client: DdsEndpoint) -> bool:
         """Return True if responses reach the client with this request writer. Used by servers."""
         found_here = [
-            each for each in self._matched(self._writers[0]) if each.participant == client.participant
+            each
+            for each in self._matched_endpoints(self._writers[0])
+            if each.participant == client.participant
         ]
         pair_id = client.announced.get("clientid")
         return any(
@@ -330,6 +339,6 @@ class ServiceChannel:
                 return
             for reader in self._readers:
                 self.participant.unwatch(reader)
-                self.participant.withdraw(self.node_id, "reader", reader)
+                self.participant.remove_endpoint(self.node_id, "reader", reader)
             for writer in self._writers:
-                self.participant.withdraw(self.node_id, "writer", writer)
+                self.participant.remove_endpoint(self.node_id, "writer", writer)

@@ -17,8 +17,8 @@ from nep.backends.deadlines import Deadlines
 from nep.backends.ros2.names import dds_service, ros_service, service_type_name, service_type_of
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_matches
-from nep.backends.ros2.services.channel import CallId, ReceivedPart, ServiceChannel
-from nep.backends.ros2.services.definitions import known_service
+from nep.backends.ros2.services.channel import CallId, ReceivedSample, ServiceChannel
+from nep.backends.ros2.services.definitions import find_service_type
 from nep.backends.services import ClientCalls, ClientSpec, OpenCall, Outcome, check_calls
 from nep.errors import NepError, NoServerError, ServerGoneError, ServiceTimeoutError
 from nep.i18n import _
@@ -29,7 +29,7 @@ _logger = logging.getLogger("nep")
 _DISCOVERY_POLL_S, _SERVER_CHECK_S = 0.02, 0.1
 """Intervals in seconds: for discovering a server, and for checking that it still exists."""
 
-Then = Callable[[Outcome], None]
+OutcomeCallback = Callable[[Outcome], None]
 
 
 @dataclass(eq=False)
@@ -39,7 +39,7 @@ class _Call:
     data: bytes | memoryview
     timeout_s: float | None
     deadline: float
-    then: Then
+    callback: OutcomeCallback
     servers: frozenset[bytes] | None = None
 
     @property
@@ -70,13 +70,13 @@ class Ros2Client(ClientCalls[_Call]):
         self._guid = secrets.randbits(63)
         self._channel: ServiceChannel | None = None
         given_name = service_type_name(spec.msg_type)
-        self._given_type = None if given_name is None else known_service(participant.types, given_name)
+        self._given_type = None if given_name is None else find_service_type(participant.types, given_name)
         try:
             channel: ServiceChannel | None = None
             with contextlib.suppress(NepError):  # reported by calls: another server may appear meanwhile
                 channel = self._open_channel()
             if channel is not None:
-                wait_for_matches(participant, channel.discovered, lambda: channel.entities)
+                wait_for_matches(participant, channel.discovered_peers, lambda: channel.entities)
         except BaseException:  # also Ctrl+C: the caller has no object to close yet
             self.close()
             raise
@@ -101,10 +101,10 @@ class Ros2Client(ClientCalls[_Call]):
                 self._participant,
                 self._node_id,
                 self.spec.service,
-                self._given_type or known_service(self._participant.types, type_name),
+                self._given_type or find_service_type(self._participant.types, type_name),
                 self.spec.id,
                 guid=self._guid,
-                on_part=self._handle_part,
+                on_part=self._handle_response,
                 on_failure=self._handle_failure,
             )
             return self._channel
@@ -132,7 +132,9 @@ class Ros2Client(ClientCalls[_Call]):
 
     # ---- calling
 
-    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> OpenCall:
+    def start_call(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> OpenCall:
         """Send a call. See `ClientTransport.begin`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
@@ -142,11 +144,11 @@ class Ros2Client(ClientCalls[_Call]):
             call = _Call(next(self._numbers), data, timeout_s, deadline, then)
             self._calls[call.number] = call
             self._bytes += len(data)
-        self._send_waiting()
+        self._send_waiting_calls()
         self._deadlines.add(min(deadline, time.monotonic() + _DISCOVERY_POLL_S))
         return call
 
-    def _send_waiting(self) -> None:
+    def _send_waiting_calls(self) -> None:
         type_error: NepError | None = None
         with self._participant.changed:
             channel, servers = self._channel, self._ready_servers()
@@ -172,7 +174,7 @@ class Ros2Client(ClientCalls[_Call]):
     def _send(self, channel: ServiceChannel, call: _Call) -> None:
         left_s = None if call.deadline == math.inf else max(0.0, call.deadline - time.monotonic())
         try:
-            cdr = channel.kind.body_of_call(self.spec.codec, call.data, left_s)
+            cdr = channel.kind.encode_call(self.spec.codec, call.data, left_s)
             channel.send(CallId(self._guid, call.number), cdr)
         except NepError as error:
             self._finish(call, error)
@@ -183,22 +185,22 @@ class Ros2Client(ClientCalls[_Call]):
 
     # ---- outcomes
 
-    def _handle_part(self, part: ReceivedPart) -> None:
+    def _handle_response(self, part: ReceivedSample) -> None:
         # Runs in the participant's thread.
         channel = self._channel
         if channel is None:
             return
         try:
-            outcome: Outcome = channel.kind.reply_in(part.cdr, self.spec.codec)
+            outcome: Outcome = channel.kind.decode_reply(part.cdr, self.spec.codec)
         except NepError as error:
             outcome = error
-        self._finish_numbered(part.id.number, outcome)
+        self._finish_by_number(part.id.number, outcome)
 
     def _handle_failure(self, call: CallId, reply: Reply) -> None:
         # Runs in the participant's thread: an error from a nep server.
-        self._finish_numbered(call.number, reply)
+        self._finish_by_number(call.number, reply)
 
-    def _finish_numbered(self, number: int, outcome: Outcome) -> None:
+    def _finish_by_number(self, number: int, outcome: Outcome) -> None:
         with self._lock:
             call = self._calls.get(number)
             self.late += call is None
@@ -218,9 +220,9 @@ class Ros2Client(ClientCalls[_Call]):
         with self._lock:
             is_waiting = any(each.servers is None for each in self._calls.values())
         if is_waiting:
-            self._send_waiting()
+            self._send_waiting_calls()
         with self._participant.changed:
-            existing = self._channel.servers() if self._channel is not None else frozenset()
+            existing = self._channel.matched_servers() if self._channel is not None else frozenset()
         with self._lock:
             calls = tuple(self._calls.values())
         for call in calls:
@@ -250,7 +252,7 @@ class Ros2Client(ClientCalls[_Call]):
                 return
             self.is_closed = True
             left, self._calls = list(self._calls.values()), {}
-        self._deadlines.forget(self)
+        self._deadlines.remove_client(self)
         if self._channel is not None:
             self._channel.close()
         self._on_close(self)

@@ -10,24 +10,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from nep.backends.ros2.message_types import FOLDERS, MessageTypes
+from nep.backends.ros2.message_types import FOLDERS_VARIABLE, MessageTypes
 from nep.backends.ros2.names import service_type_name
-from nep.backends.typed_services import CALL_ANSWER, CALL_REQUEST, TypedService
+from nep.backends.typed_services import CALL_REQUEST, CALL_RESPONSE, TypedService
 from nep.errors import NepError, WireError, did_you_mean
 from nep.i18n import _
 from nep.messages import codecs
 from nep.messages.codecs import CODECS, Codec
 
 NEP_CALL = "nep_msgs/srv/Call"
-_SUCCESS = "bool success\nstring message"
-_COMMON = {
-    NEP_CALL: (CALL_REQUEST, CALL_ANSWER),
+_SUCCESS_FIELDS = "bool success\nstring message"
+_COMMON_TYPES = {
+    NEP_CALL: (CALL_REQUEST, CALL_RESPONSE),
     "std_srvs/srv/Empty": ("", ""),
-    "std_srvs/srv/SetBool": ("bool data", _SUCCESS),
-    "std_srvs/srv/Trigger": ("", _SUCCESS),
+    "std_srvs/srv/SetBool": ("bool data", _SUCCESS_FIELDS),
+    "std_srvs/srv/Trigger": ("", _SUCCESS_FIELDS),
     "example_interfaces/srv/AddTwoInts": ("int64 a\nint64 b", "int64 sum"),
-    "example_interfaces/srv/SetBool": ("bool data", _SUCCESS),
-    "example_interfaces/srv/Trigger": ("", _SUCCESS),
+    "example_interfaces/srv/SetBool": ("bool data", _SUCCESS_FIELDS),
+    "example_interfaces/srv/Trigger": ("", _SUCCESS_FIELDS),
     "nav_msgs/srv/GetMap": ("", "nav_msgs/OccupancyGrid map"),
     "sensor_msgs/srv/SetCameraInfo": (
         "sensor_msgs/CameraInfo camera_info",
@@ -42,18 +42,18 @@ _COMMON = {
 _MAX_FILE_BYTES = 2**20
 
 
-def request_of(service_type: str) -> str:
+def request_type_of(service_type: str) -> str:
     """Return the request type of a service type."""
     return f"{service_type}_Request"
 
 
-def answer_of(service_type: str) -> str:
+def response_type_of(service_type: str) -> str:
     """Return the response type of a service type."""
     return f"{service_type}_Response"
 
 
 @dataclass(frozen=True)
-class _Part:
+class _BodyCodec:
     # Codec of a request or response in CDR.
     types: MessageTypes
     name: str
@@ -68,30 +68,33 @@ class _Part:
         return found
 
 
-def known_service(types: MessageTypes, name: str) -> TypedService:
+def find_service_type(types: MessageTypes, name: str) -> TypedService:
     """Return a service type by its full name. Raises `NepError` if it is unknown."""
-    texts = _COMMON.get(name) or _in_folders(name)
+    texts = _COMMON_TYPES.get(name) or _find_definition(name)
     if texts is None:
         raise NepError(
             _(
                 "unknown service type '{name}'; {did_you_mean} (or set {variable} to a folder of .srv files)"
             ).format(
                 name=name,
-                did_you_mean=did_you_mean(name, tuple(each for each in _COMMON if each != NEP_CALL)),
-                variable=FOLDERS,
+                did_you_mean=did_you_mean(name, tuple(each for each in _COMMON_TYPES if each != NEP_CALL)),
+                variable=FOLDERS_VARIABLE,
             )
         )
-    types.add_part(request_of(name), texts[0])
-    types.add_part(answer_of(name), texts[1])
+    types.add_part(request_type_of(name), texts[0])
+    types.add_part(response_type_of(name), texts[1])
     return TypedService(
-        name, _Part(types, request_of(name)), _Part(types, answer_of(name)), is_nep=name == NEP_CALL
+        name,
+        _BodyCodec(types, request_type_of(name)),
+        _BodyCodec(types, response_type_of(name)),
+        is_nep=name == NEP_CALL,
     )
 
 
-def _in_folders(name: str) -> tuple[str, str] | None:
+def _find_definition(name: str) -> tuple[str, str] | None:
     # Returns the parts of the .srv file before and after its separator.
     package, _srv, last = name.split("/")
-    for folder in filter(None, os.environ.get(FOLDERS, "").split(os.pathsep)):
+    for folder in filter(None, os.environ.get(FOLDERS_VARIABLE, "").split(os.pathsep)):
         for path in sorted(Path(folder).rglob(f"{last}.srv")):
             own = path.parent.parent.name if path.parent.name == "srv" else path.parent.name
             if own != package:
@@ -113,18 +116,18 @@ def _in_folders(name: str) -> tuple[str, str] | None:
     return None
 
 
-def served_type(types: MessageTypes, msg_type: str) -> TypedService:
+def service_type_for(types: MessageTypes, msg_type: str) -> TypedService:
     """Return the service type that serves a server's or client's `msg_type`. Raises `NepError`."""
     name = service_type_name(msg_type)
     if name is not None:
-        return known_service(types, name)
+        return find_service_type(types, name)
     if msg_type not in {"json", "msgpack"}:
         raise NepError(
             _(
                 "a ROS 2 service can't have the type '{name}'; use a type such as 'std_srvs/srv/SetBool'"
             ).format(name=msg_type)
         )
-    return known_service(types, NEP_CALL)
+    return find_service_type(types, NEP_CALL)
 
 
 def codec_of_calls(msg_type: str) -> Codec:

@@ -8,13 +8,20 @@ from collections.abc import Callable
 
 from nep.backends.ros2.participant import Participant
 from nep.backends.ros2.publisher import wait_for_matches
-from nep.backends.ros2.services.channel import CallId, ReceivedPart, ServiceChannel
-from nep.backends.ros2.services.definitions import served_type
-from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.ros2.services.channel import CallId, ReceivedSample, ServiceChannel
+from nep.backends.ros2.services.definitions import service_type_for
+from nep.backends.services import (
+    CallQueue,
+    IncomingCall,
+    ServerSpec,
+    Tally,
+    limit_reply_size,
+    rejection_reply,
+)
 from nep.backends.zeromq.sockets import RejectionLog
 from nep.errors import NepError
 from nep.protocol.requests import PublisherCount, PublisherRecord
-from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, failure, topic_of
+from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, error_reply, topic_of
 
 _logger = logging.getLogger("nep")
 _MATCH_TIMEOUT_S = 1.0
@@ -40,12 +47,12 @@ class Ros2Server:
         self._on_close = on_close
         self._participant = participant
         self._refusals = RejectionLog()
-        self._type = served_type(participant.types, spec.msg_type)
+        self._type = service_type_for(participant.types, spec.msg_type)
         self._channel = ServiceChannel(
             participant, node_id, spec.service, self._type, spec.id, on_part=self._handle_request
         )
         try:
-            wait_for_matches(participant, self._channel.discovered, lambda: self._channel.entities)
+            wait_for_matches(participant, self._channel.discovered_peers, lambda: self._channel.entities)
         except BaseException:  # also Ctrl+C: the caller has no object to close yet
             self._channel.close()
             raise
@@ -63,29 +70,29 @@ class Ros2Server:
         tally = self.tally
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
-    def _handle_request(self, part: ReceivedPart) -> None:
+    def _handle_request(self, part: ReceivedSample) -> None:
         # Runs in the participant's thread, with its lock held.
         try:
-            request = self._type.call_in(part.cdr)
+            request = self._type.decode_call(part.cdr)
         except NepError as error:
             if self._refusals.add(str(error)):
                 _logger.warning("malformed call to '%s': %s", self.spec.service, error)
-            self._answer(part, failure(CallKind.REFUSED, "", str(error)))
+            self._reply(part, error_reply(CallKind.REFUSED, "", str(error)))
             return
         deadline = None if request.timeout_s is None else time.monotonic() + request.timeout_s
         incoming = IncomingCall(
-            request.data, request.codec, deadline, lambda reply: self._answer(part, fitting(reply))
+            request.data, request.codec, deadline, lambda reply: self._reply(part, limit_reply_size(reply))
         )
         if not self.calls.put(incoming):
-            incoming.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+            incoming.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
-    def _answer(self, part: ReceivedPart, reply: Reply) -> bool:
+    def _reply(self, part: ReceivedSample, reply: Reply) -> bool:
         cdr: bytes | None = None
         if self._type.is_nep or reply.kind == CallKind.ANSWER:
             try:
-                cdr = self._type.body_of_reply(reply)
+                cdr = self._type.encode_reply(reply)
             except NepError as error:  # the callback's result doesn't fit the type
-                reply = failure(CallKind.ERROR, type(error).__name__, str(error))
+                reply = error_reply(CallKind.ERROR, type(error).__name__, str(error))
         self.tally.add(reply)
         if self._channel.is_closed:
             return False
@@ -103,7 +110,7 @@ class Ros2Server:
         else:  # ROS has no form for errors: its clients wait until their timeout
             self._channel.send_failure(call, reply)
 
-    def _wait_for_match(self, part: ReceivedPart) -> None:
+    def _wait_for_match(self, part: ReceivedSample) -> None:
         # The client's reader may be discovered later than its writer.
         if part.writer is None or "nepid" in part.writer.announced:
             return  # disconnected, or a nep client, which waits for the match itself
@@ -111,7 +118,7 @@ class Ros2Server:
         with self._participant.changed:
             while not self._channel.is_closed and not self._channel.can_reply_to(part.writer):
                 left = deadline - time.monotonic()
-                if left <= 0.0 or self._participant.is_in_its_thread():
+                if left <= 0.0 or self._participant.is_own_thread():
                     return
                 self._participant.changed.wait(min(left, _POLL_S))
 
@@ -120,7 +127,7 @@ class Ros2Server:
     def begin_close(self) -> None:
         """Reject queued and new calls."""
         for call in self.calls.close():
-            call.answer(refusal(self.spec.service, is_closed=True))
+            call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
         """Close the server; wait up to `timeout_s` seconds for acknowledgements of responses. Idempotent."""

@@ -19,7 +19,7 @@ import zmq
 
 from nep.backends.services import ClientSpec, OpenCall, Outcome, check_calls
 from nep.backends.zeromq.io_thread import PollState
-from nep.backends.zeromq.sockets import RejectionLog, is_far
+from nep.backends.zeromq.sockets import RejectionLog, is_remote
 from nep.errors import (
     ClosedError,
     NepError,
@@ -38,11 +38,11 @@ _READ_MAX = 100
 _MIN_RETRY_S, _MAX_RETRY_S = 0.1, 2.0
 _PENDING_RETRY_S = 0.8
 """Maximum interval in seconds between connection attempts while calls are pending."""
-_HAND_OVER_S = 2.0
+_HANDOVER_TIMEOUT_S = 2.0
 """Time in seconds that new calls wait for the last replies of a closing server."""
 
-Then = Callable[[Outcome], None]
-_Outcomes = list[tuple[Then, Outcome]]
+OutcomeCallback = Callable[[Outcome], None]
+_Outcomes = list[tuple[OutcomeCallback, Outcome]]
 
 
 @dataclass(eq=False)
@@ -51,7 +51,7 @@ class _Call:
     data: bytes | memoryview
     timeout_s: float | None
     deadline: float
-    then: Then
+    callback: OutcomeCallback
     is_sent: bool = False
 
     @property
@@ -64,7 +64,7 @@ class Connection(Protocol):
 
     endpoint: str
     is_open: bool
-    again_s: float
+    reconnect_delay_s: float
     """Time in seconds to wait before reconnecting after the connection has ended."""
 
     @property
@@ -187,7 +187,7 @@ class SocketClient:
         connection = self._connection
         return "" if connection is None else connection.endpoint
 
-    def begin(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> _Call:
+    def start_call(self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback) -> _Call:
         """Send a call. See `ClientTransport.begin`."""
         number = next(self._numbers)
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
@@ -205,7 +205,7 @@ class SocketClient:
         self._serve_soon(self)  # schedules the deadline, and the socket was used
         return call
 
-    def forget(self, call: OpenCall) -> None:
+    def cancel(self, call: OpenCall) -> None:
         """Cancel a call; its callback isn't called."""
         with self._lock:
             self._remove_locked(call.number)
@@ -272,7 +272,7 @@ class SocketClient:
     def reconnect_remote(self) -> None:
         """Reconnect to a server on another computer, because the address of this computer has changed."""
         with self._lock:
-            if is_far(self._connected_endpoint):
+            if is_remote(self._connected_endpoint):
                 self._connected_endpoint = ""
         self._serve_soon(self)
 
@@ -292,7 +292,7 @@ class SocketClient:
             self._retry_at = 0.0
         self._serve_soon(self)
 
-    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Do nothing, because replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:
@@ -323,7 +323,7 @@ class SocketClient:
             for call in [each for each in self._calls.values() if not each.is_sent]:
                 self._send_locked(call)
             self._expire(now, outcomes)
-            due = self._due()
+            due = self._next_due()
             # zmq_send may consume input, and ZMQ_FD is edge-triggered: check again
             has_more = has_more or (self._connection is not None and self._connection.has_input)
         self._run_callbacks(outcomes)
@@ -340,14 +340,14 @@ class SocketClient:
                 parts = self._connection.receive()
                 if parts is None:
                     return False
-                number, outcome = self._framing.read_answer(parts)
+                number, outcome = self._framing.read_reply(parts)
             except WireError as error:
                 if self._refusals.add(error.reason):
                     _logger.warning("malformed reply from the server of '%s': %s", self._name, error)
-                if not self._framing.in_order:
+                if not self._framing.is_in_order:
                     continue
                 outcome = error
-            if self._framing.in_order:
+            if self._framing.is_in_order:
                 number = next(iter(self._unanswered), None)
             self._unanswered_bytes -= self._unanswered.pop(number or 0, 0)
             call = self._remove_locked(number or 0)
@@ -355,7 +355,7 @@ class SocketClient:
                 self._late += 1
                 continue
             self._answered += 1
-            outcomes.append((call.then, outcome))
+            outcomes.append((call.callback, outcome))
         return True
 
     def _check_connection(self, now: float, outcomes: _Outcomes) -> None:
@@ -363,13 +363,13 @@ class SocketClient:
         connection = self._connection
         if connection is not None and connection.is_over:
             self._fail_sent_calls(outcomes)
-            self._attempts, self._retry_at = 0, now + connection.again_s
+            self._attempts, self._retry_at = 0, now + connection.reconnect_delay_s
         elif connection is not None and self._has_moved():
             self._switch_server(outcomes)  # the old connection would stay silent for long
         elif connection is not None and connection.is_open:
             self._attempts = 0
             if self._current not in self._servers:
-                self._hand_over(now, outcomes)
+                self._switch_after_replies(now, outcomes)
             else:
                 self._leave_at = math.inf
         if not self.is_connected and now >= self._retry_at:
@@ -379,14 +379,14 @@ class SocketClient:
         # True if an endpoint of the connection has changed.
         known = None if self._current is None else self._servers.get(self._current)
         return known not in {None, self._connected_endpoint} and (
-            not self._connected_endpoint or is_far(self._connected_endpoint)
+            not self._connected_endpoint or is_remote(self._connected_endpoint)
         )
 
-    def _hand_over(self, now: float, outcomes: _Outcomes) -> None:
+    def _switch_after_replies(self, now: float, outcomes: _Outcomes) -> None:
         # The server closed or was replaced: wait for its last replies, then connect to another one.
         is_waited_for = any(each.is_sent for each in self._calls.values())
         if is_waited_for and self._leave_at == math.inf:
-            self._leave_at = now + _HAND_OVER_S
+            self._leave_at = now + _HANDOVER_TIMEOUT_S
         is_next_due = now >= self._leave_at and any(not each.is_sent for each in self._calls.values())
         if not is_waited_for or is_next_due:
             self._switch_server(outcomes)
@@ -400,7 +400,7 @@ class SocketClient:
         for call in [each for each in self._calls.values() if each.is_sent]:
             self._remove_locked(call.number)
             self._failed += 1
-            outcomes.append((call.then, ServerGoneError(self._name)))
+            outcomes.append((call.callback, ServerGoneError(self._name)))
 
     def _switch_server(self, outcomes: _Outcomes) -> None:
         self._fail_sent_calls(outcomes)
@@ -441,9 +441,9 @@ class SocketClient:
                 if call.is_sent
                 else NoServerError(self._name, timeout_s, address=self.fixed_endpoint.removeprefix("tcp://"))
             )
-            outcomes.append((call.then, error))
+            outcomes.append((call.callback, error))
 
-    def _due(self) -> float:
+    def _next_due(self) -> float:
         due = min((each.deadline for each in self._calls.values()), default=math.inf)
         if self.is_connected and any(not each.is_sent for each in self._calls.values()):
             due = min(due, self._leave_at)
@@ -479,7 +479,7 @@ class SocketClient:
         if connection is not None:  # without the lock: the thread that polls it may wait for the lock
             connection.close()
         what = _("client of '{service}'").format(service=self._name)
-        self._run_callbacks([(each.then, ClosedError(what)) for each in left])
+        self._run_callbacks([(each.callback, ClosedError(what)) for each in left])
 
     def forked(self) -> None:
         """Mark the client as closed in a forked child process. See `nep.system.forks`."""

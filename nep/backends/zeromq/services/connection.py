@@ -17,14 +17,14 @@ from nep.backends.zeromq.io_thread import IoThread, PollState, SharedContext
 from nep.backends.zeromq.sockets import Part, Socket, keep_alive
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
 
-CONNECTION_FILES = 4
+FDS_PER_CONNECTION = 4
 """Number of file descriptors per connection, including those of libzmq."""
 
 _LARGE_BYTES = 65_536
 """Size in bytes from which calls are sent without a copy."""
-_NEVER_MS = 24 * 3600 * 1000
-_EVENT = struct.Struct("=hi")
-_names = itertools.count(1)
+_NO_RECONNECT_MS = 24 * 3600 * 1000
+_EVENT_HEADER = struct.Struct("=hi")
+_monitor_numbers = itertools.count(1)
 
 
 class ServerConnection:
@@ -38,16 +38,16 @@ class ServerConnection:
     ) -> None:
         self.endpoint = endpoint
         self.is_open = self.is_over = False
-        self.again_s = 0.0
+        self.reconnect_delay_s = 0.0
         self._io: IoThread = shared.io
         what = f"a client of '{service}'"
         self._socket = shared.socket(zmq.DEALER, what)
-        self._sides: tuple[_Side, ...] = ()
+        self._sides: tuple[_PolledSocket, ...] = ()
         self._monitor: Socket | None = None
         try:
             self._monitor = monitor = shared.socket(zmq.PAIR, what)
             self._connect(monitor)
-            sides = (_Side(self._socket, serve), _Side(monitor, serve))
+            sides = (_PolledSocket(self._socket, serve), _PolledSocket(monitor, serve))
         except BaseException:
             self.close()
             raise
@@ -56,12 +56,12 @@ class ServerConnection:
             self._io.add(side)
 
     def _connect(self, monitor: Socket) -> None:
-        self._socket.setsockopt(zmq.RECONNECT_IVL, _NEVER_MS)
+        self._socket.setsockopt(zmq.RECONNECT_IVL, _NO_RECONNECT_MS)
         self._socket.setsockopt(zmq.SNDHWM, 0)  # the client limits its calls
         self._socket.setsockopt(zmq.MAXMSGSIZE, PAYLOAD_MAX_BYTES)
         self._socket.copy_threshold = _LARGE_BYTES
         keep_alive(self._socket, self.endpoint)
-        name = f"inproc://nep-service-{next(_names)}"
+        name = f"inproc://nep-service-{next(_monitor_numbers)}"
         self._socket.monitor(name, zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_DISCONNECTED)
         monitor.connect(name)
         self._socket.connect(self.endpoint)
@@ -69,7 +69,7 @@ class ServerConnection:
     def update(self) -> None:
         """Update `is_open` and `is_over` from the monitor's events."""
         while self._monitor is not None and _has_input(self._monitor):
-            event, _value = _EVENT.unpack(self._monitor.recv_multipart(zmq.DONTWAIT)[0])
+            event, _value = _EVENT_HEADER.unpack(self._monitor.recv_multipart(zmq.DONTWAIT)[0])
             self.is_over = self.is_over or event == zmq.EVENT_DISCONNECTED
             self.is_open = not self.is_over
 
@@ -107,7 +107,7 @@ class ServerConnection:
             self._monitor = None
 
 
-class _Side:
+class _PolledSocket:
     def __init__(self, socket: Socket, serve: Callable[[float], PollState]) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
         self._serve = serve

@@ -15,7 +15,7 @@ from nep.backends.services import ClientSpec, ServerSpec
 from nep.backends.zeromq.io_thread import PollState, SharedContext
 from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.services.client import Connection, SocketClient
-from nep.backends.zeromq.services.connection import CONNECTION_FILES, ServerConnection
+from nep.backends.zeromq.services.connection import FDS_PER_CONNECTION, ServerConnection
 from nep.backends.zeromq.services.server import RouterServer
 from nep.backends.zeromq.services.survey import SurveyClient
 from nep.backends.zeromq.services.tcp_server import TcpServer
@@ -25,9 +25,9 @@ from nep.errors import ClosedError, NepError
 from nep.i18n import _
 from nep.protocol.requests import PublisherRecord, SubscriberRecord
 from nep.protocol.service_wire import NATIVE, ORIGINAL, SERVICE_TYPE, Framing, topic_of
-from nep.system.addresses import endpoint_of, in_numbers, is_endpoint
-from nep.system.descriptors import check_room
-from nep.system.forks import give_up
+from nep.system.addresses import endpoint_of, is_endpoint, resolve_address
+from nep.system.descriptors import check_free_descriptors
+from nep.system.forks import close_in_child
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -53,14 +53,14 @@ class ZeromqServices:
 
     # ---- servers
 
-    def server(self, spec: ServerSpec) -> RouterServer | TcpServer:
+    def create_server(self, spec: ServerSpec) -> RouterServer | TcpServer:
         """Create a server. See `ServiceTransport.server`."""
         if isinstance(spec.configuration, Direct):
-            return self._direct_server(spec, spec.configuration)
+            return self._create_direct_server(spec, spec.configuration)
         session = self._session(spec.configuration.master)
-        session.wait_for_name(spec.wait_s)
+        session.wait_for_address(spec.wait_s)
         server = self._new_server(spec, NATIVE, lambda: session.remove_publisher(spec.id, server.tally.calls))
-        with _released(server):
+        with _release_on_error(server):
             endpoints = server.move(session.hosts)
             self._add(server)
         record = PublisherRecord(
@@ -73,16 +73,16 @@ class ZeromqServices:
             raise
         return server
 
-    def _direct_server(self, spec: ServerSpec, direct: Direct) -> RouterServer | TcpServer:
+    def _create_direct_server(self, spec: ServerSpec, direct: Direct) -> RouterServer | TcpServer:
         if direct.wire == "tcp":
-            return self._tcp_server(spec, direct)
+            return self._create_tcp_server(spec, direct)
         server = self._new_server(spec, _framing(direct), lambda: None)
-        with _released(server):
+        with _release_on_error(server):
             server.fixed = (bind(server.socket, f"{direct.ip}:{direct.port}"),)
             self._add(server)
         return server
 
-    def _tcp_server(self, spec: ServerSpec, direct: Direct) -> TcpServer:
+    def _create_tcp_server(self, spec: ServerSpec, direct: Direct) -> TcpServer:
         def close(server: TcpServer, timeout_s: float) -> None:
             with self._lock:
                 self._servers.discard(server)
@@ -91,7 +91,7 @@ class ZeromqServices:
             server.release(deadline)
 
         server = TcpServer(self._shared.io, spec, f"{direct.ip}:{direct.port}", close)
-        with _released(server):
+        with _release_on_error(server):
             self._add(server)
         return server
 
@@ -124,18 +124,18 @@ class ZeromqServices:
 
     # ---- clients
 
-    def client(self, spec: ClientSpec) -> SocketClient:
+    def create_client(self, spec: ClientSpec) -> SocketClient:
         """Create a client. See `ServiceTransport.client`."""
         if isinstance(spec.configuration, Direct):
-            return self._direct_client(spec, spec.configuration)
+            return self._create_direct_client(spec, spec.configuration)
         session = self._session(spec.configuration.master)
-        session.wait_for_name(spec.wait_s)
+        session.wait_for_address(spec.wait_s)
 
-        def known(timeout_s: float) -> tuple[str, ...]:
+        def known_services(timeout_s: float) -> tuple[str, ...]:
             services = session.query_graph(timeout_s).services
             return tuple(sorted(name for name, each in services.items() if each.servers))
 
-        client = self._new_client(spec, NATIVE, lambda: session.remove_subscriber(spec.id), known)
+        client = self._new_client(spec, NATIVE, lambda: session.remove_subscriber(spec.id), known_services)
         try:
             record = SubscriberRecord(spec.id, topic_of(spec.service), SERVICE_TYPE, spec.number)
             client.connect(session.add_subscriber(record, client, spec.wait_s).publishers)
@@ -144,12 +144,12 @@ class ZeromqServices:
             raise
         return client
 
-    def survey(self, spec: ClientSpec) -> SurveyClient:
+    def create_surveyor(self, spec: ClientSpec) -> SurveyClient:
         """Create a surveyor. See `ServiceTransport.survey`."""
         if isinstance(spec.configuration, Direct):
             raise NepError(_("surveys of 'zeromq' need a master; omit the configuration, or use 'nanomsg'"))
         session = self._session(spec.configuration.master)
-        session.wait_for_name(spec.wait_s)
+        session.wait_for_address(spec.wait_s)
 
         def close(survey: SurveyClient) -> None:
             with self._lock:
@@ -172,13 +172,13 @@ class ZeromqServices:
             raise
         return survey
 
-    def _direct_client(self, spec: ClientSpec, direct: Direct) -> SocketClient:
+    def _create_direct_client(self, spec: ClientSpec, direct: Direct) -> SocketClient:
         address = f"{direct.ip}:{direct.port}"
         if not is_endpoint(endpoint_of(address)):
             raise NepError(
                 _("cannot call '{address}'; use a computer's address and a port").format(address=address)
             )
-        endpoint = endpoint_of(in_numbers(address))
+        endpoint = endpoint_of(resolve_address(address))
         return self._new_client(
             spec, _framing(direct), lambda: None, None, endpoint, is_tcp=direct.wire == "tcp"
         )
@@ -205,7 +205,7 @@ class ZeromqServices:
                 return TcpConnection(self._shared.io, endpoint.removeprefix("tcp://"), serve)
             return ServerConnection(self._shared, spec.service, endpoint, serve)
 
-        check_room(CONNECTION_FILES, f"a client of '{spec.service}'")
+        check_free_descriptors(FDS_PER_CONNECTION, f"a client of '{spec.service}'")
         client = SocketClient(
             connect_to,
             spec,
@@ -215,7 +215,7 @@ class ZeromqServices:
             known_services=known,
             endpoint=endpoint,
         )
-        with _released(client):
+        with _release_on_error(client):
             self._add(client)
         return client
 
@@ -244,12 +244,12 @@ class ZeromqServices:
     def forked(self) -> None:
         """Mark all services as closed in a forked child process. See `nep.system.forks`."""
         for server in self._servers:
-            give_up(*server.endpoints)
+            close_in_child(*server.endpoints)
             server.forked()
         for survey in self._surveys:
             survey.forked()
         for client in self._clients:
-            give_up(client.endpoint)
+            close_in_child(client.endpoint)
             client.forked()
         self._is_closed = True
         self._lock = threading.Lock()
@@ -260,7 +260,7 @@ def _framing(direct: Direct) -> Framing:
 
 
 @contextmanager
-def _released(owner: RouterServer | TcpServer | SocketClient) -> Iterator[None]:
+def _release_on_error(owner: RouterServer | TcpServer | SocketClient) -> Iterator[None]:
     # A socket left open would block the end of the program.
     try:
         yield

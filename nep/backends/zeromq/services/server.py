@@ -15,7 +15,14 @@ from functools import partial
 
 import zmq
 
-from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.services import (
+    CallQueue,
+    IncomingCall,
+    ServerSpec,
+    Tally,
+    limit_reply_size,
+    rejection_reply,
+)
 from nep.backends.zeromq.bindings import Bindings
 from nep.backends.zeromq.io_thread import PollState
 from nep.backends.zeromq.sockets import RejectionLog, Socket
@@ -172,15 +179,15 @@ class RouterServer:
                 route, *parts = self.socket.recv_multipart(zmq.DONTWAIT)
             except zmq.Again:
                 return False
-            call = self._reader.read(parts, now, partial(self._answer, route))
+            call = self._reader.read(parts, now, partial(self._reply, route))
             if call is not None:
                 calls.append(call)
         return True
 
     # ---- replying, in any thread
 
-    def _answer(self, route: bytes, number: int, reply: Reply) -> bool:
-        reply = fitting(reply)
+    def _reply(self, route: bytes, number: int, reply: Reply) -> bool:
+        reply = limit_reply_size(reply)
         self.tally.add(reply)
         with self._lock:
             if self._is_closed:
@@ -190,7 +197,7 @@ class RouterServer:
                     "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
                 )
                 return False
-            is_sent = self._send_locked(route, self._framing.answer(number, reply))
+            is_sent = self._send_locked(route, self._framing.reply(number, reply))
             has_input = bool(int(self.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
         if has_input:
             self._serve_soon(self)
@@ -228,7 +235,7 @@ class RouterServer:
             self._reject(call)
 
     def _reject(self, call: IncomingCall) -> None:
-        call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+        call.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
     def release(self, deadline: float) -> None:
         """Close the socket, which lingers until `deadline`. The I/O thread must have stopped serving it."""

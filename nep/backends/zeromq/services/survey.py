@@ -15,7 +15,7 @@ from nep.protocol.requests import RemotePublisher, SubscriberCount, as_count
 
 _logger = logging.getLogger("nep")
 
-Then = Callable[[Outcome], None]
+OutcomeCallback = Callable[[Outcome], None]
 
 
 class _SentCall(NamedTuple):
@@ -61,11 +61,13 @@ class SurveyClient:
     def late(self) -> int:
         """Number of replies that arrived after their call had timed out or was cancelled."""
         with self._lock:
-            return self._late + sum(each.late for each in self._all())
+            return self._late + sum(each.late for each in self._all_clients())
 
-    def begin_all(self, data: bytes | memoryview, timeout_s: float | None, then: Then) -> list[OpenCall]:
+    def start_survey(
+        self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
+    ) -> list[OpenCall]:
         """Send a request to all respondents. See `SurveyTransport.begin_all`."""
-        self._end_leaving()
+        self._close_idle_leaving()
         with self._lock:
             if self.is_closed:
                 raise self._closed_error()
@@ -74,30 +76,30 @@ class SurveyClient:
         try:
             for client in clients:
                 try:
-                    sent.append(_SentCall(client, client.begin(data, timeout_s, then)))
+                    sent.append(_SentCall(client, client.start_call(data, timeout_s, then)))
                 except ClosedError:  # left in the meantime
                     continue
         except BaseException:
-            self.forget_all(sent)
+            self.cancel_all(sent)
             raise
         return sent
 
-    def forget_all(self, calls: Sequence[OpenCall]) -> None:
+    def cancel_all(self, calls: Sequence[OpenCall]) -> None:
         """Cancel several calls; their callbacks aren't called."""
         for sent in calls:
             if isinstance(sent, _SentCall):
-                sent.client.forget(sent.call)
+                sent.client.cancel(sent.call)
 
-    def _all(self) -> list[SocketClient]:
+    def _all_clients(self) -> list[SocketClient]:
         return [*self._clients.values(), *self._leaving]
 
-    def _end_leaving(self) -> None:
+    def _close_idle_leaving(self) -> None:
         with self._lock:
             ended = [each for each in self._leaving if not each.is_busy]
             self._leaving = [each for each in self._leaving if each not in ended]
-        self._end(ended)
+        self._close_clients(ended)
 
-    def _end(self, clients: Iterable[SocketClient]) -> None:
+    def _close_clients(self, clients: Iterable[SocketClient]) -> None:
         for client in clients:
             client.close()
             counts = client.counts()
@@ -157,13 +159,13 @@ class SurveyClient:
             for respondent, endpoints in listed.items():
                 self._add_respondent(respondent, endpoints)
 
-    def tick(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
+    def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Do nothing, because replies have no sequence numbers."""
 
     def counts(self) -> SubscriberCount:
         """Return the statistics that a renewal reports."""
         with self._lock:
-            counts = [each.counts() for each in self._all()]
+            counts = [each.counts() for each in self._all_clients()]
             answered = self._answered + sum(each.received or 0 for each in counts)
             failed = self._failed + sum(each.lost or 0 for each in counts)
         problem = next((each.problem for each in counts if each.problem), "")
@@ -179,10 +181,10 @@ class SurveyClient:
         """Close the connections to all respondents."""
         with self._lock:
             self.is_closed = True
-            clients = self._all()
+            clients = self._all_clients()
             self._clients.clear()
             self._leaving.clear()
-        self._end(clients)
+        self._close_clients(clients)
 
     def forked(self) -> None:
         """Mark the surveyor as closed in a forked child process. See `nep.system.forks`."""

@@ -12,7 +12,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
-from nep.backends.services import CallQueue, IncomingCall, ServerSpec, Tally, fitting, refusal
+from nep.backends.services import (
+    CallQueue,
+    IncomingCall,
+    ServerSpec,
+    Tally,
+    limit_reply_size,
+    rejection_reply,
+)
 from nep.backends.zeromq.io_thread import IoThread, PollState
 from nep.backends.zeromq.services.server import CallReader
 from nep.backends.zeromq.services.tcp_stream import TcpStream, keep_alive
@@ -20,7 +27,7 @@ from nep.backends.zeromq.sockets import wait_until
 from nep.errors import AddressInUseError, WireError
 from nep.protocol.service_wire import NATIVE, Reply
 from nep.system.addresses import host_of
-from nep.system.descriptors import check_room, has_room
+from nep.system.descriptors import check_free_descriptors, has_free_descriptors
 from nep.system.log_rarely import is_logged
 
 _logger = logging.getLogger("nep")
@@ -31,7 +38,7 @@ _PEERS_MAX = 1000
 _READ_MAX = 100
 _UNREAD_MAX_BYTES = 256 * 2**20
 """Maximum number of bytes queued per client; further replies are dropped."""
-_LISTENER_FILES = 2
+_FDS_PER_LISTENER = 2
 _ACCEPT_PAUSE_S = 0.5
 """Pause in seconds before accepting again after descriptors have run out."""
 
@@ -55,7 +62,7 @@ class TcpServer:
         self._reader = CallReader(spec.service, NATIVE, self.tally)
         self._peers: set[_Peer] = set()
         self._rejected = 0
-        self._listener = _bound(address, spec.service)
+        self._listener = _create_listener(address, spec.service)
         self.fd = self._listener.fileno()
         host, port = self._listener.getsockname()[:2]
         self.endpoints = (f"tcp://{host}:{port}",)
@@ -75,7 +82,7 @@ class TcpServer:
                 if error.errno in {errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM}:
                     return PollState(pause_reading=True, due=now + _ACCEPT_PAUSE_S)
                 continue
-            if len(self._peers) >= _PEERS_MAX or not has_room(_LISTENER_FILES):
+            if len(self._peers) >= _PEERS_MAX or not has_free_descriptors(_FDS_PER_LISTENER):
                 self._reject_connection(connected)
                 continue
             self._accept(connected, f"{host}:{port}")
@@ -111,15 +118,15 @@ class TcpServer:
             is_over = peer.stream.is_over and not has_more
             if is_over and (peer.stream.is_broken or not (peer.waiting or peer.stream.backlog)):
                 # otherwise the client has only shut down its sending side and still reads replies
-                self._drop_locked(peer)
+                self._disconnect_locked(peer)
             elif peer.is_last and not peer.stream.backlog:
                 # keep reading until the client closes: closing first could discard data in flight
-                peer.stream.end_sending()
+                peer.stream.shut_down_sending()
                 self._changed.notify_all()
         for call in calls:
             if not self.calls.put(call):
                 self._reject(call)
-        return PollState(is_over, now if has_more else None, sends=peer.stream.backlog > 0)
+        return PollState(is_over, now if has_more else None, wants_write=peer.stream.backlog > 0)
 
     def _read(self, peer: _Peer, calls: list[IncomingCall], now: float) -> bool:
         # Returns True if there may be more.
@@ -136,13 +143,13 @@ class TcpServer:
             except WireError as error:
                 self._reader.reject(error)
                 return False
-            call = self._reader.read(parts, now, partial(self._answer, peer))
+            call = self._reader.read(parts, now, partial(self._reply, peer))
             if call is not None:
                 calls.append(call)
                 peer.waiting += 1
         return True
 
-    def _drop_locked(self, peer: _Peer) -> None:
+    def _disconnect_locked(self, peer: _Peer) -> None:
         # Call in the I/O thread, or after it has stopped serving all peers.
         self._peers.discard(peer)
         self._io.remove(peer)
@@ -151,8 +158,8 @@ class TcpServer:
 
     # ---- replying, in any thread
 
-    def _answer(self, peer: _Peer, number: int, reply: Reply) -> bool:
-        reply = fitting(reply)
+    def _reply(self, peer: _Peer, number: int, reply: Reply) -> bool:
+        reply = limit_reply_size(reply)
         self.tally.add(reply)
         with self._changed:
             stream = peer.stream
@@ -164,14 +171,14 @@ class TcpServer:
                     "dropped a reply of '%s': the client doesn't read its replies", self.spec.service
                 )
                 return False
-            stream.send(NATIVE.answer(number, reply))
+            stream.send(NATIVE.reply(number, reply))
             is_served = stream.backlog > 0 or stream.is_over
         if is_served:
             self._io.serve_soon(peer)
         return True
 
     def _reject(self, call: IncomingCall) -> None:
-        call.answer(refusal(self.spec.service, is_closed=self.calls.is_closed))
+        call.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
     # ---- closing
 
@@ -229,9 +236,9 @@ class _Peer:
         return self._server.serve_peer(self, now)
 
 
-def _bound(address: str, service: str) -> socket.socket:
+def _create_listener(address: str, service: str) -> socket.socket:
     host, port = host_of(address), int(address.rpartition(":")[2])
-    check_room(_LISTENER_FILES, f"a server of '{service}'")
+    check_free_descriptors(_FDS_PER_LISTENER, f"a server of '{service}'")
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     try:
         if sys.platform == "win32":  # without it another program could bind the same port

@@ -141,7 +141,7 @@ class TcpStream:
 
     # ---- closing
 
-    def end_sending(self) -> None:
+    def shut_down_sending(self) -> None:
         """Shut down the sending side."""
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
@@ -175,7 +175,7 @@ class TcpConnection:
         """True if connecting failed."""
         self.is_open = False
         # the system accepts connections for an ending program until its port is closed
-        self.again_s = 0.1
+        self.reconnect_delay_s = 0.1
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._socket.setblocking(False)
@@ -215,7 +215,7 @@ class TcpConnection:
         """Send and receive. See `Pollable.serve`."""
         rest = self._serve(now)
         pause_reading = self._is_dead or self._stream.is_over
-        return PollState(pause_reading, rest.due, sends=not self.is_open or self._stream.backlog > 0)
+        return PollState(pause_reading, rest.due, wants_write=not self.is_open or self._stream.backlog > 0)
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
         """Send a call. The I/O thread sends what the socket doesn't accept immediately."""

@@ -27,41 +27,41 @@ from types import ModuleType
 from typing import Any
 from weakref import WeakValueDictionary
 
-from nep.system.forks import in_child
+from nep.system.forks import call_in_child
 
-SHARED_BYTES = 32 * 2**10
+MIN_SHARED_BYTES = 32 * 2**10
 """Size in bytes from which shared memory is faster than the socket."""
 _MAX_PAYLOAD_BYTES = 64 * 2**20
-_SLOTS_BYTES = 320 * 2**20
+_TOTAL_SLOT_BYTES = 320 * 2**20
 """Total size of a publisher's slots in bytes; there are at least `_MIN_SLOTS`."""
 _MIN_SLOTS, _MAX_SLOTS = 4, 256
 _MIN_SLOT_BYTES = 64 * 2**10
-_HELD_MOST = 12
+_MAX_HELD_SLOTS = 12
 """Maximum number of a publisher's payloads that a reader leaves in their slots; further ones are copied."""
 _HEADER_BYTES = 64
 """Size in bytes of the header before a payload: number, size, and padding for alignment."""
 _HEADER = struct.Struct("=QQ")
-_COPIED_BYTES = 2**18
+_MAX_COPIED_BYTES = 2**18
 """Size in bytes up to which payloads requested as bytes are copied on arrival, which frees their slots."""
-_LOANS = 4
-_READERS = 64
-_SPARE_BYTES = 64 * 2**20
+_MAX_LOANS = 4
+_MAX_READERS = 64
+_RESERVED_BYTES = 64 * 2**20
 """Bytes to keep free in the shared-memory file system; a write without free space kills the program."""
 _QUERY_INTERVAL_S = 0.05
-_QUERY_BYTES = _MAX_PAYLOAD_BYTES
+_QUERY_INTERVAL_BYTES = _MAX_PAYLOAD_BYTES
 """Bytes that a publisher may write, within `_QUERY_INTERVAL_S`, before free space is queried again."""
-_MEMORY = "/dev/shm"  # noqa: S108 - only queried for free space; no file is created by name
-_MODULE = "iceoryx2"
+_SHARED_MEMORY_FOLDER = "/dev/shm"  # noqa: S108 - only queried for free space; no file is created by name
+_MODULE_NAME = "iceoryx2"
 _logger = logging.getLogger("nep")
 _lock = threading.Lock()
-_forks = 0
+_fork_count = 0
 """Number of forks since the process that loaded this module."""
 
 
-class _Opened:
+class _IceoryxNode:
     def __init__(self) -> None:
-        self.library = importlib.import_module(_MODULE)
-        self.node = _new_node(self.library, _own_folder())
+        self.library = importlib.import_module(_MODULE_NAME)
+        self.node = _new_node(self.library, _create_private_folder())
 
     def service(self, publisher: int, generation: int) -> Any:  # noqa: ANN401 - iceoryx2 is not typed
         name = self.library.ServiceName.new(f"nep/{publisher:016x}/{generation}")
@@ -71,43 +71,43 @@ class _Opened:
             .subscriber_max_buffer_size(_MAX_SLOTS)
             .subscriber_max_borrowed_samples(_MAX_SLOTS)
             .max_publishers(1)
-            .max_subscribers(_READERS)
-            .max_nodes(_READERS + 1)
+            .max_subscribers(_MAX_READERS)
+            .max_nodes(_MAX_READERS + 1)
         )
 
 
-class _Process:
+class _ProcessState:
     # State of this process. `is_refused` is True if shared memory is unavailable.
-    is_refused = False
-    opened: weakref.ref[_Opened] | None = None
+    is_unavailable = False
+    node_ref: weakref.ref[_IceoryxNode] | None = None
 
 
-_process = _Process()
+_process = _ProcessState()
 
 
 def can_share() -> bool:
     """Return True if this program may share memory, as far as is known without loading iceoryx2."""
-    return not _process.is_refused and os.environ.get("NEP_SHARED_MEMORY", "") != "0"
+    return not _process.is_unavailable and os.environ.get("NEP_SHARED_MEMORY", "") != "0"
 
 
-def begin_sharing() -> object:
+def start_sharing() -> object:
     """Load iceoryx2 if needed, which is slow the first time.
 
     Returns:
         An object to keep while memory is shared, or None if iceoryx2 is unavailable.
     """
-    return _open()
+    return _open_node()
 
 
-def _open() -> _Opened | None:
+def _open_node() -> _IceoryxNode | None:
     with _lock:
-        opened = None if _process.opened is None else _process.opened()
+        opened = None if _process.node_ref is None else _process.node_ref()
         if opened is None and can_share():
             try:
-                opened = _Opened()
-                _process.opened = weakref.ref(opened)
+                opened = _IceoryxNode()
+                _process.node_ref = weakref.ref(opened)
             except Exception as error:  # noqa: BLE001 - the socket works without it: this must never end a program
-                _process.is_refused = True
+                _process.is_unavailable = True
                 _logger.debug("no shared memory: %s", error)
         return opened
 
@@ -123,7 +123,7 @@ def _new_node(library: ModuleType, folder: Path) -> Any:  # noqa: ANN401 - not t
     return builder.create(library.ServiceType.Ipc)
 
 
-def _own_folder() -> Path:
+def _create_private_folder() -> Path:
     # Raises `OSError` if the folder belongs to another user.
     user = f"-{os.getuid()}" if sys.platform != "win32" else ""
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
@@ -135,7 +135,7 @@ def _own_folder() -> Path:
     return folder
 
 
-def _keep_forever(*inherited: object) -> None:
+def _prevent_finalization(*inherited: object) -> None:
     # Prevents finalizers from releasing the parent's resources in a forked child process.
     for each in inherited:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(each))
@@ -143,46 +143,46 @@ def _keep_forever(*inherited: object) -> None:
 
 def _forked() -> None:
     # Called in the forked child process, which starts from scratch.
-    global _lock, _forks
-    _lock, _forks = threading.Lock(), _forks + 1
-    opened = None if _process.opened is None else _process.opened()
-    _keep_forever(opened, *_writers.values(), *_readers.values())
-    _process.opened = None
+    global _lock, _fork_count
+    _lock, _fork_count = threading.Lock(), _fork_count + 1
+    opened = None if _process.node_ref is None else _process.node_ref()
+    _prevent_finalization(opened, *_writers.values(), *_readers.values())
+    _process.node_ref = None
 
 
-in_child(_forked)
+call_in_child(_forked)
 
 
 class _FreeSpace:
     # Free space, queried at intervals: a query takes as long as a small payload.
-    _asked_at = float("-inf")
-    _left_bytes = 0
+    _queried_at = float("-inf")
+    _remaining_bytes = 0
 
-    def has(self, size_bytes: int) -> bool:
+    def reserve(self, size_bytes: int) -> bool:
         if sys.platform != "linux":
             return True
         now = time.monotonic()
-        if now >= self._asked_at + _QUERY_INTERVAL_S or self._left_bytes < size_bytes:
-            self._asked_at = now
-            self._left_bytes = min(_QUERY_BYTES, room_bytes() - _SPARE_BYTES)
-        if self._left_bytes < size_bytes:
+        if now >= self._queried_at + _QUERY_INTERVAL_S or self._remaining_bytes < size_bytes:
+            self._queried_at = now
+            self._remaining_bytes = min(_QUERY_INTERVAL_BYTES, free_bytes() - _RESERVED_BYTES)
+        if self._remaining_bytes < size_bytes:
             return False
-        self._left_bytes -= size_bytes
+        self._remaining_bytes -= size_bytes
         return True
 
 
-def room_bytes() -> int:
+def free_bytes() -> int:
     """Return the number of free bytes in the shared-memory file system; 0 if unknown."""
     if sys.platform == "win32":  # Python on Windows has no statvfs
         return 0
     try:
-        found = os.statvfs(_MEMORY)
+        found = os.statvfs(_SHARED_MEMORY_FOLDER)
     except OSError:
         return 0
     return found.f_bavail * found.f_frsize
 
 
-class _Slots:
+class _SlotViews:
     # Cache of views by slot address: creating a view takes longer than filling it. Valid while the port
     # exists.
     def __init__(self) -> None:
@@ -201,7 +201,7 @@ class Loan:
 
     def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 is not typed
         self.size = size
-        self._forks = _forks
+        self._forks = _fork_count
         self._port = port  # the memory is valid while the port exists
         self._sample = sample
         self.address = int(sample.payload_ptr) + _HEADER_BYTES
@@ -221,8 +221,8 @@ class Loan:
         sample.assume_init().send()
 
     def __del__(self) -> None:
-        if self._forks != _forks:
-            _keep_forever(self._port, self._sample)
+        if self._forks != _fork_count:
+            _prevent_finalization(self._port, self._sample)
 
 
 class SharedWriter:
@@ -236,11 +236,11 @@ class SharedWriter:
         self._publisher = publisher
         self._slot_bytes = 0
         self._free_space = _FreeSpace()
-        self._opened: _Opened | None = None
+        self._opened: _IceoryxNode | None = None
         self._service: Any = None
         self._port: Any = None
         self._loans: WeakValueDictionary[int, Loan] = WeakValueDictionary()
-        self._slots = _Slots()
+        self._slots = _SlotViews()
 
     def prepare(self, size: int) -> bool:
         """Provide slots for payloads of `size` bytes; return False if that is impossible.
@@ -249,11 +249,11 @@ class SharedWriter:
         """
         if size <= self._slot_bytes:
             return self._port is not None
-        opened = _open() if size <= _MAX_PAYLOAD_BYTES else None
+        opened = _open_node() if size <= _MAX_PAYLOAD_BYTES else None
         if opened is None:
             return False
         slot_bytes = max(_MIN_SLOT_BYTES, 1 << (size - 1).bit_length())
-        slots = max(_MIN_SLOTS, min(_MAX_SLOTS, _SLOTS_BYTES // slot_bytes))
+        slots = max(_MIN_SLOTS, min(_MAX_SLOTS, _TOTAL_SLOT_BYTES // slot_bytes))
         self.close()
         self._opened = opened
         self.generation += 1
@@ -265,7 +265,7 @@ class SharedWriter:
                 .initial_max_slice_len(slot_bytes + _HEADER_BYTES)
                 .allocation_strategy(opened.library.AllocationStrategy.Static)
                 .override_sample_preallocation(slots)
-                .max_loaned_samples(_LOANS)
+                .max_loaned_samples(_MAX_LOANS)
                 .create()
             )
             self._service = service
@@ -278,15 +278,15 @@ class SharedWriter:
 
     def loan(self, size: int) -> Loan | None:
         """Return a free slot, or None if readers hold all of them."""
-        sample = self._sample(size)
+        sample = self._loan_sample(size)
         if sample is None:
             return None
         loan = Loan(self._port, sample, size)
         self._loans[loan.address] = loan
         return loan
 
-    def _sample(self, size: int) -> Any:  # noqa: ANN401 - iceoryx2 is not typed
-        if self._port is None or size > self._slot_bytes or not self._free_space.has(size):
+    def _loan_sample(self, size: int) -> Any:  # noqa: ANN401 - iceoryx2 is not typed
+        if self._port is None or size > self._slot_bytes or not self._free_space.reserve(size):
             return None
         try:
             return self._port.loan_slice_uninit(size + _HEADER_BYTES)
@@ -298,7 +298,7 @@ class SharedWriter:
 
         Returns the payload's number, or None if no slot is free.
         """
-        sample = self._sample(size)
+        sample = self._loan_sample(size)
         if sample is None:
             return None
         slot = self._slots.view(int(sample.payload_ptr), self._slot_bytes + _HEADER_BYTES)
@@ -308,7 +308,7 @@ class SharedWriter:
         sample.assume_init().send()
         return number
 
-    def lent(self, data: memoryview) -> Loan | None:
+    def find_loan(self, data: memoryview) -> Loan | None:
         """Return the loan that owns the memory of `data`, or None."""
         if not self._loans or data.readonly or not data.c_contiguous:
             return None
@@ -323,7 +323,7 @@ class SharedWriter:
         loan.send(self.number)
         return self.number
 
-    def tidy(self) -> None:
+    def reclaim_slots(self) -> None:
         """Reclaim slots that are held by killed readers."""
         if self._opened is not None and self._port is not None:
             self._opened.node.try_cleanup_dead_nodes()
@@ -333,18 +333,18 @@ class SharedWriter:
         """Release the memory. Payloads that readers hold remain valid."""
         self._port = self._service = self._opened = None
         self._slot_bytes = 0
-        self._slots = _Slots()
+        self._slots = _SlotViews()
 
 
-class _Held:
+class _HeldSample:
     # Keeps a payload in its slot until its last view is released.
     def __init__(self, sample: Any, returned: deque[None]) -> None:  # noqa: ANN401
         self._sample, self._returned = sample, returned
-        self._forks = _forks
+        self._forks = _fork_count
 
     def __del__(self) -> None:
-        if self._forks != _forks:
-            _keep_forever(self._sample)
+        if self._forks != _fork_count:
+            _prevent_finalization(self._sample)
         self._sample = None
         self._returned.append(None)
 
@@ -354,14 +354,14 @@ class SharedReader:
 
     def __init__(self, publisher: int, generation: int) -> None:
         """Open the memory of a publisher. Raises `LookupError` if this program can't open it."""
-        self._opened = _open()
+        self._opened = _open_node()
         if self._opened is None:
             raise LookupError
         self.generation = generation
         self._held = 0
         self._returned: deque[None] = deque()
         self._ahead: tuple[int, int, Any] | None = None
-        self._slots = _Slots()
+        self._slots = _SlotViews()
         try:
             self._service = self._opened.service(publisher, generation).open()
             self._port = self._service.subscriber_builder().buffer_size(_MAX_SLOTS).create()
@@ -375,16 +375,16 @@ class SharedReader:
         With `may_copy`, small payloads are copied out of their slots.
         """
         while True:
-            found, self._ahead = self._ahead or self._next(), None
+            found, self._ahead = self._ahead or self._receive_next(), None
             if found is None:
                 return None
             if found[0] == number:
-                return self._payload(*found[1:], may_copy=may_copy)
+                return self._extract_payload(*found[1:], may_copy=may_copy)
             if found[0] > number:
                 self._ahead = found
                 return None
 
-    def _next(self) -> tuple[int, int, Any] | None:
+    def _receive_next(self) -> tuple[int, int, Any] | None:
         try:
             sample = self._port.receive()
         except Exception as error:  # noqa: BLE001 - counts as lost
@@ -395,9 +395,9 @@ class SharedReader:
         number, size = _HEADER.unpack_from(self._slots.view(int(sample.payload_ptr), _HEADER.size))
         return number, size, sample
 
-    def _payload(self, size: int, sample: Any, *, may_copy: bool) -> bytes | memoryview:  # noqa: ANN401
+    def _extract_payload(self, size: int, sample: Any, *, may_copy: bool) -> bytes | memoryview:  # noqa: ANN401
         address = int(sample.payload_ptr)
-        if may_copy and size <= _COPIED_BYTES:
+        if may_copy and size <= _MAX_COPIED_BYTES:
             return bytes(
                 self._slots.view(address, size + _HEADER_BYTES)[_HEADER_BYTES : _HEADER_BYTES + size]
             )
@@ -405,10 +405,10 @@ class SharedReader:
         while self._returned:
             self._returned.popleft()
             self._held -= 1
-        if self._held >= _HELD_MOST:
+        if self._held >= _MAX_HELD_SLOTS:
             return memoryview(bytes(array))
         self._held += 1
-        array.held = _Held(sample, self._returned)  # type: ignore[attr-defined]
+        array.held = _HeldSample(sample, self._returned)  # type: ignore[attr-defined]
         return memoryview(array).cast("B").toreadonly()
 
 

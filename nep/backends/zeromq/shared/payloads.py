@@ -8,16 +8,16 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Mapping
 
-from nep.backends.zeromq.shared.memory import SHARED_BYTES, SharedReader, SharedWriter
+from nep.backends.zeromq.shared.memory import MIN_SHARED_BYTES, SharedReader, SharedWriter
 from nep.errors import WireError
 from nep.i18n import _
-from nep.protocol.wire import Shares
+from nep.protocol.wire import OfferAcceptance
 
 _NUMBER = struct.Struct("<Q")
 _MAX_OFFERS = 4
 """Maximum number of offers to a subscriber. One that doesn't reply can't share memory."""
 _OFFER_RETRY_S = 0.5
-_TIDY_S = 1.0
+_RECLAIM_INTERVAL_S = 1.0
 
 
 class SharedPayloads:
@@ -31,12 +31,12 @@ class SharedPayloads:
         self._writer = SharedWriter(publisher)
         self._tidied_at = float("-inf")
 
-    def note(self, shares: Shares) -> None:
+    def confirm(self, shares: OfferAcceptance) -> None:
         """Handle a subscriber's confirmation that it has opened the memory."""
         if shares.generation == self._writer.generation:
             self.readers.add(shares.subscriber)
 
-    def forget(self, subscriber: int) -> None:
+    def discard(self, subscriber: int) -> None:
         """Remove a subscriber that has left or has sent another hello."""
         self.readers.discard(subscriber)
         self._offered.pop(subscriber, None)
@@ -47,18 +47,18 @@ class SharedPayloads:
         Returns None if the payload must go through the socket, because there is no reader or no free slot.
         """
         size = data.nbytes if isinstance(data, memoryview) else len(data)
-        if not subscribers or not self._is_ready(size, subscribers, now):
+        if not subscribers or not self._prepare_readers(size, subscribers, now):
             return None
-        lent = self._writer.lent(data) if isinstance(data, memoryview) else None
+        lent = self._writer.find_loan(data) if isinstance(data, memoryview) else None
         number = self._writer.copy(data, size) if lent is None else self._writer.send(lent)
         if number is None:
-            if now >= self._tidied_at + _TIDY_S:
+            if now >= self._tidied_at + _RECLAIM_INTERVAL_S:
                 self._tidied_at = now
-                self._writer.tidy()
+                self._writer.reclaim_slots()
             return None
         return _NUMBER.pack(number)
 
-    def _has_slots(self, size: int) -> bool:
+    def _prepare_slots(self, size: int) -> bool:
         # No reader has opened a new segment yet.
         generation = self._writer.generation
         is_there = self._writer.prepare(size)
@@ -67,8 +67,8 @@ class SharedPayloads:
             self._offered.clear()
         return is_there
 
-    def _is_ready(self, size: int, subscribers: Mapping[int, int], now: float) -> bool:
-        if not self._has_slots(size):
+    def _prepare_readers(self, size: int, subscribers: Mapping[int, int], now: float) -> bool:
+        if not self._prepare_slots(size):
             return False
         for each in subscribers if len(self.readers) < len(subscribers) else ():
             times, at = self._offered.get(each, (0, float("-inf")))
@@ -77,9 +77,9 @@ class SharedPayloads:
                 self._offer(each, self._writer.generation)
         return bool(self.readers)
 
-    def lend(self, size: int) -> memoryview | None:
+    def borrow_memory(self, size: int) -> memoryview | None:
         """Return writable memory for a payload of `size` bytes, or None if no reader shares it."""
-        if not self.readers or size < SHARED_BYTES or not self._has_slots(size) or not self.readers:
+        if not self.readers or size < MIN_SHARED_BYTES or not self._prepare_slots(size) or not self.readers:
             return None
         loan = self._writer.loan(size)
         return None if loan is None else loan.buffer
@@ -93,7 +93,7 @@ class SharedPayloads:
 class SharedSources:
     """Memory that one subscriber shares with publishers. `answer` sends the confirmation of an offer."""
 
-    def __init__(self, subscriber: int, answer: Callable[[Shares], None]) -> None:
+    def __init__(self, subscriber: int, answer: Callable[[OfferAcceptance], None]) -> None:
         self._subscriber = subscriber
         self._answer = answer
         self._readers: dict[int, SharedReader] = {}
@@ -106,7 +106,7 @@ class SharedSources:
                 self._readers[publisher] = SharedReader(publisher, generation)
             except LookupError:
                 return
-        self._answer(Shares(self._subscriber, publisher, generation))
+        self._answer(OfferAcceptance(self._subscriber, publisher, generation))
 
     def read(
         self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False
@@ -122,7 +122,7 @@ class SharedSources:
             )
         return None if reader is None else reader.read(_NUMBER.unpack(part)[0], may_copy=may_copy)
 
-    def leave(self, publisher: int) -> None:
+    def close_publisher(self, publisher: int) -> None:
         """Close the memory of a publisher. Payloads in use remain valid."""
         self._readers.pop(publisher, None)
 

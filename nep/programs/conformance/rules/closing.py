@@ -7,7 +7,7 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_publisher
-from nep.programs.conformance.verdict import broken, expect
+from nep.programs.conformance.verdict import broken_rule, expect
 from nep.protocol.requests import RemovePublisher
 from nep.protocol.wire import BYE
 
@@ -23,7 +23,7 @@ def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int
     bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, last_seq))
     bench.wait(wait_s)
     if not _is_connected(publisher):
-        raise broken(_("it disconnected before the bye"))
+        raise broken_rule(_("it disconnected before the bye"))
 
 
 @rule(
@@ -33,26 +33,26 @@ def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int
 )
 def _bye(bench: Bench) -> None:
     topic, pub, subscriber = connected_publisher(bench)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=5)
-    number = bench.adapter.begin("close_publisher", pub=pub)
-    bench.forget()
-    bench.need(lambda: bool(subscriber.byes), "bye")
+    bench.call("publish", pub=pub, value={"a": 1}, count=5)
+    number = bench.adapter.send_request("close_publisher", pub=pub)
+    bench.discard_opened()
+    bench.require(lambda: bool(subscriber.byes), "bye")
     header = subscriber.byes[0].header
     expect("bye.seq", header.seq, 5)
     id = bench.record("publisher", topic)["id"]
     expect("bye.publisher", header.publisher, id)
     expect("received", len(subscriber.messages), 5)
-    expect("publisher-.last_seq", bench.request("publisher-", "id", id).what.get("last_seq"), 5)
+    expect("publisher-.last_seq", bench.wait_for_request("publisher-", "id", id).fields.get("last_seq"), 5)
     subscriber.disconnect()
     bench.finish(number, "close_publisher")
 
 
 @rule("bye-again", lazy("A publisher repeats its bye until no hello remains, and then closes."), _SECTION)
-def _bye_again(bench: Bench) -> None:
+def _bye_repeats(bench: Bench) -> None:
     _topic, pub, subscriber = connected_publisher(bench)
-    number = bench.adapter.begin("close_publisher", pub=pub)
-    bench.forget()
-    bench.need(lambda: len(subscriber.byes) >= 3, "bye again")
+    number = bench.adapter.send_request("close_publisher", pub=pub)
+    bench.discard_opened()
+    bench.require(lambda: len(subscriber.byes) >= 3, "bye again")
     bench.finish(number, "close_publisher")
 
 
@@ -60,10 +60,10 @@ def _bye_again(bench: Bench) -> None:
 def _bye_disconnects(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
-    publisher.bye()
+    publisher.send_byes()
     # The master still lists the publisher, so a renewal may make the adapter connect again.
-    bench.need(lambda: any(not each.is_added for each in publisher.filters), "disconnect")
-    bench.need(lambda: len(bench.events(sub)) == 1, "message")
+    bench.require(lambda: any(not each.is_added for each in publisher.filters), "disconnect")
+    bench.require(lambda: len(bench.events(sub)) == 1, "message")
 
 
 @rule(
@@ -71,14 +71,14 @@ def _bye_disconnects(bench: Bench) -> None:
     lazy("After 'publisher-' with 'is_closed', a subscriber keeps reading until the bye."),
     _SECTION,
 )
-def _closed_is_heard(bench: Bench) -> None:
+def _closed_publisher_is_read(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     _close_without_bye(bench, publisher, 3, 0.3)
     for _number in range(3):
         publisher.send(b'{"a":1}')
-    bench.need(lambda: len(bench.events(sub)) == 3, "message")
-    publisher.bye()
-    bench.need(lambda: not _is_connected(publisher), "disconnect")
+    bench.require(lambda: len(bench.events(sub)) == 3, "message")
+    publisher.send_byes()
+    bench.require(lambda: not _is_connected(publisher), "disconnect")
 
 
 @rule(
@@ -86,10 +86,10 @@ def _closed_is_heard(bench: Bench) -> None:
     lazy("A subscriber disconnects after 3 s from a closed publisher that sends no bye."),
     _SECTION,
 )
-def _closed_is_left(bench: Bench) -> None:
+def _closed_publisher_is_disconnected(bench: Bench) -> None:
     publisher, _sub = bench.subscribed_publisher(bench.new_topic())
     _close_without_bye(bench, publisher, 0, 1.5)
-    bench.need(lambda: not _is_connected(publisher), "disconnect", 10.0)
+    bench.require(lambda: not _is_connected(publisher), "disconnect", 10.0)
 
 
 @rule(
@@ -97,12 +97,12 @@ def _closed_is_left(bench: Bench) -> None:
     lazy("After 'publisher-' without 'is_closed', the connection stays open: the program may be suspended."),
     _SECTION,
 )
-def _lapsed_is_heard(bench: Bench) -> None:
+def _lapsed_publisher_stays_connected(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     bench.master.drop(publisher.node.id)
     bench.wait(0.5)
     publisher.send(b'{"a":1}')
-    bench.need(lambda: bool(bench.events(sub)), "message")
+    bench.require(lambda: bool(bench.events(sub)), "message")
     expect("connected", _is_connected(publisher), True)
 
 
@@ -115,8 +115,8 @@ def _subscriber_closes(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, sub = bench.subscribed_publisher(topic)
     bench.close_sub(sub)
-    bench.request("subscriber-", "id", bench.record("subscriber", topic)["id"])
-    bench.need(lambda: not _is_connected(publisher), "disconnect")
+    bench.wait_for_request("subscriber-", "id", bench.record("subscriber", topic)["id"])
+    bench.require(lambda: not _is_connected(publisher), "disconnect")
 
 
 @rule(
@@ -125,23 +125,23 @@ def _subscriber_closes(bench: Bench) -> None:
     _SECTION,
     is_last=True,
 )
-def _leave(bench: Bench) -> None:
+def _node_leaves(bench: Bench) -> None:
     _topic, pub, subscriber = connected_publisher(bench)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=4)
+    bench.call("publish", pub=pub, value={"a": 1}, count=4)
     count = len(bench.master.received)
-    number = bench.adapter.begin("close")
-    bench.need(lambda: bool(subscriber.byes), "bye")
+    number = bench.adapter.send_request("close")
+    bench.require(lambda: bool(subscriber.byes), "bye")
     expect("bye.flags", subscriber.byes[0].header.flags, BYE)
     subscriber.disconnect()
-    bench.need(lambda: bool(bench.requests("leave")), "leave")
-    expect("leave.node_id", bench.requests("leave")[-1].what.get("node_id"), bench.node_id)
+    bench.require(lambda: bool(bench.requests("leave")), "leave")
+    expect("leave.node_id", bench.requests("leave")[-1].fields.get("node_id"), bench.node_id)
     requests = bench.master.received[count:]
     first = next(each for each in requests if each.do in {"renew", "leave", "publisher-"})
     if first.do == "leave":
-        raise broken(_("'leave' was sent without a preceding renewal"))
+        raise broken_rule(_("'leave' was sent without a preceding renewal"))
     if first.do == "renew":
-        seqs = [each.get("last_seq") for each in first.what.get("publishers", ())]
+        seqs = [each.get("last_seq") for each in first.fields.get("publishers", ())]
         expect("renew.publishers.last_seq", 4 in seqs, True)
     bench.finish(number, "close")
-    bench.need(lambda: bench.adapter.has_ended, "end of the adapter")
+    bench.require(lambda: bench.adapter.has_ended, "end of the adapter")
     expect("exit code", bench.adapter.lines.wait(10.0), 0)

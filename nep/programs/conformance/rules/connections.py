@@ -9,7 +9,7 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_subscriber, messages_of
-from nep.programs.conformance.verdict import at_most, expect
+from nep.programs.conformance.verdict import expect, time_limit
 from nep.protocol.requests import AddPublisher
 
 _SECTION = "who-connects"
@@ -20,7 +20,7 @@ def _expect_next(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
     """Send a message and check that the adapter delivers it exactly once."""
     publisher.send(b'{"a":1}')
     wanted = str(publisher.seq)
-    bench.need(lambda: any(each.get("seq") == wanted for each in bench.events(sub)), "message")
+    bench.require(lambda: any(each.get("seq") == wanted for each in bench.events(sub)), "message")
     bench.wait(0.1)
     expect("deliveries", sum(each.get("seq") == wanted for each in bench.events(sub)), 1)
 
@@ -45,15 +45,15 @@ def _connect_once(bench: Bench) -> None:
 def _several_publishers(bench: Bench) -> None:
     first, sub = bench.subscribed_publisher(bench.new_topic())
     second = bench.publisher(first.topic)
-    bench.need(lambda: bool(second.hellos), "hello")
+    bench.require(lambda: bool(second.hellos), "hello")
     for publisher in (first, second):
         publisher.send(b'{"a":1}')
-    bench.need(
+    bench.require(
         lambda: {each["publisher"] for each in bench.events(sub)} == {str(first.id), str(second.id)},
         "message",
     )
-    first.bye()
-    bench.need(lambda: not first.hellos, "disconnect")
+    first.send_byes()
+    bench.require(lambda: not first.hellos, "disconnect")
     _expect_next(bench, second, sub)
 
 
@@ -65,9 +65,9 @@ def _several_publishers(bench: Bench) -> None:
 def _reconnect(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
-    bench.need(lambda: bool(bench.events(sub)), "message")
+    bench.require(lambda: bool(bench.events(sub)), "message")
     publisher.bind_again()
-    bench.need(lambda: bool(publisher.hellos), "hello", 10.0)
+    bench.require(lambda: bool(publisher.hellos), "hello", 10.0)
     _expect_next(bench, publisher, sub)
 
 
@@ -84,10 +84,10 @@ def _other_socket_at_publisher(bench: Bench) -> None:
     sub = bench.new_sub(topic)
     publisher = bench.publisher(topic, is_listed=False)
     publisher.socket.close(0)
-    bench.list_publisher(publisher)
+    bench.register_publisher(publisher)
     bench.fail_handshake("PULL", publisher.record.endpoints[0])
     publisher.bind_again()
-    bench.need(lambda: bool(publisher.hellos), "hello", 10.0)
+    bench.require(lambda: bool(publisher.hellos), "hello", 10.0)
     _expect_next(bench, publisher, sub)
 
 
@@ -99,10 +99,10 @@ def _other_socket_at_publisher(bench: Bench) -> None:
 def _endpoint_change(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
-    bench.need(lambda: bool(bench.events(sub)), "message")
+    bench.require(lambda: bool(bench.events(sub)), "message")
     publisher.bind_elsewhere()
-    bench.list_publisher(publisher)
-    bench.need(lambda: bool(publisher.hellos), "hello", 10.0)
+    bench.register_publisher(publisher)
+    bench.require(lambda: bool(publisher.hellos), "hello", 10.0)
     _expect_next(bench, publisher, sub)
     if "losses" in bench.features.get("features", ()):
         expect("lost", bench.counts(sub)[1], 0)
@@ -132,11 +132,11 @@ def _subscriber_lost(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
     killed, other = connected_subscriber(bench, topic, 3), connected_subscriber(bench, topic, 3)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=10)
+    bench.call("publish", pub=pub, value={"a": 1}, count=10)
     killed.socket.close(0)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=10)
-    bench.need(lambda: len(messages_of(other)) == 20, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=10)
+    bench.require(lambda: len(messages_of(other)) == 20, "message")
     other.socket.close(0)
     bench.wait(0.1)
-    with at_most(_MAX_CLOSE_S):
+    with time_limit(_MAX_CLOSE_S):
         bench.close_pub(pub)

@@ -7,7 +7,7 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_subscriber
-from nep.programs.conformance.verdict import at_most, broken, expect, printable
+from nep.programs.conformance.verdict import broken_rule, expect, printable, time_limit
 from nep.protocol.wire import LATCHED, hello_part, topic_part
 
 _SECTION = "the-handshake"
@@ -21,7 +21,7 @@ def level_of(bench: Bench) -> int:
 
 
 def _filters(publisher: ScriptedPublisher) -> list[bytes]:
-    return [each.what for each in publisher.filters if each.is_added]
+    return [each.prefix for each in publisher.filters if each.is_added]
 
 
 @rule(
@@ -34,14 +34,14 @@ def _hello_after_topic(bench: Bench) -> None:
     publisher, _sub = bench.subscribed_publisher(topic)
     filters = _filters(publisher)
     if topic_part(topic) not in filters:
-        raise broken(
+        raise broken_rule(
             _("its subscriptions are {seen}, without {wanted}").format(
                 seen=printable(filters), wanted=printable(topic_part(topic))
             )
         )
     hello = next(iter(publisher.hellos))
     if filters.index(hello) < filters.index(topic_part(topic)):
-        raise broken(_("it subscribed to the hello before the topic"))
+        raise broken_rule(_("it subscribed to the hello before the topic"))
 
 
 @rule(
@@ -74,7 +74,7 @@ def _hello_form(bench: Bench) -> None:
 def _echo(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=3)
+    bench.call("publish", pub=pub, value={"a": 1}, count=3)
     record = bench.record("publisher", topic)
     subscriber = connected_subscriber(bench, topic, 3)
     header = subscriber.echoes[0].header
@@ -95,9 +95,9 @@ def _foreign_hello(bench: Bench) -> None:
     other = hello_part(subscriber.record.id, f"{topic}/other", batches=True)
     subscriber.socket.subscribe(other)
     subscriber.socket.subscribe(hello_part(7, topic))
-    bench.need(lambda: any(parts[0] == hello_part(7, topic) for parts in subscriber.received), "echo")
+    bench.require(lambda: any(parts[0] == hello_part(7, topic) for parts in subscriber.received), "echo")
     if any(parts[0] == other for parts in subscriber.received):
-        raise broken(_("it answered the hello {hello}").format(hello=printable(other)))
+        raise broken_rule(_("it answered the hello {hello}").format(hello=printable(other)))
 
 
 @rule(
@@ -110,10 +110,10 @@ def _first_message(bench: Bench) -> None:
     subscriber = bench.subscriber(topic)
     bench.connect_delay_s = 0.15
     pub = bench.new_pub(topic)
-    bench.ask("publish", pub=pub, value={"n": 1})
-    bench.need(lambda: bool(subscriber.echoes), "echo")
-    bench.ask("publish", pub=pub, value={"n": 2})
-    bench.need(lambda: bool(subscriber.messages), "message")
+    bench.call("publish", pub=pub, value={"n": 1})
+    bench.require(lambda: bool(subscriber.echoes), "echo")
+    bench.call("publish", pub=pub, value={"n": 2})
+    bench.require(lambda: bool(subscriber.messages), "message")
     expect("message.seq", subscriber.messages[0].header.seq, 1)
 
 
@@ -126,7 +126,7 @@ def _new_pub_bounded(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.subscriber(topic)
     bench.connect_delay_s = None
-    with at_most(_MAX_WAIT_S):
+    with time_limit(_MAX_WAIT_S):
         bench.new_pub(topic)
 
 
@@ -135,15 +135,15 @@ def _new_pub_bounded(bench: Bench) -> None:
     lazy("Subscribers that don't send a hello in time are reported to the program and to the master."),
     _SECTION,
 )
-def _missing(bench: Bench) -> None:
+def _missing_hello_is_reported(bench: Bench) -> None:
     topic = bench.new_topic()
     subscriber = bench.subscriber(topic)
     bench.connect_delay_s = None
-    reply = bench.ask("publisher", topic=topic, type="json")
+    reply = bench.call("publisher", topic=topic, type="json")
     expect("publisher.missing", reply.get("missing"), [subscriber.node.name])
-    what = bench.request("missing", "publisher_id", bench.record("publisher", topic)["id"]).what
+    what = bench.wait_for_request("missing", "publisher_id", bench.record("publisher", topic)["id"]).fields
     expect("missing.subscriber_ids", list(what.get("subscriber_ids", ())), [subscriber.record.id])
-    bench.ask("close_publisher", pub=reply.get("pub"))
+    bench.call("close_publisher", pub=reply.get("pub"))
 
 
 @rule(
@@ -154,15 +154,15 @@ def _missing(bench: Bench) -> None:
 def _new_sub_waits(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher = bench.publisher(topic, echoes=False)
-    number = bench.adapter.begin("subscriber", topic=topic, type="json")
-    bench.need(lambda: bool(publisher.hellos), "hello")
+    number = bench.adapter.send_request("subscriber", topic=topic, type="json")
+    bench.require(lambda: bool(publisher.hellos), "hello")
     bench.wait(0.15)
     has_returned = bench.adapter.reply(number) is not None
     for hello in list(publisher.hellos):
-        publisher.echo(hello)
+        publisher.send_echo(hello)
     bench.close_sub(int(bench.finish(number, "subscriber")["sub"]))
     if has_returned:
-        raise broken(_("it returned before the echo"))
+        raise broken_rule(_("it returned before the echo"))
 
 
 @rule(
@@ -173,7 +173,7 @@ def _new_sub_waits(bench: Bench) -> None:
 def _new_sub_bounded(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.publisher(topic, echoes=False)
-    with at_most(_MAX_WAIT_S):
+    with time_limit(_MAX_WAIT_S):
         bench.new_sub(topic)
 
 
@@ -186,9 +186,9 @@ def _push_connects(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
     publisher = bench.publisher(topic)
-    bench.need(lambda: bool(publisher.hellos), "hello")
+    bench.require(lambda: bool(publisher.hellos), "hello")
     publisher.send(b'{"n":1}')
-    bench.need(lambda: bool(bench.events(sub)), "message")
+    bench.require(lambda: bool(bench.events(sub)), "message")
 
 
 @rule(
@@ -203,13 +203,13 @@ def _latched(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic, latched=True)
     expect("publisher.latched", bench.record("publisher", topic).get("latched"), True)
-    bench.ask("publish", pub=pub, value={"n": 1})
-    bench.ask("publish", pub=pub, value={"n": 2})
+    bench.call("publish", pub=pub, value={"n": 1})
+    bench.call("publish", pub=pub, value={"n": 2})
     subscriber = connected_subscriber(bench, topic, 3)
     before = [each for each in subscriber.notices if each.at <= subscriber.echoes[0].at]
     latched = before[0]
     if latched.payload is None:
-        raise broken(_("it sent no message before the echo"))
+        raise broken_rule(_("it sent no message before the echo"))
     expect("latched.seq", latched.header.seq, 2)
     expect("latched.flags", latched.header.flags, LATCHED)
 
@@ -224,7 +224,7 @@ def _history(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic, history=3, latched=True)
     expect("publisher.history", bench.record("publisher", topic).get("history"), 3)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=5)
+    bench.call("publish", pub=pub, value={"a": 1}, count=5)
     subscriber = connected_subscriber(bench, topic, 3)
     count = next(place for place, each in enumerate(subscriber.notices) if each.payload is None)
     seqs = [each.header.seq for each in subscriber.notices[:count] if each.payload is not None]

@@ -11,13 +11,13 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_publisher, messages_of
 from nep.programs.conformance.scripted_master import RecordedRequest
-from nep.programs.conformance.verdict import broken, expect
+from nep.programs.conformance.verdict import broken_rule, expect
 
 _SECTION = "leases-and-a-master-that-starts-again"
 
 
 def _ids(request: RecordedRequest, kind: str) -> set[Any]:
-    return {each.get("id") for each in request.what.get(kind, ()) if isinstance(each, dict)}
+    return {each.get("id") for each in request.fields.get(kind, ()) if isinstance(each, dict)}
 
 
 @rule(
@@ -29,14 +29,14 @@ def _renew(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     bench.new_sub(topic)
-    first = bench.renewal(len(bench.master.received))
-    second = bench.renewal(bench.master.received.index(first) + 1)
+    first = bench.wait_for_renewal(len(bench.master.received))
+    second = bench.wait_for_renewal(bench.master.received.index(first) + 1)
     if second.at - first.at > 2.5 * max(bench.scale, 0.4):
-        raise broken(
+        raise broken_rule(
             _("the interval between two renewals was {seconds:.1f} s").format(seconds=second.at - first.at)
         )
-    expect("renew.epoch", second.what.get("epoch"), bench.master.graph.epoch)
-    expect("renew.node_id", second.what.get("node_id"), bench.node_id)
+    expect("renew.epoch", second.fields.get("epoch"), bench.master.graph.epoch)
+    expect("renew.node_id", second.fields.get("node_id"), bench.node_id)
     for kind in ("publisher", "subscriber"):
         expect(f"renew.{kind}s", bench.record(kind, topic)["id"] in _ids(second, f"{kind}s"), True)
     member = bench.master.graph.members[bench.node_id]
@@ -52,13 +52,13 @@ def _renew(bench: Bench) -> None:
 )
 def _statistics(bench: Bench) -> None:
     topic, pub, subscriber = connected_publisher(bench)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=6)
-    bench.need(lambda: len(messages_of(subscriber)) == 6, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=6)
+    bench.require(lambda: len(messages_of(subscriber)) == 6, "message")
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b'{"a":1}')
-    bench.need(lambda: bool(bench.events(sub)), "message")
-    bench.renewal(len(bench.master.received))
-    found = bench.renewal(len(bench.master.received)).what
+    bench.require(lambda: bool(bench.events(sub)), "message")
+    bench.wait_for_renewal(len(bench.master.received))
+    found = bench.wait_for_renewal(len(bench.master.received)).fields
     id, subscriber_id = (
         bench.record("publisher", topic)["id"],
         bench.record("subscriber", publisher.topic)["id"],
@@ -78,16 +78,16 @@ def _next_s(bench: Bench) -> None:
     bench.master.change = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "next_s": wanted_s}} if reply["is"] == "renewed" else reply
     )
-    first = bench.renewal(len(bench.master.received))
-    second = bench.renewal(bench.master.received.index(first) + 1, 10.0)
+    first = bench.wait_for_renewal(len(bench.master.received))
+    second = bench.wait_for_renewal(bench.master.received.index(first) + 1, 10.0)
     if second.at - first.at < 0.8 * wanted_s:
-        raise broken(
+        raise broken_rule(
             _("it renewed after {seconds:.1f} s; 'next_s' was {wanted:g}").format(
                 wanted=wanted_s, seconds=second.at - first.at
             )
         )
     bench.master.change = lambda _request, reply: reply
-    bench.renewal(len(bench.master.received), 10.0)
+    bench.wait_for_renewal(len(bench.master.received), 10.0)
 
 
 @rule(
@@ -95,19 +95,19 @@ def _next_s(bench: Bench) -> None:
     lazy("A node answers 'again' with a 'join' that has all its publishers and subscribers."),
     _SECTION,
 )
-def _again(bench: Bench) -> None:
+def _rejoin_on_request(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     bench.new_sub(topic)
     ids = bench.record("publisher", topic)["id"], bench.record("subscriber", topic)["id"]
     count = len(bench.master.received)
     bench.master.drop(bench.node_id)
-    bench.need(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join")
+    bench.require(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join")
     join = next(each for each in bench.master.received[count:] if each.do == "join")
     expect("join.publishers", ids[0] in _ids(join, "publishers"), True)
     expect("join.subscribers", ids[1] in _ids(join, "subscribers"), True)
-    renewal = bench.renewal(bench.master.received.index(join) + 1)
-    expect("renew.epoch", renewal.what.get("epoch"), bench.master.graph.epoch)
+    renewal = bench.wait_for_renewal(bench.master.received.index(join) + 1)
+    expect("renew.epoch", renewal.fields.get("epoch"), bench.master.graph.epoch)
 
 
 @rule(
@@ -115,28 +115,28 @@ def _again(bench: Bench) -> None:
     lazy("A node joins a restarted master; no message is lost while the master is down."),
     _SECTION,
 )
-def _restart(bench: Bench) -> None:
+def _rejoin_restarted_master(bench: Bench) -> None:
     _topic, pub, subscriber = connected_publisher(bench)
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     bench.master.stop()
-    bench.ask("publish", pub=pub, value={"a": 1}, count=10)
+    bench.call("publish", pub=pub, value={"a": 1}, count=10)
     publisher.send(b'{"a":1}')
     bench.wait(0.3)
     count = len(bench.master.received)
     bench.master.start()
-    bench.need(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join", 10.0)
-    bench.list_publisher(publisher)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=10)
+    bench.require(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join", 10.0)
+    bench.register_publisher(publisher)
+    bench.call("publish", pub=pub, value={"a": 1}, count=10)
     publisher.send(b'{"a":1}')
-    bench.need(lambda: len(messages_of(subscriber)) == 20, "message")
-    bench.need(lambda: len(bench.events(sub)) == 2, "message")
+    bench.require(lambda: len(messages_of(subscriber)) == 20, "message")
+    bench.require(lambda: len(bench.events(sub)) == 2, "message")
     expect(
         "new connections",
-        sum(each.is_added and each.what in publisher.hellos for each in publisher.filters),
+        sum(each.is_added and each.prefix in publisher.hellos for each in publisher.filters),
         1,
     )
-    renewal = bench.renewal(len(bench.master.received))
-    expect("renew.epoch", renewal.what.get("epoch"), bench.master.graph.epoch)
+    renewal = bench.wait_for_renewal(len(bench.master.received))
+    expect("renew.epoch", renewal.fields.get("epoch"), bench.master.graph.epoch)
 
 
 @rule(
@@ -155,7 +155,7 @@ def _other_socket_at_master(bench: Bench) -> None:
     bench.fail_handshake("PUB", f"tcp://{bench.master.address}")
     count = len(bench.master.received)
     bench.master.start()
-    bench.need(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join", 10.0)
+    bench.require(lambda: any(each.do == "join" for each in bench.master.received[count:]), "join", 10.0)
     join = next(each for each in bench.master.received[count:] if each.do == "join")
     expect("join.subscribers", id in _ids(join, "subscribers"), True)
 
@@ -185,9 +185,9 @@ def _renewed_topics(bench: Bench) -> None:
         if reply["is"] == "renewed"
         else reply
     )
-    bench.need(lambda: bool(publisher.hellos), "hello")
+    bench.require(lambda: bool(publisher.hellos), "hello")
     publisher.send(b'{"a":1}')
-    bench.need(lambda: bool(bench.events(sub)), "message")
+    bench.require(lambda: bool(bench.events(sub)), "message")
 
 
 @rule(
@@ -195,7 +195,7 @@ def _renewed_topics(bench: Bench) -> None:
     lazy("Probes, unknown pushes, unknown fields and malformed replies are ignored."),
     "the-master",
 )
-def _unknown_answers(bench: Bench) -> None:
+def _unknown_replies(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
     epoch = bench.master.graph.epoch
@@ -209,8 +209,8 @@ def _unknown_answers(bench: Bench) -> None:
         b"",
     ):
         bench.master.push(bench.node_id, body)
-    bench.renewal(len(bench.master.received))
+    bench.wait_for_renewal(len(bench.master.received))
     publisher = bench.publisher(topic)
-    bench.need(lambda: bool(publisher.hellos), "hello")
+    bench.require(lambda: bool(publisher.hellos), "hello")
     publisher.send(b'{"a":1}')
-    bench.need(lambda: bool(bench.events(sub)), "message")
+    bench.require(lambda: bool(bench.events(sub)), "message")

@@ -12,7 +12,7 @@ from nep.programs.conformance.malformed import malformed_parts
 from nep.programs.conformance.peers import ScriptedPublisher
 from nep.programs.conformance.rule import rule
 from nep.programs.conformance.rules.messages import connected_publisher, connected_subscriber, messages_of
-from nep.programs.conformance.verdict import broken, expect, printable
+from nep.programs.conformance.verdict import broken_rule, expect, printable
 from nep.protocol.wire import Header, topic_part
 
 _NESTING_DEPTH = 100_000
@@ -21,10 +21,10 @@ _NESTING_DEPTH = 100_000
 def _expect_working(bench: Bench, publisher: ScriptedPublisher, sub: int) -> None:
     """Send a valid message and check that the adapter delivers it and no other."""
     publisher.send(b'{"good":1}', seq=1)
-    bench.need(lambda: any(_seq(each) == 1 for each in bench.events(sub)), "message")
+    bench.require(lambda: any(_seq(each) == 1 for each in bench.events(sub)), "message")
     others = [each for each in bench.events(sub) if each.get("publisher") != str(publisher.id)]
     if others:
-        raise broken(_("it delivered {seen}").format(seen=printable(others[0])))
+        raise broken_rule(_("it delivered {seen}").format(seen=printable(others[0])))
 
 
 def _seq(event: object) -> int:
@@ -42,7 +42,7 @@ def _send_malformed(publisher: ScriptedPublisher) -> Iterator[str]:
     lazy("Malformed messages are not delivered, and the subscriber keeps reading."),
     "order-of-checks",
 )
-def _malformed(bench: Bench) -> None:
+def _malformed_messages(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for _code in _send_malformed(publisher):
         bench.pump()
@@ -57,15 +57,15 @@ def _malformed(bench: Bench) -> None:
     "bounds",
     "statistics",
 )
-def _malformed_named(bench: Bench) -> None:
+def _malformed_messages_are_reported(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, sub = bench.subscribed_publisher(topic)
     head = Header(1, 0, 1, 1, 1).pack()
     publisher.socket.send_multipart([topic_part(topic), head[:31], b"{}"])
     _expect_working(bench, publisher, sub)
     id = bench.record("subscriber", topic)["id"]
-    bench.renewal(len(bench.master.received))
-    found = bench.renewal(len(bench.master.received)).what
+    bench.wait_for_renewal(len(bench.master.received))
+    found = bench.wait_for_renewal(len(bench.master.received)).fields
     (entry,) = (each for each in found.get("subscribers", ()) if each.get("id") == id)
     problem = entry.get("problem", "")
     if not isinstance(problem, str) or not problem:
@@ -73,7 +73,7 @@ def _malformed_named(bench: Bench) -> None:
 
 
 @rule("deep", lazy("Deeply nested JSON and msgpack do not stop a subscriber."), "messages")
-def _deep(bench: Bench) -> None:
+def _deep_nesting(bench: Bench) -> None:
     for msg_type, payload, good in (
         ("json", b"[" * _NESTING_DEPTH + b"]" * _NESTING_DEPTH, b"[1]"),
         ("msgpack", b"\x91" * _NESTING_DEPTH + b"\xc0", msgpack.packb([1])),
@@ -82,24 +82,24 @@ def _deep(bench: Bench) -> None:
         publisher.send(payload)
         publisher.send(payload[:1000])
         publisher.send(good)
-        bench.need(lambda: any(_seq(each) == 3 for each in bench.events(sub)), "message")  # noqa: B023
+        bench.require(lambda: any(_seq(each) == 3 for each in bench.events(sub)), "message")  # noqa: B023
 
 
 @rule("undecodable", lazy("Payloads that can't be decoded do not stop a subscriber."), "messages")
-def _undecodable(bench: Bench) -> None:
+def _undecodable_payloads(bench: Bench) -> None:
     for msg_type, payload in (("json", b'{"a":'), ("string", b"\xff\xfe"), ("msgpack", b"\xc1")):
         publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
         publisher.send(b"1" if msg_type != "msgpack" else b"\x01")
-        bench.need(lambda: any(_seq(each) == 2 for each in bench.events(sub)), "message")  # noqa: B023
+        bench.require(lambda: any(_seq(each) == 2 for each in bench.events(sub)), "message")  # noqa: B023
 
 
 @rule("large", lazy("Messages of 8 MB are received intact."), "bounds")
-def _large(bench: Bench) -> None:
+def _large_messages(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, sub = bench.subscribed_publisher(topic, "bytes")
     publisher.send(bytes(8 * 2**20))
-    bench.need(lambda: bool(bench.events(sub)), "message", 10.0)
+    bench.require(lambda: bool(bench.events(sub)), "message", 10.0)
     expect("payload", len(str(bench.events(sub)[0].get("payload"))), 4 * ((8 * 2**20 + 2) // 3))
 
 
@@ -122,8 +122,8 @@ def _unknown_filters(bench: Bench) -> None:
         bad.socket.subscribe(what)
     bad.socket.subscribe(b"\xff" * 5000)
     bench.wait(0.2)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=3)
-    bench.need(lambda: len(messages_of(good)) == 3, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=3)
+    bench.require(lambda: len(messages_of(good)) == 3, "message")
     other = connected_subscriber(bench, topic, 3)
-    bench.ask("publish", pub=pub, value={"a": 1})
-    bench.need(lambda: len(messages_of(other)) == 1, "message")
+    bench.call("publish", pub=pub, value={"a": 1})
+    bench.require(lambda: len(messages_of(other)) == 1, "message")

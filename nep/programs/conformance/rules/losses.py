@@ -15,7 +15,7 @@ _SECTION = "notices"
 
 def _expect_counts(bench: Bench, sub: int, received: int, lost: int) -> None:
     """Wait until the adapter's subscriber has these counts. Other counts break the rule."""
-    bench.need(lambda: len(bench.events(sub)) >= received, "message")
+    bench.require(lambda: len(bench.events(sub)) >= received, "message")
     for _turn in range(40):
         if bench.counts(sub) == (received, lost):
             return
@@ -31,7 +31,7 @@ def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
         else reply
     )
     for _turn in range(3):
-        bench.renewal(len(bench.master.received))
+        bench.wait_for_renewal(len(bench.master.received))
 
 
 @rule(
@@ -61,7 +61,7 @@ def _lost_echo(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.seq = 5
-    publisher.echo(next(iter(publisher.hellos)))
+    publisher.send_echo(next(iter(publisher.hellos)))
     publisher.send(b"1")
     _expect_counts(bench, sub, 2, 4)
 
@@ -76,7 +76,7 @@ def _lost_bye(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.seq = 4
-    publisher.bye()
+    publisher.send_byes()
     _expect_counts(bench, sub, 1, 3)
 
 
@@ -89,7 +89,7 @@ def _lost_bye(bench: Bench) -> None:
 def _lost_last_seq(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
-    bench.need(lambda: bool(bench.events(sub)), "message")
+    bench.require(lambda: bool(bench.events(sub)), "message")
     _report_last_seq(bench, publisher.id, 3)
     _expect_counts(bench, sub, 1, 2)
 
@@ -115,7 +115,7 @@ def _lost_late(bench: Bench) -> None:
     _SECTION,
     "losses",
 )
-def _lost_leap(bench: Bench) -> None:
+def _lost_seq_jump(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     publisher.send(b"1")
     publisher.send(b"1", seq=2**40)
@@ -129,16 +129,16 @@ def _lost_leap(bench: Bench) -> None:
     "how-a-publisher-ends",
     "losses",
 )
-def _lost_new(bench: Bench) -> None:
+def _lost_from_new_publisher(bench: Bench) -> None:
     topic = bench.new_topic()
     sub = bench.new_sub(topic)
     new, rejoined = bench.publisher(topic, echoes=False), bench.publisher(topic, is_listed=False)
-    bench.need(lambda: bool(new.hellos), "hello")
+    bench.require(lambda: bool(new.hellos), "hello")
     new.send(b"1", seq=5)
     _expect_counts(bench, sub, 1, 4)
     rejoined.seq = 100
     bench.master.repeat_pushes(bench.node_id, rejoined.record, rejoined.node)  # without is_new
-    bench.need(lambda: bool(rejoined.hellos), "hello")
+    bench.require(lambda: bool(rejoined.hellos), "hello")
     rejoined.send(b"1", seq=101)
     _expect_counts(bench, sub, 2, 4)
 
@@ -155,6 +155,6 @@ def _lost_unreachable(bench: Bench) -> None:
     publisher = bench.publisher(topic, is_listed=False)
     with closed_port() as endpoint:
         publisher.record = replace(publisher.record, endpoints=(endpoint,))
-        bench.list_publisher(publisher)
+        bench.register_publisher(publisher)
         _report_last_seq(bench, publisher.id, 7)
         _expect_counts(bench, sub, 0, 7)

@@ -15,13 +15,13 @@ from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import ScriptedSubscriber
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, printable
+from nep.programs.conformance.verdict import broken_rule, expect, printable
 from nep.protocol.batch import read_parts
-from nep.protocol.wire import BATCH, Parts, topic_part, unpack_at
+from nep.protocol.wire import BATCH, Parts, topic_part, unpack_header_at
 
 _BURST = 200
 _STAMP_NS = 60_000_000_000
-_SENT: Mapping[str, tuple[dict[str, object], bytes]] = {
+_SAMPLES: Mapping[str, tuple[dict[str, object], bytes]] = {
     "json": ({"value": {"text": "größe", "n": 2**53 - 1}}, b""),
     "string": ({"text": "größe\n機器人"}, "größe\n機器人".encode()),
     "bytes": ({"bytes": base64.b64encode(bytes(range(256))).decode()}, bytes(range(256))),
@@ -36,7 +36,7 @@ def connected_subscriber(
     endpoint = bench.record("publisher", topic)["endpoints"][0]
     subscriber = bench.subscriber(topic, msg_type, level=level, endpoint=endpoint)
     if level is not None:
-        bench.need(lambda: bool(subscriber.echoes), "echo")
+        bench.require(lambda: bool(subscriber.echoes), "echo")
     return subscriber
 
 
@@ -58,7 +58,7 @@ def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
     try:
         return subscriber.messages
     except WireError as error:
-        raise broken(
+        raise broken_rule(
             _("a message can't be parsed ({code}): {reason}").format(code=error.code, reason=error.reason)
         ) from error
 
@@ -67,10 +67,10 @@ def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
     """Return a subscriber without a hello, once it receives messages of the adapter's publisher."""
     subscriber = connected_subscriber(bench, topic, None)
     for _turn in range(200):
-        bench.ask("publish", pub=pub, value={"warm": True})
-        if bench.until(lambda: bool(subscriber.received), 0.05):
+        bench.call("publish", pub=pub, value={"warm": True})
+        if bench.wait_until(lambda: bool(subscriber.received), 0.05):
             return subscriber
-    raise broken(_("no '{what}' within {seconds:g} s").format(what="message", seconds=10.0))
+    raise broken_rule(_("no '{what}' within {seconds:g} s").format(what="message", seconds=10.0))
 
 
 @rule(
@@ -82,13 +82,13 @@ def _three_parts(bench: Bench) -> None:
     topic, pub, other = connected_publisher(bench)
     subscriber = _plain_subscriber(bench, topic, pub)
     count = len(subscriber.received)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
-    bench.need(lambda: len(subscriber.received) >= count + _BURST, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
+    bench.require(lambda: len(subscriber.received) >= count + _BURST, "message")
     for parts in subscriber.raw:
         expect("parts", len(parts), 3)
         expect("topic", parts[0], topic_part(topic))
     messages_of(subscriber)
-    bench.need(lambda: len(messages_of(other)) >= count + _BURST, "message")
+    bench.require(lambda: len(messages_of(other)) >= count + _BURST, "message")
 
 
 @rule(
@@ -99,11 +99,11 @@ def _three_parts(bench: Bench) -> None:
 def _batches_to_readers(bench: Bench) -> None:
     topic, pub, subscriber = connected_publisher(bench, 1)
     connected_subscriber(bench, topic, 3)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
-    bench.need(lambda: bool(subscriber.raw) and _last_seq(subscriber) >= _BURST, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
+    bench.require(lambda: bool(subscriber.raw) and _last_seq(subscriber) >= _BURST, "message")
     for parts in subscriber.raw:
-        if len(parts) == 1 and unpack_at(parts[0], len(topic_part(topic)))[0] >> 16 & BATCH:
-            raise broken(_("it sent a batch to a subscriber whose hello has level 1"))
+        if len(parts) == 1 and unpack_header_at(parts[0], len(topic_part(topic)))[0] >> 16 & BATCH:
+            raise broken_rule(_("it sent a batch to a subscriber whose hello has level 1"))
 
 
 def _last_seq(subscriber: ScriptedSubscriber) -> int:
@@ -115,17 +115,17 @@ def _last_seq(subscriber: ScriptedSubscriber) -> int:
     lazy("Messages can be sent in any form that the subscriber reads; none is lost or out of order."),
     "one-part",
 )
-def _forms(bench: Bench) -> None:
+def _message_forms(bench: Bench) -> None:
     for level in (0, 1, 2, 3):
         _topic, pub, subscriber = connected_publisher(bench, level)
-        bench.ask("publish", pub=pub, value={"a": 1}, count=_BURST)
-        bench.need(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called immediately
+        bench.call("publish", pub=pub, value={"a": 1}, count=_BURST)
+        bench.require(lambda: len(messages_of(subscriber)) >= _BURST, "message")  # noqa: B023 - called immediately
         seqs = [each.header.seq for each in messages_of(subscriber)]
         if seqs != list(range(1, _BURST + 1)):
-            raise broken(_("the seqs are {seen}").format(seen=printable(seqs)))
+            raise broken_rule(_("the seqs are {seen}").format(seen=printable(seqs)))
         numbers = [json.loads(bytes(each.payload)).get("n") for each in messages_of(subscriber)]
         if numbers != list(range(1, _BURST + 1)):
-            raise broken(_("the messages are not in order: {seen}").format(seen=printable(numbers)))
+            raise broken_rule(_("the messages are not in order: {seen}").format(seen=printable(numbers)))
 
 
 @rule(
@@ -134,10 +134,10 @@ def _forms(bench: Bench) -> None:
     "messages",
 )
 def _header(bench: Bench) -> None:
-    for msg_type, (members, _payload) in _SENT.items():
+    for msg_type, (members, _payload) in _SAMPLES.items():
         topic, pub, subscriber = connected_publisher(bench, 0, msg_type)
-        bench.ask("publish", pub=pub, **members)
-        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
+        bench.call("publish", pub=pub, **members)
+        bench.require(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
         found = messages_of(subscriber)[0].header
         expect("header.codec", found.codec, codec_for(msg_type).number)
         expect("header.flags", found.flags, 0)
@@ -151,10 +151,10 @@ def _header(bench: Bench) -> None:
     "messages",
 )
 def _payload(bench: Bench) -> None:
-    for msg_type, (members, wanted) in _SENT.items():
+    for msg_type, (members, wanted) in _SAMPLES.items():
         _topic, pub, subscriber = connected_publisher(bench, 0, msg_type)
-        bench.ask("publish", pub=pub, **members)
-        bench.need(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
+        bench.call("publish", pub=pub, **members)
+        bench.require(lambda: bool(subscriber.raw), "message")  # noqa: B023 - called immediately
         data = bytes(read_parts(subscriber.raw[0])[0].payload)
         try:
             if msg_type == "json":
@@ -164,7 +164,7 @@ def _payload(bench: Bench) -> None:
             else:
                 expect("payload", data, wanted)
         except ValueError as error:
-            raise broken(
+            raise broken_rule(
                 _("the payload {seen} is not valid {msg_type}").format(
                     seen=printable(data), msg_type=msg_type
                 )
@@ -176,13 +176,13 @@ def _payload(bench: Bench) -> None:
     lazy("Seqs also count messages that were published without subscribers."),
     "messages",
 )
-def _seq_unheard(bench: Bench) -> None:
+def _seq_without_subscribers(bench: Bench) -> None:
     topic = bench.new_topic()
     pub = bench.new_pub(topic)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=7)
+    bench.call("publish", pub=pub, value={"a": 1}, count=7)
     subscriber = connected_subscriber(bench, topic, 0)
-    bench.ask("publish", pub=pub, value={"a": 1})
-    bench.need(lambda: bool(subscriber.raw), "message")
+    bench.call("publish", pub=pub, value={"a": 1})
+    bench.require(lambda: bool(subscriber.raw), "message")
     expect("header.seq", messages_of(subscriber)[0].header.seq, 8)
 
 
@@ -193,11 +193,11 @@ def _seq_unheard(bench: Bench) -> None:
 )
 def _stamp(bench: Bench) -> None:
     _topic, pub, subscriber = connected_publisher(bench)
-    bench.ask("publish", pub=pub, value={"a": 1}, count=20)
-    bench.need(lambda: len(messages_of(subscriber)) >= 20, "message")
+    bench.call("publish", pub=pub, value={"a": 1}, count=20)
+    bench.require(lambda: len(messages_of(subscriber)) >= 20, "message")
     stamps = [each.header.stamp_ns for each in messages_of(subscriber)]
     now = time.time_ns()
     if any(abs(now - each) > _STAMP_NS for each in stamps):
-        raise broken(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
+        raise broken_rule(_("the stamp is {seen}; the time is {now}").format(seen=stamps[0], now=now))
     if stamps != sorted(stamps):
-        raise broken(_("the stamps are {seen}").format(seen=printable(stamps)))
+        raise broken_rule(_("the stamps are {seen}").format(seen=printable(stamps)))

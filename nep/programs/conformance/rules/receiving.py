@@ -10,10 +10,10 @@ import msgpack  # type: ignore[import-untyped]
 from nep.i18n import _, lazy
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, printable
-from nep.protocol.wire import LATCHED, parse_read
+from nep.programs.conformance.verdict import broken_rule, expect, printable
+from nep.protocol.wire import LATCHED, parse_acknowledgement
 
-_SENT: Mapping[str, tuple[bytes, object]] = {
+_SAMPLES: Mapping[str, tuple[bytes, object]] = {
     "json": ('{"text":"größe","n":[1,null,true]}'.encode(), {"text": "größe", "n": [1, None, True]}),
     "string": ("größe\n機器人".encode(), "größe\n機器人"),
     "bytes": (bytes(range(256)), None),
@@ -23,7 +23,7 @@ _SENT: Mapping[str, tuple[bytes, object]] = {
 
 def _expect_seqs(bench: Bench, sub: int, count: int, first: int = 1) -> None:
     """Wait for `count` messages and check that their sequence numbers are consecutive from `first`."""
-    bench.need(lambda: len(bench.events(sub)) >= count, "message")
+    bench.require(lambda: len(bench.events(sub)) >= count, "message")
     bench.wait(0.05)
     seqs = [each.get("seq") for each in bench.events(sub)]
     expect("seq", seqs, [str(number) for number in range(first, first + count)])
@@ -31,7 +31,7 @@ def _expect_seqs(bench: Bench, sub: int, count: int, first: int = 1) -> None:
 
 @rule("reads-parts", lazy("A subscriber reads messages of three parts, of every codec."), "messages")
 def _reads_parts(bench: Bench) -> None:
-    for msg_type, (payload, value) in _SENT.items():
+    for msg_type, (payload, value) in _SAMPLES.items():
         publisher, sub = bench.subscribed_publisher(bench.new_topic(), msg_type)
         publisher.send(payload)
         _expect_seqs(bench, sub, 1)
@@ -65,7 +65,7 @@ def _reads_batches(bench: Bench) -> None:
 
 
 @rule("reads-alone", lazy("A subscriber reads messages whose first part is its hello."), "notices")
-def _reads_alone(bench: Bench) -> None:
+def _reads_messages_under_hello(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for form in ("alone", "parts", "alone"):
         publisher.send(b'{"a":1}', form)
@@ -108,24 +108,24 @@ def _other_topics(bench: Bench) -> None:
     "what-is-under-way",
     "hello2",
 )
-def _read(bench: Bench) -> None:
+def _read_acknowledgement(bench: Bench) -> None:
     topic = bench.new_topic()
     publisher, sub = bench.subscribed_publisher(topic)
-    before = [parse_read(each.what) for each in publisher.filters]
+    before = [parse_acknowledgement(each.prefix) for each in publisher.filters]
     if any(each is not None for each in before):
-        raise broken(_("it answered the first echo"))
+        raise broken_rule(_("it answered the first echo"))
     publisher.send(b'{"a":1}')
     publisher.send(b'{"a":1}')
-    publisher.echo(next(iter(publisher.hellos)))
-    bench.need(lambda: any(parse_read(each.what) for each in publisher.filters), "read")
+    publisher.send_echo(next(iter(publisher.hellos)))
+    bench.require(lambda: any(parse_acknowledgement(each.prefix) for each in publisher.filters), "read")
     _expect_seqs(bench, sub, 2)
-    answers = [each for each in publisher.filters if parse_read(each.what) is not None]
-    found = parse_read(answers[0].what)
+    answers = [each for each in publisher.filters if parse_acknowledgement(each.prefix) is not None]
+    found = parse_acknowledgement(answers[0].prefix)
     expect("read.subscriber", found and found.subscriber, bench.record("subscriber", topic)["id"])
     expect("read.publisher", found and found.publisher, publisher.id)
     expect("read.seq", found and found.seq, 2)
-    bench.need(
-        lambda: any(not each.is_added and parse_read(each.what) for each in publisher.filters),
+    bench.require(
+        lambda: any(not each.is_added and parse_acknowledgement(each.prefix) for each in publisher.filters),
         "read taken back",
     )
 
@@ -139,7 +139,7 @@ def _receives_in_order(bench: Bench) -> None:
     publisher, sub = bench.subscribed_publisher(bench.new_topic())
     for number in range(500):
         publisher.send(b'{"n":%d}' % number)
-    bench.need(lambda: len(bench.events(sub)) >= 500, "message")
+    bench.require(lambda: len(bench.events(sub)) >= 500, "message")
     seqs = [each.get("seq") for each in bench.events(sub)]
     if seqs != [str(number) for number in range(1, 501)]:
-        raise broken(_("the seqs are {seen}").format(seen=printable(seqs)))
+        raise broken_rule(_("the seqs are {seen}").format(seen=printable(seqs)))

@@ -10,7 +10,7 @@ from nep.i18n import _, lazy
 from nep.messages.codecs import codec_for
 from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, printable
+from nep.programs.conformance.verdict import broken_rule, expect, printable
 from nep.protocol.requests import COUNT_MAX, id_from, node_id_from
 
 _NODE_ID = re.compile(r"[0-9a-f]{16}")
@@ -21,7 +21,7 @@ _ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)
 def _text(what: str, record: Mapping[str, Any], name: str) -> str:
     value = record.get(name)
     if not isinstance(value, str):
-        raise broken(
+        raise broken_rule(
             _("{what} is {seen}, expected {wanted}").format(
                 what=f"{what}.{name}", seen=printable(value), wanted="text"
             )
@@ -31,7 +31,7 @@ def _text(what: str, record: Mapping[str, Any], name: str) -> str:
 
 def _integer(what: str, value: object, least: int, most: int) -> int:
     if type(value) is not int or not least <= value <= most:
-        raise broken(
+        raise broken_rule(
             _("{what} is {seen}, expected an integer from {least} to {most}").format(
                 what=what, seen=printable(value), least=least, most=most
             )
@@ -48,12 +48,12 @@ def _node_record(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_sub(topic)
     bench.record("subscriber", topic)
-    node = bench.requests("subscriber+")[-1].what.get("node")
+    node = bench.requests("subscriber+")[-1].fields.get("node")
     if not isinstance(node, dict):
         expect("node", node, {})
         return
     if not _NODE_ID.fullmatch(_text("node", node, "id")):
-        raise broken(
+        raise broken_rule(
             _("node.id is {seen}, expected 16 lowercase hexadecimal digits").format(
                 seen=printable(node["id"])
             )
@@ -76,7 +76,7 @@ def _node_key(bench: Bench) -> None:
     topic = bench.new_topic()
     bench.new_pub(topic)
     record = bench.record("publisher", topic)
-    node = bench.requests("publisher+")[-1].what["node"]
+    node = bench.requests("publisher+")[-1].fields["node"]
     key = _text("node", node, "key")
     expect("node.id", node.get("id"), node_id_from(key))
     number = _integer("publisher.number", record.get("number"), 1, COUNT_MAX)
@@ -86,7 +86,7 @@ def _node_key(bench: Bench) -> None:
     other = _integer("subscriber.number", subscriber.get("number"), 1, COUNT_MAX)
     expect("subscriber.id", subscriber.get("id"), id_from(key, other))
     if other == number:
-        raise broken(_("publisher and subscriber have the same number {number}").format(number=number))
+        raise broken_rule(_("publisher and subscriber have the same number {number}").format(number=number))
 
 
 @rule(
@@ -119,7 +119,7 @@ def _publisher_port(bench: Bench) -> None:
     for endpoint in bench.record("publisher", topic).get("endpoints", ()):
         found = _ENDPOINT.fullmatch(str(endpoint))
         if found is not None and int(found.group(2)) in _ORIGINAL_PORTS:
-            raise broken(_("its endpoint is {endpoint}").format(endpoint=printable(endpoint)))
+            raise broken_rule(_("its endpoint is {endpoint}").format(endpoint=printable(endpoint)))
 
 
 @rule(
@@ -148,6 +148,6 @@ def _request_form(bench: Bench) -> None:
     calls: dict[tuple[str, int], object] = {}
     for each in bench.master.received:
         if each.problem:
-            raise broken(_("a request is malformed: {problem}").format(problem=each.problem))
-        if calls.setdefault((each.sender, each.call), (each.do, each.what)) != (each.do, each.what):
-            raise broken(_("two requests have the call number {call}").format(call=each.call))
+            raise broken_rule(_("a request is malformed: {problem}").format(problem=each.problem))
+        if calls.setdefault((each.sender, each.call), (each.do, each.fields)) != (each.do, each.fields):
+            raise broken_rule(_("two requests have the call number {call}").format(call=each.call))

@@ -16,9 +16,9 @@ from nep.programs.conformance.bench import Bench
 from nep.programs.conformance.peers import new_node
 from nep.programs.conformance.ports import bind_again, closed_port
 from nep.programs.conformance.rule import rule
-from nep.programs.conformance.verdict import broken, expect, printable
+from nep.programs.conformance.verdict import broken_rule, expect, printable
 from nep.protocol.requests import AddPublisher, Leave, PublisherRecord
-from nep.protocol.service_wire import NATIVE, SERVICE_TYPE, CallKind, Reply, failure, topic_of
+from nep.protocol.service_wire import NATIVE, SERVICE_TYPE, CallKind, Reply, error_reply, topic_of
 from nep.protocol.wire import topic_part
 
 _SECTION = "services.md#calls-and-answers"
@@ -34,17 +34,17 @@ def _socket(bench: Bench, kind: int) -> Iterator[zmq.Socket[bytes]]:
         socket.close(0)
 
 
-def _answers(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[int | None, Reply]:
+def _replies(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[int | None, Reply]:
     """Wait for the replies to these calls, and return all replies received."""
     found: dict[int | None, Reply] = {}
 
     def has_all() -> bool:
         while socket.poll(0):
-            read = NATIVE.read_answer(socket.recv_multipart())
+            read = NATIVE.read_reply(socket.recv_multipart())
             found[read.number] = read.reply
         return wanted <= found.keys()
 
-    bench.need(has_all, "answer")
+    bench.require(has_all, "answer")
     return found
 
 
@@ -56,7 +56,7 @@ def _answers(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[
 )
 def _service_record(bench: Bench) -> None:
     name = bench.new_topic()
-    bench.ask("serve", service=name)
+    bench.call("serve", service=name)
     record = bench.record("publisher", topic_of(name))
     expect("publisher.msg_type", record.get("msg_type"), SERVICE_TYPE)
     expect("publisher.codec", record.get("codec"), SERVICE_TYPE)
@@ -68,14 +68,14 @@ def _service_record(bench: Bench) -> None:
     _SECTION,
     "services",
 )
-def _service_answer(bench: Bench) -> None:
+def _service_reply(bench: Bench) -> None:
     name = bench.new_topic()
-    bench.ask("serve", service=name)
+    bench.call("serve", service=name)
     with _socket(bench, zmq.DEALER) as socket:
         socket.connect(bench.record("publisher", topic_of(name))["endpoints"][0])
         for number in (7, 2**64 - 1):
             socket.send_multipart(NATIVE.call(number, _JSON, _CALL_S, b'{"a":1}'))
-        for reply in _answers(bench, socket, {7, 2**64 - 1}).values():
+        for reply in _replies(bench, socket, {7, 2**64 - 1}).values():
             expect("kind", int(reply.kind), int(CallKind.ANSWER))
             expect("codec", reply.codec, _JSON)
             expect("payload", json.loads(bytes(reply.data)), {"a": 1})
@@ -89,7 +89,7 @@ def _service_answer(bench: Bench) -> None:
 )
 def _service_malformed(bench: Bench) -> None:
     name = bench.new_topic()
-    bench.ask("serve", service=name)
+    bench.call("serve", service=name)
     (head, payload) = NATIVE.call(1, _JSON, _CALL_S, b"{}")
     with _socket(bench, zmq.DEALER) as socket:
         socket.connect(bench.record("publisher", topic_of(name))["endpoints"][0])
@@ -97,7 +97,7 @@ def _service_malformed(bench: Bench) -> None:
             socket.send_multipart(parts)
         socket.send_multipart(NATIVE.call(2, _JSON, _CALL_S, b'{"a":'))
         socket.send_multipart(NATIVE.call(3, _JSON, _CALL_S, b"[]"))
-        found = _answers(bench, socket, {2, 3})
+        found = _replies(bench, socket, {2, 3})
         expect("answers", sorted(each or 0 for each in found), [2, 3])
         expect("kind", int(found[2].kind), int(CallKind.REFUSED))
 
@@ -106,12 +106,12 @@ def _service_malformed(bench: Bench) -> None:
 def _server(bench: Bench, name: str) -> Iterator[zmq.Socket[bytes]]:
     with _socket(bench, zmq.ROUTER) as socket:
         port = socket.bind_to_random_port("tcp://127.0.0.1")
-        with _listed_server(bench, name, f"tcp://127.0.0.1:{port}"):
+        with _registered_server(bench, name, f"tcp://127.0.0.1:{port}"):
             yield socket
 
 
 @contextmanager
-def _listed_server(bench: Bench, name: str, endpoint: str) -> Iterator[None]:
+def _registered_server(bench: Bench, name: str, endpoint: str) -> Iterator[None]:
     node = new_node("tester_server")
     id = secrets.randbits(62) | 1
     record = PublisherRecord(id, topic_of(name), SERVICE_TYPE, SERVICE_TYPE, (endpoint,))
@@ -122,17 +122,17 @@ def _listed_server(bench: Bench, name: str, endpoint: str) -> Iterator[None]:
         bench.master.submit(Leave(node.id))
 
 
-def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) -> Any:  # noqa: ANN401 - JSON
+def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) -> Any:  # noqa: ANN401 - JSON
     """Reply to the adapter's pending call, and return the value that the adapter's client received."""
-    bench.need(lambda: bool(socket.poll(0)), "call")
+    bench.require(lambda: bool(socket.poll(0)), "call")
     sender, *parts = socket.recv_multipart()
     call = NATIVE.read_call(parts)
     expect("call.codec", call.codec in {1, 4}, True)
     if call.timeout_s is None or not 0 < call.timeout_s <= 2 * _CALL_S:
-        raise broken(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
+        raise broken_rule(_("the call's timeout is {seen}").format(seen=printable(call.timeout_s)))
     data = reply.data if reply.kind != CallKind.ANSWER else call.data
     answer = Reply(reply.kind, data, call.codec if reply.kind == CallKind.ANSWER else _JSON)
-    socket.send_multipart([sender, *NATIVE.answer(call.number, answer)])
+    socket.send_multipart([sender, *NATIVE.reply(call.number, answer)])
     return bench.finish(number, "call").get("value")
 
 
@@ -145,8 +145,8 @@ def _called(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) 
 def _service_call(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
-        number = bench.adapter.begin("call", service=name, value={"a": [1, None]}, timeout_s=_CALL_S)
-        value = _called(bench, socket, number, Reply(CallKind.ANSWER, b""))
+        number = bench.adapter.send_request("call", service=name, value={"a": [1, None]}, timeout_s=_CALL_S)
+        value = _reply_to_call(bench, socket, number, Reply(CallKind.ANSWER, b""))
         expect("value", value, {"a": [1, None]})
 
 
@@ -163,12 +163,12 @@ def _other_socket_at_server(bench: Bench) -> None:
     name = bench.new_topic()
     with closed_port() as endpoint:
         pass
-    with _listed_server(bench, name, endpoint):
-        number = bench.adapter.begin("call", service=name, value=1, timeout_s=_CALL_S)
+    with _registered_server(bench, name, endpoint):
+        number = bench.adapter.send_request("call", service=name, value=1, timeout_s=_CALL_S)
         bench.fail_handshake("PUB", endpoint)
         with _socket(bench, zmq.ROUTER) as socket:
             bind_again(socket, endpoint)
-            value = _called(bench, socket, number, Reply(CallKind.ANSWER, b""))
+            value = _reply_to_call(bench, socket, number, Reply(CallKind.ANSWER, b""))
     expect("value", value, 1)
 
 
@@ -182,12 +182,14 @@ def _service_error(bench: Bench) -> None:
     name = bench.new_topic()
     with _server(bench, name) as socket:
         for kind, error in ((CallKind.ERROR, "ValueError"), (CallKind.REFUSED, "")):
-            number = bench.adapter.begin("call", service=name, value={}, timeout_s=_CALL_S)
+            number = bench.adapter.send_request("call", service=name, value={}, timeout_s=_CALL_S)
             try:
-                value = _called(bench, socket, number, failure(kind, error, "rejected by the tester"))
+                value = _reply_to_call(
+                    bench, socket, number, error_reply(kind, error, "rejected by the tester")
+                )
             except AdapterError:
                 continue
-            raise broken(_("it returned {seen} as the reply").format(seen=printable(value)))
+            raise broken_rule(_("it returned {seen} as the reply").format(seen=printable(value)))
 
 
 @rule(
@@ -202,10 +204,10 @@ def _pattern(bench: Bench) -> None:
     expect("subscriber.pattern", bench.record("subscriber", f"{place}/*").get("pattern"), True)
     publishers = [bench.publisher(f"{place}/{name}") for name in ("one", "two")]
     for publisher in publishers:
-        bench.need(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called immediately
-        if topic_part(publisher.topic) not in [each.what for each in publisher.filters]:
-            raise broken(_("it did not subscribe to {topic}").format(topic=publisher.topic))
+        bench.require(lambda: bool(publisher.hellos), "hello")  # noqa: B023 - called immediately
+        if topic_part(publisher.topic) not in [each.prefix for each in publisher.filters]:
+            raise broken_rule(_("it did not subscribe to {topic}").format(topic=publisher.topic))
         publisher.send(b'{"a":1}')
-    bench.need(lambda: len(bench.events(sub)) >= 2, "message")
+    bench.require(lambda: len(bench.events(sub)) >= 2, "message")
     topics = {each.get("topic") for each in bench.events(sub)}
     expect("topics", topics, {publisher.topic for publisher in publishers})

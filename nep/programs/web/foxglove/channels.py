@@ -13,7 +13,7 @@ from nep.errors import NepError
 from nep.i18n import _
 from nep.messages.codecs import codec_for
 from nep.messages.message import Message
-from nep.nodes.loop_wait import give_way
+from nep.nodes.loop_wait import yield_to_loop
 from nep.nodes.subscriber import Subscriber
 from nep.programs.web.context import PageContext, PageTopic
 from nep.programs.web.foxglove.protocol import MAX_ID, message_frame
@@ -22,9 +22,9 @@ from nep.programs.web.messages.operations import Subscribe
 from nep.programs.web.messages.payloads import ros_type_of
 from nep.programs.web.outgoing import Frame, json_bytes
 from nep.programs.web.rosbridge.page_topics import read_messages, subscribed_topic
-from nep.programs.web.send_queue import Feed, Queued
+from nep.programs.web.send_queue import Feed, QueuedMessage
 
-_ADVERTISED_TOGETHER = 100
+_MAX_CHANNELS_PER_MESSAGE = 100
 """Maximum number of channels advertised in one message, because each includes its schema."""
 
 
@@ -55,10 +55,10 @@ class ChannelSchema(Protocol):
 class ChannelFormat(Protocol):
     """Encoder of messages for channels, implemented by `nep.recordings.formats.channels.LiveChannels`."""
 
-    def expected(self, topic: str, msg_type: str) -> ChannelSchema:
+    def expected_channel(self, topic: str, msg_type: str) -> ChannelSchema:
         """Return the most likely channel for a topic on which no message was received yet."""
 
-    def encoded(self, message: Message, log_ns: int) -> tuple[ChannelSchema, bytes]:
+    def encode(self, message: Message, log_ns: int) -> tuple[ChannelSchema, bytes]:
         """Return the channel of a message and the message's encoded data."""
 
 
@@ -98,7 +98,7 @@ class Channels:
         self._last_id = 0
 
     @property
-    def subscribed(self) -> tuple[PageTopic, ...]:
+    def subscribed_topics(self) -> tuple[PageTopic, ...]:
         """Topics to which the client subscribes. Thread-safe."""
         return tuple(subscribed_topic(each.feed) for each in self._subscriptions.copy().values())
 
@@ -115,14 +115,14 @@ class Channels:
         for topic, channel in list(self._channels.items()):
             if found.get(topic) != channel.msg_type:
                 del self._channels[topic]
-                await self._withdraw(channel)
+                await self._unadvertise(channel)
         new = [(topic, msg_type) for topic, msg_type in found.items() if topic not in self._channels]
-        for begin in range(0, len(new), _ADVERTISED_TOGETHER):
+        for begin in range(0, len(new), _MAX_CHANNELS_PER_MESSAGE):
             self._advertise(
-                (topic, msg_type, self._format.expected(topic, _readable_type(msg_type)))
-                for topic, msg_type in new[begin : begin + _ADVERTISED_TOGETHER]
+                (topic, msg_type, self._format.expected_channel(topic, _readable_type(msg_type)))
+                for topic, msg_type in new[begin : begin + _MAX_CHANNELS_PER_MESSAGE]
             )
-            await give_way()
+            await yield_to_loop()
 
     def _advertise(self, topics: Iterable[tuple[str, str, ChannelSchema]]) -> None:
         channels = []
@@ -143,7 +143,7 @@ class Channels:
             )
         self._tell({"op": "advertise", "channels": channels})
 
-    async def _withdraw(self, channel: _Channel) -> None:
+    async def _unadvertise(self, channel: _Channel) -> None:
         self._tell({"op": "unadvertise", "channelIds": [channel.id]})
         for each in [each for each in self._subscriptions.values() if each.channel is channel]:
             await self.unsubscribe(each.id)
@@ -162,7 +162,7 @@ class Channels:
                 _("this page already subscribes to {count} topics, the maximum").format(count=MAX_TOPICS)
             )
         topic, msg_type = channel.definition.topic, channel.msg_type
-        subscriber = await self._context.in_thread(
+        subscriber = await self._context.run_in_thread(
             self._context.node.new_sub, topic, msg_type, wildcards=False
         )
         feed = Feed(topic, msg_type)
@@ -180,18 +180,18 @@ class Channels:
             return
         known.reader.cancel()
         self._context.queue.remove(known.feed)
-        await self._context.in_thread(known.subscriber.close)
+        await self._context.run_in_thread(known.subscriber.close)
 
-    async def frames_of(self, queued: Queued) -> list[Frame]:
+    async def frames_of(self, queued: QueuedMessage) -> list[Frame]:
         """Encode a message for the client. Raises `NepError` if the message can't be decoded."""
         message = queued.message
         known = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
         if known is None:
             return []
         log_ns = time.time_ns()
-        definition, data = self._format.encoded(_readable(message), log_ns)
-        if _shape(definition) != _shape(known.channel.definition):  # raw pixels, for example
-            await self._withdraw(known.channel)
+        definition, data = self._format.encode(_readable_message(message), log_ns)
+        if _schema_key(definition) != _schema_key(known.channel.definition):  # raw pixels, for example
+            await self._unadvertise(known.channel)
             self._advertise([(message.topic, known.channel.msg_type, definition)])
             return []
         return [message_frame(known.id, log_ns, data)]
@@ -208,12 +208,12 @@ def _readable_type(msg_type: str) -> str:
     return "json" if codec_for(msg_type).name == "msgpack" else msg_type
 
 
-def _readable(message: Message) -> Message:
+def _readable_message(message: Message) -> Message:
     if message.codec != "msgpack":
         return message
     data = json_bytes(message.payload)
     return Message(message.topic, data, "json", "json", seq=message.seq, stamp_ns=message.stamp_ns)
 
 
-def _shape(definition: ChannelSchema) -> tuple[str, str]:
+def _schema_key(definition: ChannelSchema) -> tuple[str, str]:
     return definition.message_encoding, definition.schema_name

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from nep.programs.web.foxglove.protocol import ENCODING
 from nep.programs.web.messages.payloads import ros_type_of
-from nep.programs.web.rosbridge.rosapi import is_shown
+from nep.programs.web.rosbridge.rosapi import is_visible
 from nep.protocol.graph_view import GraphView
 
 _MAX_SERVICES = 1_000
@@ -23,7 +23,7 @@ class _Connections(NamedTuple):
     services: _Names
 
 
-_NONE = _Connections({}, {}, {})
+_NO_CONNECTIONS = _Connections({}, {}, {})
 
 
 class GraphUpdates:
@@ -34,14 +34,14 @@ class GraphUpdates:
         """Ids of services by (name, type)."""
         self._last_id = 0
         self._are_connections_wanted = False
-        self._connections = _NONE
+        self._connections = _NO_CONNECTIONS
 
-    def want_connections(self, *, is_wanted: bool) -> None:
+    def set_connections_wanted(self, *, is_wanted: bool) -> None:
         """Start or stop sending the publishers, subscribers and servers; a start sends all of them."""
         self._are_connections_wanted = is_wanted
-        self._connections = _NONE
+        self._connections = _NO_CONNECTIONS
 
-    def service(self, id_: int) -> str:
+    def service_name(self, id_: int) -> str:
         """Return the name of the service with this id; "" if there is none."""
         return next((name for (name, _type), known in self._service_ids.items() if known == id_), "")
 
@@ -54,7 +54,7 @@ class GraphUpdates:
         return [*messages, *_changes(known, self._connections)]
 
     def _update_services(self, view: GraphView) -> list[dict[str, object]]:
-        served = (each for each in view.services.values() if each.servers and is_shown(each.name))
+        served = (each for each in view.services.values() if each.servers and is_visible(each.name))
         found = [(each.name, ros_type_of(each.msg_type)) for each in served][:_MAX_SERVICES]
         messages: list[dict[str, object]] = []
         gone = self._service_ids.keys() - set(found)
@@ -84,8 +84,8 @@ def _connections(view: GraphView) -> _Connections:
         known = (view.nodes.get(each) for each in ids)
         return tuple(sorted({each.name for each in known if each is not None}))
 
-    topics = [each for each in view.topics.values() if is_shown(each.name)]
-    services = [each for each in view.services.values() if is_shown(each.name) and each.servers]
+    topics = [each for each in view.topics.values() if is_visible(each.name)]
+    services = [each for each in view.services.values() if is_visible(each.name) and each.servers]
     return _Connections(
         {each.name: names(one.node_id for one in each.publishers) for each in topics},
         {each.name: names(one.node_id for one in each.subscribers) for each in topics},
@@ -99,14 +99,14 @@ def _changes(known: _Connections, now: _Connections) -> list[dict[str, object]]:
     return [
         {
             "op": "connectionGraphUpdate",
-            "publishedTopics": _changed(known.published, now.published, "publisherIds"),
-            "subscribedTopics": _changed(known.subscribed, now.subscribed, "subscriberIds"),
-            "advertisedServices": _changed(known.services, now.services, "providerIds"),
+            "publishedTopics": _changed_names(known.published, now.published, "publisherIds"),
+            "subscribedTopics": _changed_names(known.subscribed, now.subscribed, "subscriberIds"),
+            "advertisedServices": _changed_names(known.services, now.services, "providerIds"),
             "removedTopics": sorted(known.published.keys() - now.published.keys()),
             "removedServices": sorted(known.services.keys() - now.services.keys()),
         }
     ]
 
 
-def _changed(known: _Names, now: _Names, field: str) -> list[dict[str, object]]:
+def _changed_names(known: _Names, now: _Names, field: str) -> list[dict[str, object]]:
     return [{"name": name, field: list(ids)} for name, ids in now.items() if known.get(name) != ids]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.nodes.loop_wait import give_way
+from nep.nodes.loop_wait import yield_to_loop
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.connection import PageConnection
@@ -32,8 +32,8 @@ from nep.programs.web.messages.ros_definitions import JSON_TYPE
 from nep.programs.web.outgoing import Frame, json_bytes
 from nep.programs.web.rosbridge.page_services import PageServices
 from nep.programs.web.rosbridge.page_topics import PageTopics
-from nep.programs.web.rosbridge.rosapi import is_shown
-from nep.programs.web.send_queue import Queued
+from nep.programs.web.rosbridge.rosapi import is_visible
+from nep.programs.web.send_queue import QueuedMessage
 from nep.system.lazy_import import lazy_module
 from nep.system.log_rarely import is_logged
 from nep.text import bounded_str, quotable
@@ -109,7 +109,7 @@ class FoxglovePage(PageConnection):
 
     @property
     def _topic_list(self) -> tuple[PageTopic, ...]:
-        return (*self._channels.subscribed, *self._topics.topics)
+        return (*self._channels.subscribed_topics, *self._topics.topics)
 
     async def run(self) -> None:
         """Serve the client until it disconnects; then close its node."""
@@ -125,10 +125,10 @@ class FoxglovePage(PageConnection):
         )
         tasks = [asyncio.create_task(self._write()), asyncio.create_task(self._watch_graph())]
         try:
-            await self._context.in_thread(self._announce)
+            await self._context.run_in_thread(self._log_connection)
             while True:
                 await self._handle(await self._receive())
-                await give_way()  # let other pages run
+                await yield_to_loop()  # let other pages run
         except ws_exceptions.ConnectionClosed:
             return
         finally:
@@ -155,7 +155,7 @@ class FoxglovePage(PageConnection):
             _logger.warning("page '%s': %s (%d so far)", self.name, error, self._rejected)
         self._send_status(error.level if isinstance(error, op.OperationError) else "error", str(error))
 
-    async def _frames_of(self, queued: Queued) -> list[Frame]:
+    async def _frames_of(self, queued: QueuedMessage) -> list[Frame]:
         return await self._channels.frames_of(queued)
 
     # ---- the graph
@@ -164,12 +164,12 @@ class FoxglovePage(PageConnection):
         """Advertise and unadvertise topics and services as the graph changes."""
         while not self._is_gone.is_set():
             try:
-                view = await self._context.in_thread(self._node.graph, _GRAPH_TIMEOUT_S)
+                view = await self._context.run_in_thread(self._node.graph, _GRAPH_TIMEOUT_S)
                 await self._channels.update(
                     {
                         topic: info.msg_type
                         for topic, info in view.topics.items()
-                        if info.publishers and info.msg_type != "*" and is_shown(topic)
+                        if info.publishers and info.msg_type != "*" and is_visible(topic)
                     }
                 )
                 for message in self._updates.update(view):
@@ -193,17 +193,17 @@ class FoxglovePage(PageConnection):
             elif isinstance(request, wire.ServiceRequest):
                 self._call(request)
             else:
-                await self._carry_out(request)
+                await self._execute(request)
         except NepError as error:
             self._reject(error)
         except Exception:
             _logger.exception("an operation of the page '%s' failed", self.name)
             self._reject(NepError(_("an operation failed because of an internal error of the server")))
 
-    async def _carry_out(self, fields: Mapping[str, object]) -> None:
+    async def _execute(self, fields: Mapping[str, object]) -> None:
         name = str(fields.get("op"))
         if name in {"subscribeConnectionGraph", "unsubscribeConnectionGraph"}:
-            self._updates.want_connections(is_wanted=name == "subscribeConnectionGraph")
+            self._updates.set_connections_wanted(is_wanted=name == "subscribeConnectionGraph")
             return
         for operation, member, carry_out in (
             ("subscribe", "subscriptions", self._subscribe),
@@ -271,7 +271,7 @@ class FoxglovePage(PageConnection):
 
     def _call(self, request: wire.ServiceRequest) -> None:
         ids = f"{request.service_id}:{request.call_id}"
-        operation = op.CallService(ids, self._updates.service(request.service_id), {})
+        operation = op.CallService(ids, self._updates.service_name(request.service_id), {})
         try:
             if not operation.service:
                 raise NepError(_("unknown service id {id}").format(id=request.service_id))

@@ -29,7 +29,7 @@ class FragmentBuffer:
         if part.id is None:
             raise OperationError(_("a fragment needs an 'id'"))
         if self._totals.setdefault(part.id, part.total) != part.total:
-            self._forget(part.id)
+            self._discard(part.id)
             raise OperationError(
                 _("the fragments of '{id}' differ in 'total'; all were discarded").format(id=part.id), part.id
             )
@@ -37,9 +37,9 @@ class FragmentBuffer:
         self._size += len(part.data) - len(parts.get(part.number, ""))
         parts[part.number] = part.data
         while len(self._parts) > MAX_FRAGMENTED or (self._size > MAX_MESSAGE_BYTES and len(self._parts) > 1):
-            self._forget(next(each for each in self._parts if each != part.id))
+            self._discard(next(each for each in self._parts if each != part.id))
         if self._size > MAX_MESSAGE_BYTES:
-            self._forget(part.id)
+            self._discard(part.id)
             raise OperationError(
                 _("the fragments of '{id}' have more than {most} characters; all were discarded").format(
                     id=part.id, most=MAX_MESSAGE_BYTES
@@ -49,10 +49,10 @@ class FragmentBuffer:
         if len(parts) < part.total:
             return None
         whole = "".join(parts[number] for number in range(part.total))
-        self._forget(part.id)
+        self._discard(part.id)
         return whole
 
-    def _forget(self, id_: OperationId) -> None:
+    def _discard(self, id_: OperationId) -> None:
         self._totals.pop(id_, None)
         self._size -= sum(map(len, self._parts.pop(id_, {}).values()))
 

@@ -13,8 +13,8 @@ from typing import Literal, cast
 import orjson
 
 from nep.errors import BadTopicError, NepError, did_you_mean
-from nep.i18n import _, listed
-from nep.messages.nesting import json_is_too_deep, too_deep
+from nep.i18n import _, format_list
+from nep.messages.nesting import json_is_too_deep, too_deep_reason
 from nep.programs.web.limits import (
     CALL_TIMEOUT_S,
     MAX_CALL_TIMEOUT_S,
@@ -34,7 +34,7 @@ Level = Literal["info", "warning", "error", "none"]
 COMPRESSIONS: tuple[Compression, ...] = ("none", "png", "cbor", "cbor-raw")
 """Compressions in order of priority, if two subscriptions of a page to one topic differ."""
 LEVELS: tuple[Level, ...] = ("info", "warning", "error", "none")
-_RESERVED = "/nep/"
+_RESERVED_PREFIX = "/nep/"
 _MAX_NUMBER = 2**53
 _MAX_THROTTLE_MS = 3_600_000
 
@@ -228,7 +228,7 @@ def parse_json(data: bytes) -> object:
             )
         )
     if json_is_too_deep(data):
-        raise OperationError(_("an operation was rejected: {reason}").format(reason=too_deep()))
+        raise OperationError(_("an operation was rejected: {reason}").format(reason=too_deep_reason()))
     if len(data) > MAX_VALUES and sum(map(data.count, (b",", b"[", b"{"))) > MAX_VALUES:
         raise OperationError(
             _("an operation has more than {most} values; send less data at once").format(most=MAX_VALUES)
@@ -241,7 +241,7 @@ def parse_json(data: bytes) -> object:
         ) from None
 
 
-def shown(text: str) -> str:
+def log_text(text: str) -> str:
     """Return text from a page, escaped and bounded for the log."""
     return escaped(bounded_str(text, 1_000))
 
@@ -267,7 +267,7 @@ class _Fields:
         if value is None and default is not None:
             return default
         if not isinstance(value, str):
-            raise self.wrong(name, _("a text"))
+            raise self.invalid_field(name, _("a text"))
         if len(value) > most:
             raise self.error(
                 _("'{name}' has {count} characters; at most {most} are allowed").format(
@@ -294,9 +294,9 @@ class _Fields:
     def own_name(self, name: str) -> str:
         """Return a field with the name of a topic or service that the page creates."""
         given = self.topic(name)
-        if given.startswith(_RESERVED):
+        if given.startswith(_RESERVED_PREFIX):
             said = _("names that start with '{prefix}' are reserved; choose another name")
-            raise self.error(said.format(prefix=_RESERVED))
+            raise self.error(said.format(prefix=_RESERVED_PREFIX))
         return given
 
     def number(self, name: str, default: int | None, least: int, most: int) -> int:
@@ -309,7 +309,7 @@ class _Fields:
             return default
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not math.isfinite(cast("float", value)):
-            raise self.wrong(name, _("a number"))
+            raise self.invalid_field(name, _("a number"))
         number = int(cast("float", value))
         if not least <= number <= most:
             raise self.error(
@@ -323,7 +323,7 @@ class _Fields:
         """Return a text field whose value is one of `choices`."""
         value = self.text(name, default)
         if value not in choices:
-            raise self.wrong(name, listed([f"'{each}'" for each in choices], "or"))
+            raise self.invalid_field(name, format_list([f"'{each}'" for each in choices], "or"))
         return value
 
     def compression(self) -> Compression:
@@ -345,7 +345,7 @@ class _Fields:
         """Create the error for this operation."""
         return OperationError(sentence, self.id)
 
-    def wrong(self, name: str, wanted: str) -> OperationError:
+    def invalid_field(self, name: str, wanted: str) -> OperationError:
         """Create the error for a missing field, or a field that is not `wanted`."""
         op = quotable(self._fields.get("op"))
         if name not in self._fields:
@@ -360,9 +360,9 @@ class _Fields:
 
 
 def _operation(fields: _Fields) -> Operation:
-    known = _READERS.get(fields.op)
+    known = _PARSERS.get(fields.op)
     if known is None:
-        said = did_you_mean(fields.op, tuple(_READERS))
+        said = did_you_mean(fields.op, tuple(_PARSERS))
         raise fields.error(
             _("unknown operation '{op}'; {did_you_mean}").format(op=quotable(fields.op), did_you_mean=said)
         )
@@ -408,7 +408,7 @@ def _call_service(fields: _Fields) -> Operation:
 def _service_response(fields: _Fields) -> Operation:
     is_success = fields.get("result", True)
     if not isinstance(is_success, bool):
-        raise fields.wrong("result", _("true or false"))
+        raise fields.invalid_field("result", _("true or false"))
     values = fields.get("values")
     return ServiceResponse(fields.id, fields.topic("service"), {} if values is None else values, is_success)
 
@@ -441,7 +441,7 @@ def _auth(fields: _Fields) -> Operation:
     )
 
 
-_READERS = {
+_PARSERS = {
     "advertise": _advertise,
     "unadvertise": lambda fields: Unadvertise(fields.id, fields.topic("topic")),
     "publish": _publish,

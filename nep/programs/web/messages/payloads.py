@@ -27,7 +27,7 @@ from nep.i18n import _
 from nep.messages import image_codec
 from nep.messages.codecs import codec_for
 from nep.messages.encoded import Encoded
-from nep.messages.image_files import examine
+from nep.messages.image_files import parse_header
 from nep.messages.message import Message
 from nep.programs.web.messages.ros_definitions import (
     JSON_TYPE,
@@ -40,13 +40,19 @@ from nep.text import bounded_str, escaped
 
 _STRING = "std_msgs/String"
 _BYTES = "std_msgs/UInt8MultiArray"
-_FILE = "sensor_msgs/CompressedImage"
-_PIXELS = "sensor_msgs/Image"
-_OWN = {"string": _STRING, "bytes": _BYTES, "image": _FILE, "json": JSON_TYPE, "msgpack": MSGPACK_TYPE}
-_CODECS = {**{ros_type: codec for codec, ros_type in _OWN.items()}, _PIXELS: "image"}
-_UNKNOWN = frozenset({"", "*"})
+_COMPRESSED_IMAGE = "sensor_msgs/CompressedImage"
+_RAW_IMAGE = "sensor_msgs/Image"
+_ROS_TYPES = {
+    "string": _STRING,
+    "bytes": _BYTES,
+    "image": _COMPRESSED_IMAGE,
+    "json": JSON_TYPE,
+    "msgpack": MSGPACK_TYPE,
+}
+_CODECS = {**{ros_type: codec for codec, ros_type in _ROS_TYPES.items()}, _RAW_IMAGE: "image"}
+_UNKNOWN_TYPES = frozenset({"", "*"})
 _STAMP = struct.Struct("<II")
-_NS = 1_000_000_000
+_NS_PER_S = 1_000_000_000
 
 
 class PayloadError(NepError):
@@ -61,10 +67,10 @@ def nep_type_of(ros_type: str) -> str:
 
 def ros_type_of(msg_type: str) -> str:
     """Return the ROS type that represents a NEP message type for pages."""
-    if msg_type in _UNKNOWN:
+    if msg_type in _UNKNOWN_TYPES:
         return JSON_TYPE
     codec = codec_for(msg_type).name
-    return msg_type if codec == "json" and "/" in msg_type else _OWN[codec]
+    return msg_type if codec == "json" and "/" in msg_type else _ROS_TYPES[codec]
 
 
 def is_compatible(ros_type: str, msg_type: str) -> bool:
@@ -72,7 +78,7 @@ def is_compatible(ros_type: str, msg_type: str) -> bool:
 
     A topic of plain JSON accepts any type, because its messages are passed on unchanged.
     """
-    if msg_type in _UNKNOWN or not ros_type or ros_type_of(msg_type) == JSON_TYPE:
+    if msg_type in _UNKNOWN_TYPES or not ros_type or ros_type_of(msg_type) == JSON_TYPE:
         return True
     wanted = bare_type(ros_type)
     return wanted == JSON_TYPE or nep_type_of(ros_type) == codec_or_type(msg_type)
@@ -97,9 +103,9 @@ def to_ros(message: Message, *, as_pixels: bool = False) -> object:
     if message.codec == "bytes":
         return {"layout": {"dim": [], "data_offset": 0}, "data": message.payload}
     if message.codec == "image":
-        ros_type = _PIXELS if as_pixels else _FILE
+        ros_type = _RAW_IMAGE if as_pixels else _COMPRESSED_IMAGE
         definition = definition_of(ros_type)
-        shape = definition.decode(_picture(message, ros_type)) if definition is not None else {}
+        shape = definition.decode(_image_bytes(message, ros_type)) if definition is not None else {}
         header = cast("dict[str, object]", shape["header"])
         shape["header"] = {**header, "seq": (message.seq or 0) & 0xFFFFFFFF}
         return shape
@@ -109,9 +115,9 @@ def to_ros(message: Message, *, as_pixels: bool = False) -> object:
 def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
     """Return a message in the ROS 1 serialization of its type. Raises the exceptions of `to_ros`."""
     if message.codec == "image":
-        return _picture(message, _PIXELS if as_pixels else _FILE)
+        return _image_bytes(message, _RAW_IMAGE if as_pixels else _COMPRESSED_IMAGE)
     if message.codec in {"string", "bytes"}:
-        ros_type = _OWN[message.codec]
+        ros_type = _ROS_TYPES[message.codec]
         return carried.to_ros(ros_type, message.codec, Encoded(bytes(message.data)))
     definition = definition_of(bare_type(ros_type_of(message.msg_type)))
     if definition is not None and definition.name not in {JSON_TYPE, MSGPACK_TYPE}:
@@ -120,19 +126,19 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
     return carried.to_ros(_STRING, "json", Encoded(bytes(text)))
 
 
-def _picture(message: Message, ros_type: str) -> bytes:
+def _image_bytes(message: Message, ros_type: str) -> bytes:
     """Return an image in ROS serialization, stamped with the time of publication."""
-    encoded = Encoded(message.data, dict(message.extension) or examine(message.data).extension)
+    encoded = Encoded(message.data, dict(message.extension) or parse_header(message.data).extension)
     layout = image_codec.raw_layout((encoded.extension or {}).get("encoding"))
-    if ros_type == _FILE and layout is not None:
+    if ros_type == _COMPRESSED_IMAGE and layout is not None:
         encoded = image_codec.encode(message.payload)
-    elif ros_type == _PIXELS and layout is None:
+    elif ros_type == _RAW_IMAGE and layout is None:
         encoded = image_codec.raw_image(message.payload)
     body = carried.to_ros(ros_type, "image", encoded)
     stamp_ns = message.stamp_ns
-    if stamp_ns is None or not 0 <= stamp_ns < 2**32 * _NS:
+    if stamp_ns is None or not 0 <= stamp_ns < 2**32 * _NS_PER_S:
         return body
-    return body[:4] + _STAMP.pack(*divmod(stamp_ns, _NS)) + body[12:]
+    return body[:4] + _STAMP.pack(*divmod(stamp_ns, _NS_PER_S)) + body[12:]
 
 
 def _with_ros1_times(value: object) -> object:
@@ -156,18 +162,18 @@ def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
     """
     codec = codec_or_type(msg_type)
     if codec == "string":
-        text = _map(msg, ros_type).get("data", "")
+        text = _as_map(msg, ros_type).get("data", "")
         if not isinstance(text, str):
-            raise _wrong("data", text, _("a text"))
+            raise _field_error("data", text, _("a text"))
         return text
     if codec == "bytes":
-        return _bytes(_map(msg, ros_type).get("data", ""), "data")
+        return _bytes(_as_map(msg, ros_type).get("data", ""), "data")
     if codec == "image":
-        return _image(_map(msg, ros_type), bare_type(ros_type))
-    return _map(msg, ros_type) if "/" in codec else msg
+        return _image(_as_map(msg, ros_type), bare_type(ros_type))
+    return _as_map(msg, ros_type) if "/" in codec else msg
 
 
-def _map(msg: object, ros_type: str) -> Mapping[str, object]:
+def _as_map(msg: object, ros_type: str) -> Mapping[str, object]:
     if not isinstance(msg, Mapping):
         raise PayloadError(
             _("a message of '{type}' must be a map of its fields, not {given}").format(
@@ -183,21 +189,21 @@ def _bytes(value: object, field: str) -> bytes:
         try:
             return base64.b64decode(value, validate=True)
         except (binascii.Error, ValueError):
-            raise _wrong(field, value, _("base64")) from None
+            raise _field_error(field, value, _("base64")) from None
     if isinstance(value, Sequence):
         try:
             return bytes(value)
         except (TypeError, ValueError):
             pass
-    raise _wrong(field, value, _("base64 or numbers from 0 to 255"))
+    raise _field_error(field, value, _("base64 or numbers from 0 to 255"))
 
 
 def _image(fields: Mapping[str, object], ros_type: str) -> object:
     data = _bytes(fields.get("data", ""), "data")
-    if ros_type != _PIXELS:
+    if ros_type != _RAW_IMAGE:
         return data  # the codec reads whether it is a JPEG or a PNG
-    definition = definition_of(_PIXELS)
-    unpack = carried.unpacker("image", _PIXELS, full_text(_PIXELS) or "").unpack
+    definition = definition_of(_RAW_IMAGE)
+    unpack = carried.unpacker_for("image", _RAW_IMAGE, full_text(_RAW_IMAGE) or "").unpack
     try:
         known = (
             {each.name: fields[each.name] for each in definition.fields if each.name in fields}
@@ -212,7 +218,7 @@ def _image(fields: Mapping[str, object], ros_type: str) -> object:
     return Encoded(bytes(pixels), extension)
 
 
-def _wrong(field: str, value: object, wanted: str) -> PayloadError:
+def _field_error(field: str, value: object, wanted: str) -> PayloadError:
     return PayloadError(
         _("'{field}' is {given}; expected {wanted}").format(
             field=field, given=escaped(bounded_str(value, 60)), wanted=wanted

@@ -9,7 +9,7 @@ import math
 from nep.errors import DecodeError, EncodeError, NepError
 from nep.i18n import _
 from nep.messages import image_codec
-from nep.messages.image_files import examine
+from nep.messages.image_files import parse_header
 from nep.programs.web.limits import MAX_MESSAGE_BYTES
 from nep.programs.web.messages.operations import OperationError
 
@@ -35,7 +35,7 @@ def text_as_png(text: bytes) -> str:
 def text_in_png(data: str) -> bytes:
     """Decode the text in a PNG file. Raises `OperationError`; large files are rejected before decoding."""
     try:
-        file = examine(base64.b64decode(data, validate=True))
+        file = parse_header(base64.b64decode(data, validate=True))
         is_right = file.kind == "png" and (file.channels, file.bits) == (3, 8)
         if not is_right or file.width * file.height * 3 > MAX_MESSAGE_BYTES:
             raise OperationError(

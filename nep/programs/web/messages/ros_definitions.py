@@ -16,7 +16,7 @@ JSON_TYPE = "nep/Json"
 MSGPACK_TYPE = "nep/Msgpack"
 
 _HEADER = "std_msgs/Header header\n"
-_TEXTS = {
+_DEFINITION_TEXTS = {
     JSON_TYPE: "string data\n",
     MSGPACK_TYPE: "string data\n",
     "std_msgs/Bool": "bool data\n",
@@ -90,18 +90,20 @@ def definition_of(ros_type: str) -> Definition | None:
 
 def full_text(ros_type: str) -> str | None:
     """Return the definition as printed by `gendeps --cat`, or None if the type is unknown here."""
-    if ros_type not in _TEXTS:
+    if ros_type not in _DEFINITION_TEXTS:
         return None
-    inside = sorted(set(_types_inside(ros_type)))
-    return _TEXTS[ros_type] + "".join(f"{_SEPARATOR}\nMSG: {each}\n{_TEXTS[each]}" for each in inside)
+    inside = sorted(set(_nested_types(ros_type)))
+    return _DEFINITION_TEXTS[ros_type] + "".join(
+        f"{_SEPARATOR}\nMSG: {each}\n{_DEFINITION_TEXTS[each]}" for each in inside
+    )
 
 
-def _types_inside(ros_type: str) -> Iterator[str]:
-    for line in _TEXTS[ros_type].splitlines():
+def _nested_types(ros_type: str) -> Iterator[str]:
+    for line in _DEFINITION_TEXTS[ros_type].splitlines():
         name = line.partition(" ")[0].partition("[")[0]
-        if name in _TEXTS:
+        if name in _DEFINITION_TEXTS:
             yield name
-            yield from _types_inside(name)
+            yield from _nested_types(name)
 
 
 def type_definitions(ros_type: str) -> list[dict[str, object]] | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from nep.errors import NepError
 from nep.i18n import _
-from nep.nodes.loop_wait import give_way
+from nep.nodes.loop_wait import yield_to_loop
 from nep.nodes.node import Node
 from nep.programs.robots.guard import MotionGuard
 from nep.programs.web.access import AuthCheck
@@ -22,7 +22,7 @@ from nep.programs.web.messages.png import text_in_png
 from nep.programs.web.outgoing import Frame, publish_frames
 from nep.programs.web.rosbridge.page_services import PageServices
 from nep.programs.web.rosbridge.page_topics import PageTopics
-from nep.programs.web.send_queue import Queued
+from nep.programs.web.send_queue import QueuedMessage
 from nep.system.lazy_import import lazy_module
 from nep.system.log_rarely import is_logged
 
@@ -92,10 +92,10 @@ class Page(PageConnection):
         """Serve the page until it disconnects; then close its node."""
         writer = asyncio.create_task(self._write())
         try:
-            await self._context.in_thread(self._announce)
+            await self._context.run_in_thread(self._log_connection)
             while True:
                 await self.handle(await self._receive())
-                await give_way()  # let other pages run
+                await yield_to_loop()  # let other pages run
         except ws_exceptions.ConnectionClosed:
             return
         finally:
@@ -104,7 +104,7 @@ class Page(PageConnection):
             self._services.cancel()
             await self._close_node()
 
-    async def _frames_of(self, queued: Queued) -> list[Frame]:
+    async def _frames_of(self, queued: QueuedMessage) -> list[Frame]:
         topic = queued.feed.topic
         try:
             return publish_frames(topic, queued.message, queued.feed.form)
@@ -120,7 +120,7 @@ class Page(PageConnection):
         """Execute the operation in a message from the page. Never raises because of the message's content."""
         self._counts.operations += 1
         try:
-            await self._carry_out(op.parse(data))
+            await self._execute(op.parse(data))
         except NepError as error:
             self._reject(error)
         except Exception:
@@ -129,11 +129,11 @@ class Page(PageConnection):
                 op.OperationError(_("an operation failed because of an internal error of the server"))
             )
 
-    async def _carry_out(self, operation: op.Operation) -> None:
+    async def _execute(self, operation: op.Operation) -> None:
         for _nested in range(MAX_NESTED_OPERATIONS):
             if not isinstance(operation, op.Fragment | op.Png):
                 break
-            inner = self._unwrapped(operation)
+            inner = self._unwrap(operation)
             if inner is None:
                 return
             operation = inner
@@ -149,7 +149,7 @@ class Page(PageConnection):
         except NepError as error:
             raise op.OperationError(str(error), operation.id) from error
 
-    def _unwrapped(self, part: op.Fragment | op.Png) -> op.Operation | None:
+    def _unwrap(self, part: op.Fragment | op.Png) -> op.Operation | None:
         """Return the wrapped operation once all fragments have arrived, else None."""
         try:
             whole = self._fragments.add(part)
@@ -166,7 +166,7 @@ class Page(PageConnection):
 
     def _log_status(self, operation: op.PageStatus) -> None:
         write = {"error": self._node.log.error, "warning": self._node.log.warning}
-        write.get(operation.level, self._node.log.info)("%s", op.shown(operation.msg))
+        write.get(operation.level, self._node.log.info)("%s", op.log_text(operation.msg))
 
     def _reject(self, error: NepError) -> None:
         # Logged at increasing intervals: a page can send any number of invalid operations.
@@ -182,7 +182,7 @@ async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:
     """Return True if the first message is a valid ``auth`` operation and arrives in time."""
     try:
         data = await asyncio.wait_for(connection.recv(decode=False), AUTH_TIMEOUT_S)
-        return isinstance(auth := op.parse(bytes(data)), op.Auth) and check.is_right(auth)
+        return isinstance(auth := op.parse(bytes(data)), op.Auth) and check.verify(auth)
     except (op.OperationError, asyncio.TimeoutError, ws_exceptions.ConnectionClosed):
         return False
 

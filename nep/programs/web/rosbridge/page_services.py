@@ -63,7 +63,7 @@ class PageServices:
 
     async def _call(self, operation: CallService) -> None:
         try:
-            values, is_success = await self._answer(operation), True
+            values, is_success = await self._call_service(operation), True
         except Exception as error:  # noqa: BLE001 - a reply of any kind must not close the page
             values, is_success = str(error) or type(error).__name__, False
         try:
@@ -71,16 +71,16 @@ class PageServices:
         except NepError as error:
             self._send_response(operation, str(error), False)
 
-    async def _answer(self, operation: CallService) -> object:
+    async def _call_service(self, operation: CallService) -> object:
         if is_rosapi(operation.service):
             api = RosApi(self._context.node, self._context.motion_refusal)
-            return await self._context.in_thread(api.answer, operation.service, operation.args)
+            return await self._context.run_in_thread(api.reply, operation.service, operation.args)
         client = self._clients.pop(operation.service, None)
         if client is None:
-            client = await self._context.in_thread(self._context.node.new_client, operation.service)
+            client = await self._context.run_in_thread(self._context.node.new_client, operation.service)
         self._clients[operation.service] = client
         while len(self._clients) > MAX_SERVICES:
-            await self._context.in_thread(self._clients.pop(next(iter(self._clients))).close)
+            await self._context.run_in_thread(self._clients.pop(next(iter(self._clients))).close)
         return await client.acall(operation.args, operation.timeout_s)
 
     def _respond(self, operation: CallService, values: object, is_success: bool) -> None:
@@ -108,23 +108,23 @@ class PageServices:
                 _("this page already serves {count} services, the maximum").format(count=MAX_SERVICES),
                 operation.id,
             )
-        callback = partial(self._ask_page, operation.service)
-        self._servers[operation.service] = await self._context.in_thread(
+        callback = partial(self._forward_call, operation.service)
+        self._servers[operation.service] = await self._context.run_in_thread(
             self._context.node.new_server, operation.service, callback, threads=1
         )
         said = _("serving '{service}'").format(service=operation.service)
         self._context.send_status("info", said, operation.id)
 
-    def _ask_page(self, service: str, request: object) -> Future[object]:
+    def _forward_call(self, service: str, request: object) -> Future[object]:
         """Forward a request to the page and return the future of its reply.
 
         Called in a thread of the server.
         """
         answer: Future[object] = Future()
-        self._loop.call_soon_threadsafe(self._ask, service, request, answer)
+        self._loop.call_soon_threadsafe(self._send_call, service, request, answer)
         return answer
 
-    def _ask(self, service: str, request: object, answer: Future[object]) -> None:
+    def _send_call(self, service: str, request: object, answer: Future[object]) -> None:
         if len(self._pending) >= MAX_CALLS:
             answer.set_exception(ServiceFailedError(_("the page has too many pending calls")))
             return
@@ -164,7 +164,7 @@ class PageServices:
                 "warning",
             )
         self._fail_pending(operation.service)
-        await self._context.in_thread(known.close)
+        await self._context.run_in_thread(known.close)
 
     def cancel(self) -> None:
         """Cancel all calls, because the page has disconnected. Its node closes servers and clients."""

@@ -30,8 +30,8 @@ from nep.text import quotable
 _GRAPH_TIMEOUT_S = 2.0
 _SETTLE_S = 0.5
 """Maximum time in seconds to wait for the descriptions of robots before a page may publish."""
-_PIXELS = "sensor_msgs/Image"
-_NS = 1_000_000_000
+_RAW_IMAGE = "sensor_msgs/Image"
+_NS_PER_S = 1_000_000_000
 
 
 @dataclass
@@ -39,7 +39,7 @@ class _Publication:
     publisher: Publisher
     ros_type: str
     ids: set[OperationId] = field(default_factory=set)
-    received: RateMeter = field(default_factory=lambda: RateMeter(time.monotonic))
+    receive_rate: RateMeter = field(default_factory=lambda: RateMeter(time.monotonic))
 
 
 @dataclass
@@ -78,7 +78,7 @@ class PageTopics:
         if known is None:
             known = await self._open_publication(operation)
         elif bare_type(known.ros_type) != bare_type(operation.ros_type):
-            raise _another_type(operation.topic, operation.ros_type, known.publisher.msg_type, operation.id)
+            raise _type_conflict(operation.topic, operation.ros_type, known.publisher.msg_type, operation.id)
         if len(known.ids) < MAX_SUBSCRIPTION_IDS:
             known.ids.add(operation.id)
         self._context.send_status(
@@ -91,7 +91,7 @@ class PageTopics:
                 _("this page already publishes {count} topics, the maximum").format(count=MAX_TOPICS),
                 operation.id,
             )
-        publisher = await self._context.in_thread(self._open_publisher, operation)
+        publisher = await self._context.run_in_thread(self._open_publisher, operation)
         opened = self._publications[operation.topic] = _Publication(publisher, operation.ros_type)
         return opened
 
@@ -99,7 +99,7 @@ class PageTopics:
         """Open the publisher of a topic. Called in the page's thread."""
         known = self._type_of(operation.topic)
         if not is_compatible(operation.ros_type, known):
-            raise _another_type(operation.topic, operation.ros_type, known, operation.id)
+            raise _type_conflict(operation.topic, operation.ros_type, known, operation.id)
         msg_type = known or nep_type_of(operation.ros_type)
         self._context.guard.wait_for_descriptions(_SETTLE_S)
         self._check_motion(operation.topic, msg_type, operation.id)
@@ -129,10 +129,10 @@ class PageTopics:
         self._check_motion(operation.topic, publisher.msg_type, operation.id)
         msg = _with_header(operation.msg, known.ros_type)
         publisher.publish(from_ros(msg, known.ros_type, publisher.msg_type), strict=True)
-        known.received.count(operation.size_bytes)
+        known.receive_rate.count(operation.size_bytes)
 
     async def _open_by_type(self, operation: Publish) -> _Publication:
-        msg_type = await self._context.in_thread(self._type_of, operation.topic)
+        msg_type = await self._context.run_in_thread(self._type_of, operation.topic)
         if not msg_type:
             raise OperationError(
                 _("topic '{topic}' is not advertised; advertise it before you publish").format(
@@ -155,7 +155,7 @@ class PageTopics:
         known.ids.discard(operation.id)
         if operation.id is None or not known.ids:
             del self._publications[operation.topic]
-            await self._context.in_thread(known.publisher.close)
+            await self._context.run_in_thread(known.publisher.close)
         self._context.send_status(
             "info", _("unadvertised '{topic}'").format(topic=operation.topic), operation.id
         )
@@ -164,13 +164,13 @@ class PageTopics:
 
     async def subscribe(self, operation: Subscribe) -> None:
         """Start to send the messages of a topic to the page."""
-        as_pixels = bare_type(operation.ros_type) == _PIXELS
+        as_pixels = bare_type(operation.ros_type) == _RAW_IMAGE
         known = self._subscriptions.get(operation.topic)
         if known is None:
             await self._open_subscription(operation, as_pixels=as_pixels)
         else:
             if not is_compatible(operation.ros_type, known.subscriber.msg_type):
-                raise _another_type(
+                raise _type_conflict(
                     operation.topic, operation.ros_type, known.subscriber.msg_type, operation.id
                 )
             if known.feed.subscription_count >= MAX_SUBSCRIPTION_IDS:
@@ -192,7 +192,7 @@ class PageTopics:
                 _("this page already subscribes to {count} topics, the maximum").format(count=MAX_TOPICS),
                 operation.id,
             )
-        subscriber = await self._context.in_thread(self._open_subscriber, operation)
+        subscriber = await self._context.run_in_thread(self._open_subscriber, operation)
         feed = Feed(operation.topic, subscriber.msg_type)
         feed.subscribe(operation, as_pixels=as_pixels)
         reader = asyncio.create_task(read_messages(subscriber, feed, self._context.queue))
@@ -202,7 +202,7 @@ class PageTopics:
         """Open the subscriber of a topic. Called in the page's thread."""
         known = self._type_of(operation.topic)
         if not is_compatible(operation.ros_type, known):
-            raise _another_type(operation.topic, operation.ros_type, known, operation.id)
+            raise _type_conflict(operation.topic, operation.ros_type, known, operation.id)
         msg_type = known or (nep_type_of(operation.ros_type) if operation.ros_type else "json")
         return self._context.node.new_sub(operation.topic, msg_type, wildcards=False)
 
@@ -221,7 +221,7 @@ class PageTopics:
     async def _close_subscription(self, known: _Subscription) -> None:
         known.reader.cancel()
         self._context.queue.remove(known.feed)
-        await self._context.in_thread(known.subscriber.close)
+        await self._context.run_in_thread(known.subscriber.close)
 
     def cancel(self) -> None:
         """Stop reading, because the page has disconnected. Its node closes publishers and subscribers."""
@@ -243,7 +243,7 @@ def subscribed_topic(feed: Feed) -> PageTopic:
     return PageTopic(
         feed.topic,
         False,
-        feed.at_most_per_s,
+        feed.max_rate_hz,
         rate,
         bytes_per_s,
         feed.sent.total,
@@ -253,11 +253,11 @@ def subscribed_topic(feed: Feed) -> PageTopic:
 
 def _published_topic(item: tuple[str, _Publication]) -> PageTopic:
     topic, publication = item
-    rate, bytes_per_s = publication.received.rates()
-    return PageTopic(topic, True, None, rate, bytes_per_s, publication.received.total)
+    rate, bytes_per_s = publication.receive_rate.rates()
+    return PageTopic(topic, True, None, rate, bytes_per_s, publication.receive_rate.total)
 
 
-def _another_type(topic: str, ros_type: str, known: str, id_: OperationId) -> OperationError:
+def _type_conflict(topic: str, ros_type: str, known: str, id_: OperationId) -> OperationError:
     return OperationError(
         _("'{topic}' has the type '{known}', not '{given}'").format(
             topic=quotable(topic), known=quotable(ros_type_of(known)), given=quotable(ros_type)
@@ -274,6 +274,6 @@ def _with_header(msg: object, ros_type: str) -> object:
     header = msg.get("header", {})
     if not isinstance(header, Mapping) or "stamp" in header:
         return msg
-    sec, nanosec = divmod(time.time_ns(), _NS)
+    sec, nanosec = divmod(time.time_ns(), _NS_PER_S)
     stamped = {"frame_id": "", **header, "stamp": {"sec": sec, "nanosec": nanosec}}
     return {**msg, "header": stamped}

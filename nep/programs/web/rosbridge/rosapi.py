@@ -14,19 +14,19 @@ import orjson
 from nep.errors import NepError
 from nep.i18n import _
 from nep.nodes.node import Node
-from nep.patterns.parameters.owned import place_of
+from nep.patterns.parameters.owned import parameters_topic
 from nep.programs.web.messages.payloads import ros_type_of
 from nep.programs.web.messages.ros_definitions import JSON_TYPE, bare_type, full_text, type_definitions
 from nep.protocol.graph_view import GraphView, NodeInfo
 from nep.text import bounded_str, quotable
 
 PREFIX = "/rosapi/"
-_HIDDEN = "/nep/"
+_HIDDEN_PREFIX = "/nep/"
 _GRAPH_TIMEOUT_S = 2.0
 _PARAMETER_TIMEOUT_S = 2.0
 _NAMES_TIMEOUT_S = 5.0
-_MAX_NODES_ASKED = 50
-_NS = 1_000_000_000
+_MAX_NODES_QUERIED = 50
+_NS_PER_S = 1_000_000_000
 
 
 def is_rosapi(service: str) -> bool:
@@ -34,9 +34,9 @@ def is_rosapi(service: str) -> bool:
     return f"/{service.removeprefix('/')}".startswith(PREFIX)
 
 
-def is_shown(name: str) -> bool:
+def is_visible(name: str) -> bool:
     """Return True unless a topic or service is internal to NEP (below /nep/)."""
-    return not name.startswith(_HIDDEN)
+    return not name.startswith(_HIDDEN_PREFIX)
 
 
 class RosApi:
@@ -52,7 +52,7 @@ class RosApi:
         self._node = node
         self._motion_refusal = motion_refusal
 
-    def answer(self, service: str, args: object) -> Mapping[str, object]:
+    def reply(self, service: str, args: object) -> Mapping[str, object]:
         """Return the reply of a rosapi service. Raises `NepError`."""
         name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
         known = _SERVICES.get(name)
@@ -70,7 +70,7 @@ class RosApi:
     def _types(self) -> dict[str, str]:
         """ROS types by topic, without topics internal to NEP."""
         topics = self._view.topics.values()
-        return {each.name: ros_type_of(each.msg_type) for each in topics if is_shown(each.name)}
+        return {each.name: ros_type_of(each.msg_type) for each in topics if is_visible(each.name)}
 
     def _name(self, node_id: str) -> str:
         known = self._view.nodes.get(node_id)
@@ -132,12 +132,12 @@ class RosApi:
 
     def services(self, _args: Mapping[str, object]) -> Mapping[str, object]:
         """Return all services that have a server, and those of rosapi."""
-        return {"services": [*self._served, *(f"{PREFIX}{each}" for each in _SERVICES)]}
+        return {"services": [*self._served_services, *(f"{PREFIX}{each}" for each in _SERVICES)]}
 
     @property
-    def _served(self) -> list[str]:
+    def _served_services(self) -> list[str]:
         found = self._view.services.values()
-        return [each.name for each in found if each.servers and is_shown(each.name)]
+        return [each.name for each in found if each.servers and is_visible(each.name)]
 
     def service_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the type of a service; "" if the service doesn't exist."""
@@ -153,7 +153,7 @@ class RosApi:
     def services_for_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the services of a type."""
         wanted = _text(args, "type")
-        names = [*self._served, *(f"{PREFIX}{each}" for each in _SERVICES)]
+        names = [*self._served_services, *(f"{PREFIX}{each}" for each in _SERVICES)]
         return {"services": [each for each in names if self._service_type(each) == wanted]}
 
     def service_providers(self, args: Mapping[str, object]) -> Mapping[str, object]:
@@ -187,9 +187,9 @@ class RosApi:
         ids = {each.id for each in self._nodes_named(_text(args, "node"))}
         topics, services = self._view.topics.values(), self._view.services.values()
         return {
-            "subscribing": [each.name for each in topics if _has(each.subscribers, ids)],
-            "publishing": [each.name for each in topics if _has(each.publishers, ids)],
-            "services": [each.name for each in services if _has(each.servers, ids)],
+            "subscribing": [each.name for each in topics if _has_member(each.subscribers, ids)],
+            "publishing": [each.name for each in topics if _has_member(each.publishers, ids)],
+            "services": [each.name for each in services if _has_member(each.servers, ids)],
         }
 
     def _nodes_named(self, name: str) -> list[NodeInfo]:
@@ -202,10 +202,12 @@ class RosApi:
 
     def get_param_names(self, _args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the names of all parameters, for nodes that reply in time."""
-        able = [each for each in self._view.nodes.values() if place_of(each.id) in self._view.services]
+        able = [
+            each for each in self._view.nodes.values() if parameters_topic(each.id) in self._view.services
+        ]
         names: list[str] = []
         deadline = time.monotonic() + _NAMES_TIMEOUT_S
-        for each in able[:_MAX_NODES_ASKED]:
+        for each in able[:_MAX_NODES_QUERIED]:
             if time.monotonic() > deadline:
                 break
             try:
@@ -244,7 +246,7 @@ class RosApi:
             raise NepError(_('a parameter value must be JSON text, such as 0.5 or "slow"')) from None
         ids = {each.id for each in self._nodes_named(node)}
         for topic in self._view.topics.values():
-            if not _has(topic.subscribers, ids):
+            if not _has_member(topic.subscribers, ids):
                 continue
             if refusal := self._motion_refusal(topic.name, topic.msg_type):
                 raise NepError(refusal)
@@ -264,7 +266,7 @@ class RosApi:
 
     def get_time(self, _args: Mapping[str, object]) -> Mapping[str, object]:
         """Return the current time of this computer."""
-        secs, nsecs = divmod(time.time_ns(), _NS)
+        secs, nsecs = divmod(time.time_ns(), _NS_PER_S)
         return {"time": {"secs": secs, "nsecs": nsecs}}
 
 
@@ -287,7 +289,7 @@ def _parameter(args: Mapping[str, object]) -> tuple[str, str]:
     return node.removeprefix("/"), name
 
 
-def _has(members: tuple[object, ...], node_ids: set[str]) -> bool:
+def _has_member(members: tuple[object, ...], node_ids: set[str]) -> bool:
     return any(getattr(each, "node_id", "") in node_ids for each in members)
 
 

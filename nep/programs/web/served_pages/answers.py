@@ -23,10 +23,10 @@ from nep.i18n import _, language
 from nep.programs.web.access import Access, checked_origin, query_of
 
 _METHODS = frozenset({"GET", "HEAD"})
-_HOLE = re.compile(r"\{\{(\w+)\}\}")
+_PLACEHOLDER = re.compile(r"\{\{(\w+)\}\}")
 _INLINE = re.compile(r"<(script|style)>(.*?)</\1>", re.DOTALL)
-_HTML = "text/html; charset=utf-8"
-_TEXT = "text/plain; charset=utf-8"
+_HTML_TYPE = "text/html; charset=utf-8"
+_TEXT_TYPE = "text/plain; charset=utf-8"
 _HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -51,7 +51,7 @@ class PageRequest(NamedTuple):
     method: str
     path: str
     hosts: tuple[str, ...]
-    own: str
+    own_origin: str
     authorization: str | None = None
 
 
@@ -64,30 +64,32 @@ class PageResponse(NamedTuple):
     is_token_refused: bool = False
 
 
-def answer(request: PageRequest, access: Access) -> PageResponse:
+def respond(request: PageRequest, access: Access) -> PageResponse:
     """Return the response to a request. Never raises because of the request's content."""
     path = request.path.partition("?")[0]
     if request.method not in _METHODS:
-        return _plain(HTTPStatus.METHOD_NOT_ALLOWED, _("only GET is supported"), {"Allow": "GET, HEAD"})
+        return _text_response(
+            HTTPStatus.METHOD_NOT_ALLOWED, _("only GET is supported"), {"Allow": "GET, HEAD"}
+        )
     if path not in {"/", "/starter.html"}:
-        return _plain(HTTPStatus.NOT_FOUND, _("page not found; open {url}").format(url="/"))
+        return _text_response(HTTPStatus.NOT_FOUND, _("page not found; open {url}").format(url="/"))
     origin = _origin(request, access)
     if origin is None:
         said = _("this server replies only at its own address; open {url}")
-        return _plain(HTTPStatus.FORBIDDEN, said.format(url=f"{request.own}/"))
-    if access.token and not access.is_given(request.path, request.authorization):
-        return _page(
+        return _text_response(HTTPStatus.FORBIDDEN, said.format(url=f"{request.own_origin}/"))
+    if access.token and not access.check_token(request.path, request.authorization):
+        return _page_response(
             HTTPStatus.UNAUTHORIZED,
-            _filled("refused.html", _refused_words()),
+            _fill_template("refused.html", _refused_page_texts()),
             "default-src 'none'; img-src data:",
         )._replace(is_token_refused=True)
     host = origin.partition("://")[2]
     url = f"{'wss' if origin.startswith('https') else 'ws'}://{host}"
     if path == "/starter.html":
         page = starter_page(url + query_of(access.token))
-        return _page(HTTPStatus.OK, page, f"default-src 'none'; connect-src {url}")
+        return _page_response(HTTPStatus.OK, page, f"default-src 'none'; connect-src {url}")
     policy = f"default-src 'none'; img-src data:; connect-src 'self' {url}"
-    return _page(HTTPStatus.OK, _filled("test.html", _test_page_words()), policy)
+    return _page_response(HTTPStatus.OK, _fill_template("test.html", _test_page_texts()), policy)
 
 
 def starter_page(url: str) -> str:
@@ -96,7 +98,7 @@ def starter_page(url: str) -> str:
     Args:
         url: WebSocket URL of the server, with the token if one is required.
     """
-    return _source("starter.html").replace("{{address}}", _script_json(url))
+    return _read_template("starter.html").replace("{{address}}", _script_json(url))
 
 
 def _origin(request: PageRequest, access: Access) -> str | None:
@@ -108,7 +110,7 @@ def _origin(request: PageRequest, access: Access) -> str | None:
             origin = checked_origin(f"{scheme}://{request.hosts[0]}")
         except NepError:
             return None
-        if not access.origin_refusal(origin, request.own):
+        if not access.origin_refusal(origin, request.own_origin):
             return origin
     return None
 
@@ -116,12 +118,14 @@ def _origin(request: PageRequest, access: Access) -> str | None:
 # ---- responses
 
 
-def _plain(status: HTTPStatus, sentence: str, headers: Mapping[str, str] | None = None) -> PageResponse:
-    kind = {"Content-Type": _TEXT, "Content-Security-Policy": "default-src 'none'"}
+def _text_response(
+    status: HTTPStatus, sentence: str, headers: Mapping[str, str] | None = None
+) -> PageResponse:
+    kind = {"Content-Type": _TEXT_TYPE, "Content-Security-Policy": "default-src 'none'"}
     return PageResponse(status, {**_HEADERS, **kind, **(headers or {})}, f"{sentence}\n".encode())
 
 
-def _page(status: HTTPStatus, text: str, policy: str) -> PageResponse:
+def _page_response(status: HTTPStatus, text: str, policy: str) -> PageResponse:
     hashes: dict[str, str] = {}
     for element, content in _INLINE.findall(text):
         digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
@@ -129,16 +133,16 @@ def _page(status: HTTPStatus, text: str, policy: str) -> PageResponse:
     inline = "".join(f"; {element}-src{each}" for element, each in hashes.items())
     policy += f"{inline}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     return PageResponse(
-        status, {**_HEADERS, "Content-Type": _HTML, "Content-Security-Policy": policy}, text.encode()
+        status, {**_HEADERS, "Content-Type": _HTML_TYPE, "Content-Security-Policy": policy}, text.encode()
     )
 
 
 @lru_cache
-def _source(name: str) -> str:
+def _read_template(name: str) -> str:
     return Path(__file__).with_name(name).read_text("utf-8")
 
 
-def _filled(name: str, words: Mapping[str, str]) -> str:
+def _fill_template(name: str, words: Mapping[str, str]) -> str:
     """Fill in the texts of a page. "data" is the JSON for the page's script; other texts are escaped."""
 
     def value(hole: re.Match[str]) -> str:
@@ -146,7 +150,7 @@ def _filled(name: str, words: Mapping[str, str]) -> str:
             return _script_json(words)
         return html.escape(words[hole[1]])
 
-    return _HOLE.sub(value, _source(name))
+    return _PLACEHOLDER.sub(value, _read_template(name))
 
 
 def _script_json(value: object) -> str:
@@ -157,7 +161,7 @@ def _script_json(value: object) -> str:
 # ---- words
 
 
-def _refused_words() -> dict[str, str]:
+def _refused_page_texts() -> dict[str, str]:
     return {
         "language": language(),
         "title": _("Token required"),
@@ -168,7 +172,7 @@ def _refused_words() -> dict[str, str]:
     }
 
 
-def _test_page_words() -> dict[str, str]:
+def _test_page_texts() -> dict[str, str]:
     return {
         "language": language(),
         "title": _("Test page"),

@@ -14,7 +14,7 @@ MOMENT = datetime.fromisoformat("2026-11-23 07:05:09")
 
 
 def test_date_parts_are_extracted():
-    told = {part: clock.part_of_moment(MOMENT, part) for _words, part in PARTS}
+    told = {part: clock.date_part(MOMENT, part) for _words, part in PARTS}
     assert told == {
         "year": 2026, "month": 11, "day": 23, "weekday": 1, "day name": "Monday", "hour": 7, "minute": 5,
         "second": 9, "date": "2026-11-23", "time": "07:05", "date and time": "2026-11-23 07:05:09",
@@ -42,7 +42,7 @@ PARTS = options()
     ],
 )
 def test_common_date_formats_are_parsed(written, expected):
-    assert str(clock.read_moment(written, MOMENT)) == expected
+    assert str(clock.parse_moment(written, MOMENT)) == expected
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_common_date_formats_are_parsed(written, expected):
 )
 def test_invalid_date_is_rejected_with_explanation(wrong):
     with pytest.raises(BehaviourError, match="needs a time such as 14:30"):
-        clock.read_moment(wrong, MOMENT)
+        clock.parse_moment(wrong, MOMENT)
 
 
 def test_seconds_since_is_positive_for_past_and_negative_for_future():
@@ -81,12 +81,12 @@ def test_timer_counts_and_resets():
 def test_script_clock_stops_while_paused():
     time_s = [10.0]
     scheduler = Scheduler(lambda: time_s[0])
-    began = scheduler.running_s()
+    began = scheduler.running_time_s()
     time_s[0] += 2
     scheduler.pause()
     scheduler.pause()
     time_s[0] += 100
-    assert scheduler.running_s() - began == 2
-    scheduler.go_on()
+    assert scheduler.running_time_s() - began == 2
+    scheduler.resume()
     time_s[0] += 1
-    assert scheduler.running_s() - began == 3
+    assert scheduler.running_time_s() - began == 3

@@ -182,7 +182,7 @@ def test_hidden_list_slot_is_not_required() -> None:
 
 def test_empty_slot_of_new_list_is_reported() -> None:
     run = play(workspace(started(write(list_of() | {"extraState": {"items": 2}}))))
-    assert run.program.problems[0].sentence == "list of needs a value. Drag one into its slot."
+    assert run.program.problems[0].message == "list of needs a value. Drag one into its slot."
 
 
 def test_nested_list_is_deep_copied_when_added() -> None:

@@ -37,7 +37,7 @@ def worked_out(name: str, *given: object) -> object:
 )
 def test_letters_are_grapheme_clusters(words, count):
     assert values.length(words) == count
-    assert "".join(values.letters(words)) == words
+    assert "".join(values.grapheme_clusters(words)) == words
 
 
 @pytest.mark.parametrize(

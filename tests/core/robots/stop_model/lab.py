@@ -85,7 +85,7 @@ class SimulatedLab:
         self.advance(GRAPH_POLL_S)
         link = self.studio.session.fleet.link(name)
         assert link is not None
-        assert link.connected
+        assert link.is_connected
         assert not link.virtual
         return link
 

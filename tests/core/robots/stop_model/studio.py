@@ -10,10 +10,10 @@ from typing import Any, cast
 import orjson
 
 from app.blocks.model.program import Program
-from app.core.network.source import GraphSeen, MasterFound
+from app.core.network.source import GraphReceived, MasterFound
 from app.core.robots.stop.stopper import RobotStopper
 from app.core.run.acting.arming import Target
-from app.core.run.acting.shelf import KeptMessage
+from app.core.run.acting.shelf import SavedMessage
 from app.core.run.runner import RunnerEvent
 from app.core.run.wanted import RequestedRun
 from app.core.session import Session
@@ -44,7 +44,7 @@ class SimulatedHeartbeat:
         self._robots: dict[str, Callable[[Mapping[str, object]], object]] = {}
         self._is_due = False
 
-    def beat(self, robot: str, publish: Callable[[Mapping[str, object]], object]) -> None:
+    def start(self, robot: str, publish: Callable[[Mapping[str, object]], object]) -> None:
         self._robots[robot] = publish
         if not self._is_due:
             self._is_due = True
@@ -158,7 +158,7 @@ class SimulatedStudio:
         source.post(MasterFound("127.0.0.1:9"))
 
     def see(self) -> None:
-        self._source.post(GraphSeen(self.network.view(), 0.0))
+        self._source.post(GraphReceived(self.network.view(), 0.0))
 
     def tick(self) -> None:
         self.session.tick()
@@ -194,7 +194,7 @@ class SimulatedStudio:
     def send_from_shelf(self, name: str) -> None:
         """Send a message of the publish shelf, as its button and its key do."""
         acting = self.session.acting
-        message = KeptMessage("m", "drive", f"/{name}/command", "robot/command", _drive_text(name))
+        message = SavedMessage("m", "drive", f"/{name}/command", "robot/command", _drive_text(name))
         acting.send(message)
         while acting.question is not None or self.session.fleet.permission.question is not None:
             if acting.question is not None:
@@ -211,8 +211,8 @@ class SimulatedStudio:
     def replay(self, name: str) -> None:
         """Replay a command that was recorded: what `ReplayOutbox` tells and does for each route."""
         topic = f"/{name}/command"
-        if self.session.fleet.gate.permits(topic, lambda: self.replay(name)):
-            self.session.acting.tell_moved(Target("topic", topic), "replay")
+        if self.session.fleet.gate.request_permission(topic, lambda: self.replay(name)):
+            self.session.acting.notify_moved(Target("topic", topic), "replay")
             publisher = self.node.new_pub(topic, "robot/command")
             self.network.connect()
             publisher.publish(orjson.loads(_drive_text(name)))

@@ -19,10 +19,10 @@ from app.core.network.mailbox import Batch
 from app.ui.panels.plot import PANEL
 from app.ui.panels.plot.export import CSV, PNG, SVG
 from app.ui.panels.plot.look import DASHES, CurveLook
-from app.ui.panels.plot.panel import SOON, PlotPanel
-from app.ui.panels.plot.shown_curve import MINUS, value_words
+from app.ui.panels.plot.panel import IDLE_STATS_UPDATE_TICKS, PlotPanel
+from app.ui.panels.plot.shown_curve import MINUS, value_text
 from app.ui.panels.plot.time_view import TimeView
-from app.ui.widgets.field_drag import dropped_field, field_in_hand
+from app.ui.widgets.field_drag import dropped_field, field_mime_data
 from nep.messages.message import Message
 from tests.ui.fakes import Session
 from tests.ui.panel_case import Window, button, has_keys, press
@@ -58,10 +58,10 @@ def send(panel: PlotPanel, topic: str, rows, *, dropped: int = 0) -> None:
 
 def show(panel: PlotPanel, *texts: str, right: bool = False) -> None:
     for text in texts:
-        panel._show_new(panel.curves.add(text, TOPICS), right=right)
+        panel._add_curves(panel.curves.add(text, TOPICS), right=right)
 
 
-def look(panel: PlotPanel, times: int = SOON) -> None:
+def look(panel: PlotPanel, times: int = IDLE_STATS_UPDATE_TICKS) -> None:
     for _ in range(times):
         panel.refresh()
 
@@ -114,7 +114,7 @@ def test_field_added_by_another_panel_is_plotted_and_its_topic_watched(panel, wi
     assert "/odom" in window.session.watched
     send(panel, "/odom", sine(0, 60))
     look(panel)
-    assert cell(panel, "/odom.speed", "last") == value_words(float(np.sin(59.95)))
+    assert cell(panel, "/odom.speed", "last") == value_text(float(np.sin(59.95)))
     assert panel.points.text() == "1\u2009200 points, all shown"
     columns = drawn(panel, panel.theme.series(0))
     assert len(columns) > 0.9 * panel.canvas.area.width()
@@ -141,7 +141,7 @@ def test_million_points_are_reduced_to_two_per_pixel(panel) -> None:
     samples = panel.shown[0].curve.samples
     times = np.arange(1_000_000) / 1000
     samples.extend(times, np.sin(times), np.zeros(len(times), dtype=bool))
-    panel._choose_span("all")
+    panel._set_span("all")
     look(panel)
     assert panel.points.text() == "1\u2009000\u2009000 points, downsampled to 2 per pixel"
     (item,) = panel.canvas._lines.values()
@@ -152,7 +152,7 @@ def test_million_points_are_reduced_to_two_per_pixel(panel) -> None:
 def test_states_have_lanes_and_booleans_show_only_true(panel) -> None:
     show(panel, "/odom.speed", "/odom.mode", "/odom.on")
     send(panel, "/odom", sine(0, 60))
-    panel._changed()
+    panel._curves_changed()
     look(panel)
     words = [(curve.name, run.word) for curve, run, _box in panel.lanes.boxes()]
     assert {word for name, word in words if name == "/odom.mode"} == {"up", "down"}
@@ -192,7 +192,7 @@ def test_largest_and_smallest_numbers_are_drawn(panel, values) -> None:
     show(panel, "/odom.speed")
     send(panel, "/odom", [(t / 10, {"speed": value}) for t, value in enumerate(values * 20)])
     look(panel)
-    panel.canvas.release_values()
+    panel.canvas.reset_value_ranges()
     look(panel)
     shown = panel.canvas.ranges["left"]
     assert shown.low < shown.high
@@ -214,7 +214,7 @@ def test_single_value_between_two_gaps_is_drawn_as_a_dot(panel) -> None:
 def test_state_changes_within_a_pixel_are_painted_once(panel) -> None:
     show(panel, "/odom.mode")
     send(panel, "/odom", [(t / 100, {"mode": f"step {t}"}) for t in range(6000)])
-    panel._changed()
+    panel._curves_changed()
     look(panel)
     boxes = [box for _curve, _run, box in panel.lanes.boxes()]
     wide = panel.canvas.area.width()
@@ -315,10 +315,10 @@ def test_zoom_stays_within_the_range_of_floats() -> None:
         view.zoom(factor, 5.0, view.visible_range(0.0, 10.0))
         begin, end = view.visible_range(0.0, 10.0)
         assert 0 < end - begin <= 1e9
-    view.hold((1.0, 3.0))
+    view.pause((1.0, 3.0))
     view.zoom(2.0, 2.0, (1.0, 3.0))
     assert view.visible_range(0.0, 99.0) == pytest.approx((0.0, 4.0)), "what is under the mouse stays there"
-    view.choose(0.0)
+    view.set_span(0.0)
     assert view.visible_range(-7.0, 99.0) == (-7.0, 4.0)
 
 
@@ -329,7 +329,7 @@ def test_cursors_a_and_b_are_moved_by_mouse_and_keys(panel) -> None:
     show(panel, "/odom.speed", "/odom.mode")
     send(panel, "/odom", sine(0, 60))
     look(panel)
-    panel._changed()
+    panel._curves_changed()
     QTest.keyClick(panel.canvas, Qt.Key.Key_M)
     look(panel)
     assert set(panel.canvas.cursors) == {"A", "B"}
@@ -337,18 +337,18 @@ def test_cursors_a_and_b_are_moved_by_mouse_and_keys(panel) -> None:
     flag = panel.canvas._flag(x).center()
     drag(panel.canvas.viewport(), flag, flag - QPointF(40, 0))
     assert panel.canvas.x_of(panel.canvas.cursors["A"]) == pytest.approx(x - 40, abs=1)
-    panel._put_cursor("A", 10.0)
+    panel._set_cursor("A", 10.0)
     QTest.keyClick(panel.canvas, Qt.Key.Key_Right)
     assert panel.canvas.cursors["A"] == pytest.approx(10.05)
     QTest.keyClick(panel.canvas, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
     assert panel.canvas.cursors["A"] == pytest.approx(9.55)
-    panel._put_cursor("B", 20.0)
+    panel._set_cursor("B", 20.0)
     look(panel)
-    assert cell(panel, "/odom.speed", "a") == value_words(float(np.sin(9.55)))
-    assert cell(panel, "/odom.speed", "difference") == value_words(float(np.sin(20.0) - np.sin(9.55)))
+    assert cell(panel, "/odom.speed", "a") == value_text(float(np.sin(9.55)))
+    assert cell(panel, "/odom.speed", "difference") == value_text(float(np.sin(20.0) - np.sin(9.55)))
     inside = np.sin(np.arange(9.55, 20.01, 0.05))
-    assert cell(panel, "/odom.speed", "max") == value_words(float(inside.max()))
-    assert cell(panel, "/odom.speed", "mean") == value_words(float(inside.mean()))
+    assert cell(panel, "/odom.speed", "max") == value_text(float(inside.max()))
+    assert cell(panel, "/odom.speed", "mean") == value_text(float(inside.mean()))
     assert cell(panel, "/odom.mode", "difference") == "6 changes"
     assert panel.about.text() == "Min, max and mean between A and B"
     QTest.keyClick(panel.canvas, Qt.Key.Key_M)
@@ -366,7 +366,7 @@ def test_eye_icon_hides_a_curve_and_its_menu_changes_axis_and_colour(panel, wind
     QTest.mouseClick(
         panel.table.viewport(), Qt.MouseButton.LeftButton, pos=panel.table.visualRect(index).center()
     )
-    assert panel.shown[0].hidden
+    assert panel.shown[0].is_hidden
     look(panel)
     assert list(panel.canvas._lines) == ["/odom.turn"]
     menu = panel.table.menu_of(panel.shown[1])
@@ -408,7 +408,7 @@ def test_plot_keys_work_in_the_table_too(panel) -> None:
     ],
 )  # fmt: skip
 def test_table_shows_the_values_of_the_curves(value, words) -> None:
-    assert value_words(value) == words
+    assert value_text(value) == words
 
 
 # -- adding ------------------------------------------------------------------------------------------------
@@ -417,11 +417,11 @@ def test_table_shows_the_values_of_the_curves(value, words) -> None:
 @pytest.fixture
 def adding(panel, window, qtbot) -> PlotPanel:
     panel.activateWindow()
-    panel.add.ask("")
+    panel.add.prompt("")
     qtbot.waitUntil(panel.add.hasFocus)
     session = window.session
     session.send("/odom", {"pose": {"x": 1.5, "y": 2}, "speed": 3, "ranges": [1, 2, 3]})
-    panel.add._renew()
+    panel.add._refresh_fields()
     return panel
 
 
@@ -460,7 +460,7 @@ def test_expression_is_accepted_and_all_array_elements_are_added_at_once(adding,
     panel = adding
     QTest.keyClicks(panel.add, "/odom.speed * 2")
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
-    panel.add.ask("/odom.ranges[*]")
+    panel.add.prompt("/odom.ranges[*]")
     window.session.send("/odom", {"pose": {"x": 1.5, "y": 2}, "speed": 3, "ranges": [1, 2, 3]})
     QTest.keyClick(panel.add, Qt.Key.Key_Return)
     assert [each.name for each in panel.shown] == [
@@ -494,7 +494,7 @@ def test_image_topics_are_not_subscribed_to_find_numeric_fields(adding, window) 
 
 
 def test_field_is_added_by_drag_and_drop() -> None:
-    data = field_in_hand("ros2 /odom", 'pose["first name"]')
+    data = field_mime_data("ros2 /odom", 'pose["first name"]')
     assert dropped_field(data) == ("ros2 /odom", 'pose["first name"]')
     assert data.text() == 'ros2 /odom.pose["first name"]'
     data.setData("application/x-nep-field", b"[1, 2]")
@@ -520,11 +520,11 @@ def test_second_curve_is_plotted_over_the_first(panel) -> None:
     look(panel)
     panel.across.click()
     panel.cursors.click()
-    panel._put_cursor("A", 0.0)
-    panel._put_cursor("B", 30.0)
+    panel._set_cursor("A", 0.0)
+    panel._set_cursor("B", 30.0)
     look(panel)
     assert panel.drawings.currentWidget() is panel.xy
-    one, other = panel.xy.place_of(0, 0), panel.xy.place_of(1, 1)
+    one, other = panel.xy.position_of(0, 0), panel.xy.position_of(1, 1)
     assert abs(other.x() - one.x()) == pytest.approx(abs(other.y() - one.y()), rel=1e-6), "equal scales"
     assert "A to B" in panel.about.text()
     (path,) = panel.xy._paths
@@ -542,8 +542,8 @@ def test_largest_and_smallest_numbers_are_drawn_in_xy_mode(panel, values) -> Non
     send(panel, "/odom", rows)
     panel.across.click()
     panel.cursors.click()
-    panel._put_cursor("A", 0.0)
-    panel._put_cursor("B", 1.0)
+    panel._set_cursor("A", 0.0)
+    panel._set_cursor("B", 1.0)
     look(panel)
     assert panel.drawings.currentWidget() is panel.xy
     assert not panel.xy.grab().isNull()
@@ -556,14 +556,14 @@ def test_largest_and_smallest_numbers_are_drawn_in_xy_mode(panel, values) -> Non
 
 def test_layout_restores_the_plot_even_if_topics_are_missing(qtbot, panel, window) -> None:
     show(panel, "/odom.speed", "/odom.speed - /cmd.linear", right=True)
-    panel.shown[0].hidden = True
-    panel._choose_span("300")
+    panel.shown[0].is_hidden = True
+    panel._set_span("300")
     kept = json.loads(json.dumps(panel.save_state()))
     other = Window(Session()).make(PANEL, (600, 400))
     qtbot.addWidget(other)
     assert isinstance(other, PlotPanel)
     other.restore_state(kept)
-    assert [(each.name, each.right, each.hidden) for each in other.shown] == [
+    assert [(each.name, each.right, each.is_hidden) for each in other.shown] == [
         ("/odom.speed", True, True),
         ("/odom.speed - /cmd.linear", True, False),
     ]
@@ -591,7 +591,7 @@ def test_damaged_layout_leaves_a_working_plot(panel, state) -> None:
 def test_data_images_and_svg_are_exported(qtbot, panel, window, tmp_path: Path) -> None:
     show(panel, "/odom.speed", "/odom.mode")
     send(panel, "/odom", sine(0, 100))
-    panel._changed()
+    panel._curves_changed()
     look(panel)
     panel.exporter.write(tmp_path / "a.csv", CSV)
     qtbot.waitUntil(lambda: panel.refresh() or "Exported a.csv" in window.toasts)
@@ -615,7 +615,7 @@ def test_export_that_cannot_be_written_is_reported(qtbot, panel, window, tmp_pat
     look(panel)
     (tmp_path / "file").write_text("x")
     for kind in (CSV, PNG):
-        panel.exporter.write(tmp_path / "file" / f"a{kind.ending}", kind)
+        panel.exporter.write(tmp_path / "file" / f"a{kind.suffix}", kind)
         qtbot.waitUntil(
             lambda: panel.refresh() or any("can't write" in each.lower() for each in window.toasts)
         )

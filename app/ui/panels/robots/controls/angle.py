@@ -78,7 +78,7 @@ class AngleDial(QWidget):
             return math.degrees(math.atan2(away.y(), -away.x()))
         return math.degrees(math.atan2(-away.x(), -away.y()))
 
-    def _choose(self, value: float) -> None:
+    def _change_value(self, value: float) -> None:
         steps = round((value - self._minimum) / self._step)
         stepped = round(self._minimum + steps * self._step, 6)
         wanted = min(max(stepped, self._minimum), self._maximum)
@@ -91,29 +91,29 @@ class AngleDial(QWidget):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self._grip = self._value
-            self._turn_to(self._angle_at(event.position()))
+            self._drag_to(self._angle_at(event.position()))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._grip is not None:
-            self._turn_to(self._angle_at(event.position()))
+            self._drag_to(self._angle_at(event.position()))
 
-    def _turn_to(self, pointed: float) -> None:
+    def _drag_to(self, pointed: float) -> None:
         # Of the equivalent angles, takes the one nearest to the last, so that full turns accumulate.
         last = self._grip if self._grip is not None else self._value
         self._grip = pointed + 360.0 * round((last - pointed) / 360.0)
         self._grip = min(max(self._grip, self._minimum - 90.0), self._maximum + 90.0)
-        self._choose(self._grip)
+        self._change_value(self._grip)
 
     def mouseReleaseEvent(self, _event: QMouseEvent) -> None:
         self._grip = None
 
     def mouseDoubleClickEvent(self, _event: QMouseEvent) -> None:
         self._grip = None
-        self._choose(self._default)
+        self._change_value(self._default)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         if self.hasFocus():
-            self._choose(self._value + self._step * event.angleDelta().y() / WHEEL_NOTCH)
+            self._change_value(self._value + self._step * event.angleDelta().y() / WHEEL_NOTCH)
             event.accept()
         else:
             event.ignore()
@@ -133,7 +133,7 @@ class AngleDial(QWidget):
         if by is None:
             super().keyPressEvent(event)
         else:
-            self._choose(self._value + by)
+            self._change_value(self._value + by)
 
     # -- painting -----------------------------------------------------------------------------------------
 

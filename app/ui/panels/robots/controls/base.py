@@ -13,7 +13,7 @@ from nep.i18n import _
 
 VALUE_WIDTH, ROW_HEIGHT = 104, 36
 
-Tell = Callable[[], None]
+Callback = Callable[[], None]
 
 
 class Control:
@@ -34,11 +34,11 @@ class Control:
         widget: QWidget,
         value: Callable[[], object],
         show: Callable[[object], None],
-        changed: Callable[[Tell], None],
+        changed: Callable[[Callback], None],
         *,
-        finished: Callable[[Tell], None] | None = None,
+        finished: Callable[[Callback], None] | None = None,
         sentence: Callable[[], str] | None = None,
-        close: Tell | None = None,
+        close: Callback | None = None,
     ) -> None:
         self.widget = widget
         self.changed = changed
@@ -53,13 +53,13 @@ class Control:
         """Show a value; invalid values are ignored."""
         self._show(value)
 
-    def finished(self, tell: Tell) -> None:
+    def finished(self, tell: Callback) -> None:
         """Call `tell` whenever the user finishes editing."""
         if self._finished is not None:
             self._finished(tell)
 
     @property
-    def sentence(self) -> str:
+    def error_text(self) -> str:
         """Error message shown by the control itself, "" if the value is valid."""
         return "" if self._sentence is None else self._sentence()
 
@@ -69,7 +69,7 @@ class Control:
             self._close()
 
 
-def connect(signal: object, tell: Tell) -> None:
+def connect(signal: object, tell: Callback) -> None:
     """Connect a callback to a signal and ignore the signal's arguments."""
     signal.connect(lambda *_values: tell())  # type: ignore[attr-defined]  # any Qt signal
 

@@ -8,15 +8,16 @@ from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import ROW_HEIGHT, Control, connect, sentence_case
 from app.ui.panels.robots.controls.colour import colour_control
 from app.ui.panels.robots.controls.number import number_control
-from app.ui.panels.robots.controls.picture import NoPictures, Pictures, picture_control
+from app.ui.panels.robots.controls.picture import EmptyImageSource, ImageSource, picture_control
 from app.ui.panels.robots.controls.text import text_control
-from app.ui.panels.robots.input_text import NUMBERS
-from app.ui.text.sensor_values import yes_words
+from app.ui.panels.robots.input_text import NUMBER_KINDS
+from app.ui.text.sensor_values import yes_no_text
 from app.ui.theme.theme import Theme
 from app.ui.widgets import ComboBox, Segments, Switch
 
 __all__ = [
-    "NUMBERS", "ROW_HEIGHT", "Control", "NoPictures", "Pictures", "control_for", "sentence_case",
+    "NUMBER_KINDS", "ROW_HEIGHT", "Control", "EmptyImageSource", "ImageSource", "control_for",
+    "sentence_case",
 ]  # fmt: skip
 
 MAX_SEGMENTS = 4
@@ -24,7 +25,7 @@ MAX_SEGMENT_CHARS = 44
 
 
 def control_for(
-    theme: Theme, parameter: Parameter, options: Sequence[str] = (), pictures: Pictures | None = None
+    theme: Theme, parameter: Parameter, options: Sequence[str] = (), pictures: ImageSource | None = None
 ) -> Control:
     """Return the input control for a parameter.
 
@@ -33,14 +34,14 @@ def control_for(
     """
     if parameter.choices or options:
         return _choice(theme, parameter, options)
-    if parameter.kind in NUMBERS:
+    if parameter.kind in NUMBER_KINDS:
         return number_control(theme, parameter)
     if parameter.kind == "boolean":
         return _switch(theme, parameter)
     if parameter.kind == "colour":
         return colour_control(theme, parameter)
     if parameter.kind == "image":
-        return picture_control(theme, parameter, pictures if pictures is not None else NoPictures())
+        return picture_control(theme, parameter, pictures if pictures is not None else EmptyImageSource())
     return text_control(theme, parameter)
 
 
@@ -59,7 +60,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
         )
         made = Control(
             segments,
-            lambda: _chosen(values, segments.value),
+            lambda: _value_for_key(values, segments.value),
             lambda value: segments.set_value(str(value)),
             lambda tell: connect(segments.changed, tell),
         )
@@ -67,7 +68,7 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
         combo = ComboBox(theme, pairs, name=parameter.title)
         made = Control(
             combo,
-            lambda: _chosen(values, combo.value),
+            lambda: _value_for_key(values, combo.value),
             lambda value: combo.set_value(str(value)),
             lambda tell: connect(combo.currentIndexChanged, tell),
         )
@@ -76,15 +77,15 @@ def _choice(theme: Theme, parameter: Parameter, options: Sequence[str]) -> Contr
     return made
 
 
-def _chosen(values: dict[str, object], key: str) -> object:
+def _value_for_key(values: dict[str, object], key: str) -> object:
     # 0 is a valid value; "" means that there is none.
     return values.get(key, key) if key else None
 
 
 def _switch(theme: Theme, parameter: Parameter) -> Control:
-    switch = Switch(theme, yes_words(parameter.default is True), parameter.default is True)
+    switch = Switch(theme, yes_no_text(parameter.default is True), parameter.default is True)
     switch.setAccessibleName(parameter.title)
-    switch.toggled.connect(lambda on: switch.setText(yes_words(on)))
+    switch.toggled.connect(lambda on: switch.setText(yes_no_text(on)))
     return Control(
         switch,
         switch.isChecked,

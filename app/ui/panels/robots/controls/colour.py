@@ -77,7 +77,7 @@ class ColourSwatches(QWidget):
         self._swatches: dict[str, _Swatch] = {}
         for colour, words in self._names.items():
             swatch = _Swatch(theme, colour, words)
-            swatch.clicked.connect(lambda _on=False, colour=colour: self._choose(colour))
+            swatch.clicked.connect(lambda _on=False, colour=colour: self._change_value(colour))
             self._swatches[colour] = swatch
             row.addWidget(swatch)
         self._name = label("", "bodyLarge", role="textSecondary")
@@ -102,7 +102,7 @@ class ColourSwatches(QWidget):
             swatch.setAutoExclusive(True)
         self._name.setText(self._names.get(self._value, self._value))
 
-    def _choose(self, value: str) -> None:
+    def _change_value(self, value: str) -> None:
         if value != self._value:
             self.set_value(value)
             self.changed.emit(self._value)
@@ -134,14 +134,14 @@ class HueStrip(QWidget):
         self._light = min(MAX_LIGHTNESS, max(MIN_LIGHTNESS, colour.lightnessF()))
         self.update()
 
-    def _choose(self, hue: float, light: float) -> None:
+    def _change_colour(self, hue: float, light: float) -> None:
         self._hue, self._light = min(max(hue, 0.0), 0.999), min(max(light, MIN_LIGHTNESS), MAX_LIGHTNESS)
         self.update()
         self.changed.emit(QColor.fromHslF(self._hue, 0.9, self._light).name())
 
     def _press(self, at: QPointF) -> None:
         light = MAX_LIGHTNESS - at.y() / self.height() * (MAX_LIGHTNESS - MIN_LIGHTNESS)
-        self._choose(at.x() / self.width(), light)
+        self._change_colour(at.x() / self.width(), light)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -161,7 +161,7 @@ class HueStrip(QWidget):
         if by is None:
             super().keyPressEvent(event)
         else:
-            self._choose(self._hue + by[0] / HUES, self._light + by[1])
+            self._change_colour(self._hue + by[0] / HUES, self._light + by[1])
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -213,11 +213,11 @@ class ColourChoice(QWidget):
         self.sentence = ""
         self._wrong = label("", "small", role="error", wrap=True)
         self._lay_out()
-        self.other.toggled.connect(self._open)
-        self.swatches.changed.connect(self._from_swatch)
-        self.strip.changed.connect(self._from_strip)
-        self.field.textEdited.connect(lambda _text: self._typed(final=False))
-        self.field.editingFinished.connect(lambda: self._typed(final=True))
+        self.other.toggled.connect(self._set_expanded)
+        self.swatches.changed.connect(self._swatch_selected)
+        self.strip.changed.connect(self._hue_picked)
+        self.field.textEdited.connect(lambda _text: self._hex_edited(final=False))
+        self.field.editingFinished.connect(lambda: self._hex_edited(final=True))
 
     def _lay_out(self) -> None:
         first = Flow(gap=6)
@@ -245,40 +245,40 @@ class ColourChoice(QWidget):
         """Show a colour without emitting `changed`; invalid values are ignored."""
         if isinstance(value, str) and _HEX.fullmatch(value):
             self.swatches.set_value(value)
-            self._show_number()
+            self._show_value()
 
-    def _open(self, on: bool) -> None:
+    def _set_expanded(self, on: bool) -> None:
         self._more.setVisible(on)
         if on:
-            self._show_number()
+            self._show_value()
             self.strip.setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _show_number(self) -> None:
+    def _show_value(self) -> None:
         self.field.setText(self.swatches.value)
         self.strip.show_colour(QColor(self.swatches.value))
-        self._judge("")
+        self._show_error("")
 
-    def _from_swatch(self, _value: str) -> None:
-        self._show_number()
+    def _swatch_selected(self, _value: str) -> None:
+        self._show_value()
         self.changed.emit()
 
-    def _from_strip(self, value: str) -> None:
+    def _hue_picked(self, value: str) -> None:
         self.swatches.set_value(value)
         self.field.setText(value)
-        self._judge("")
+        self._show_error("")
         self.changed.emit()
 
-    def _typed(self, *, final: bool) -> None:
+    def _hex_edited(self, *, final: bool) -> None:
         found = _HEX.fullmatch(self.field.text().strip())
         if found is not None:
             self.swatches.set_value(f"#{found[1].lower()}")
             self.strip.show_colour(QColor(self.swatches.value))
-        self._judge("" if found is not None else _("Enter a colour such as #33aaff."), quiet=not final)
+        self._show_error("" if found is not None else _("Enter a colour such as #33aaff."), quiet=not final)
         self.changed.emit()
         if final:
             self.finished.emit()
 
-    def _judge(self, sentence: str, *, quiet: bool = False) -> None:
+    def _show_error(self, sentence: str, *, quiet: bool = False) -> None:
         self.sentence = sentence
         shown = bool(sentence) and not quiet
         self._wrong.setText(sentence if shown else "")

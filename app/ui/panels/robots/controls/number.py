@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.robots.description.description import Parameter
 from app.robots.description.typed_number import parse_number
 from app.ui.panels.robots.controls.angle import AngleDial
-from app.ui.panels.robots.controls.base import VALUE_WIDTH, Control, Tell, connect
+from app.ui.panels.robots.controls.base import VALUE_WIDTH, Callback, Control, connect
 from app.ui.theme.theme import Theme
 from app.ui.widgets import NumberEdit, SliderWithUnit, label
 from app.ui.widgets.flow_layout import Flow
@@ -18,7 +18,7 @@ from app.ui.widgets.keyboard import is_plain
 from nep.i18n import number as number_text
 
 COARSE_SPAN = 20
-UPRIGHT_WORDS = ("pitch", "tilt", "down", "up", "nod")
+VERTICAL_KEYWORDS = ("pitch", "tilt", "down", "up", "nod")
 PAGE_STEPS = 10
 
 
@@ -46,12 +46,12 @@ def number_control(theme: Theme, parameter: Parameter) -> Control:
             if dial is not None:
                 dial.set_value(number)
 
-    def changed(tell: Tell) -> None:
+    def changed(tell: Callback) -> None:
         connect(slider.changed, tell)
         connect(slider.field.textEdited, tell)
 
     return Control(
-        slider if dial is None else _beside(dial, slider, parameter.title),
+        slider if dial is None else _dial_row(dial, slider, parameter.title),
         lambda: _value_of(slider, parameter),
         show,
         changed,
@@ -64,8 +64,8 @@ def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
     # Returns the typed text if it differs from the slider's value, even if it is invalid.
     whole = parameter.kind == "integer"
     typed = slider.field.text()
-    if typed != slider.field.written(slider.value):
-        return read_number(typed, whole=whole)
+    if typed != slider.field.format_number(slider.value):
+        return typed_value(typed, whole=whole)
     return round(slider.value) if whole else float(slider.value)
 
 
@@ -79,7 +79,7 @@ def step_of(parameter: Parameter) -> float:
     return 0.01 if span <= 2 else 0.1
 
 
-def read_number(typed: str, *, whole: bool) -> object:
+def typed_value(typed: str, *, whole: bool) -> object:
     """Parse a typed number. Return None for empty text, and the text itself if it is invalid."""
     if not typed.strip():
         return None
@@ -100,7 +100,7 @@ def _dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDi
         value=slider.value,
         default=_number(parameter.default),
         name=parameter.title,
-        upright=any(word in words for word in UPRIGHT_WORDS),
+        upright=any(word in words for word in VERTICAL_KEYWORDS),
     )
 
     def from_dial(value: float) -> None:
@@ -112,7 +112,7 @@ def _dial(theme: Theme, parameter: Parameter, slider: SliderWithUnit) -> AngleDi
     return dial
 
 
-def _beside(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
+def _dial_row(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
     row = QWidget()
     row.setAccessibleName(name)
     inner = Flow(row)
@@ -139,7 +139,7 @@ class OpenNumber(NumberEdit):
             Qt.Key.Key_PageUp: PAGE_STEPS,
             Qt.Key.Key_PageDown: -PAGE_STEPS,
         }.get(Qt.Key(event.key()))
-        now = read_number(self.text() or "0", whole=False)
+        now = typed_value(self.text() or "0", whole=False)
         if steps is None or not is_plain(event) or not isinstance(now, (int, float)):
             super().keyPressEvent(event)
             return
@@ -153,7 +153,7 @@ class OpenNumber(NumberEdit):
         if self.text().strip():
             super()._read()
         else:
-            self._judge("")
+            self._set_problem("")
 
 
 def _open_number(theme: Theme, parameter: Parameter) -> Control:
@@ -162,8 +162,8 @@ def _open_number(theme: Theme, parameter: Parameter) -> Control:
     field.setMaximumWidth(2 * VALUE_WIDTH)
     wrong = label("", "small", role="error", wrap=True)
     wrong.hide()
-    field.problem.connect(wrong.setText)
-    field.problem.connect(lambda said: wrong.setVisible(bool(said)))
+    field.problem_changed.connect(wrong.setText)
+    field.problem_changed.connect(lambda said: wrong.setVisible(bool(said)))
     column = QWidget()
     column.setAccessibleName(parameter.title)
     inner = QVBoxLayout(column)
@@ -182,7 +182,7 @@ def _open_number(theme: Theme, parameter: Parameter) -> Control:
     show(parameter.default)
     return Control(
         column,
-        lambda: read_number(field.text(), whole=parameter.kind == "integer"),
+        lambda: typed_value(field.text(), whole=parameter.kind == "integer"),
         show,
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),

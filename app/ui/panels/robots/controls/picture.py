@@ -17,13 +17,13 @@ from shiboken6 import isValid
 
 from app.robots.description.description import Parameter
 from app.ui.panels.robots.controls.base import Control, connect, line_field
-from app.ui.panels.robots.controls.picture_file import encoded, image_of, read_picture
+from app.ui.panels.robots.controls.picture_file import encode_image, image_of, read_picture
 from app.ui.text import plain
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.menus import Menu, drop_below
+from app.ui.widgets.menus import Menu, open_below
 from nep.errors import DecodeError
 from nep.i18n import _
 
@@ -34,7 +34,7 @@ POLL_MS = 200
 THUMBNAIL = QSize(72, 54)
 
 
-class Pictures(Protocol):
+class ImageSource(Protocol):
     """Source of images: topics of the session, and files."""
 
     def topics(self) -> Sequence[str]:
@@ -43,11 +43,11 @@ class Pictures(Protocol):
     def stream(self, topic: str) -> ImageStream:
         """Subscribe to a topic's images until the stream is closed."""
 
-    def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
+    def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
         """Show the dialog to choose an image file; an empty `folder` stands for the user's pictures."""
 
 
-class NoPictures:
+class EmptyImageSource:
     """Null implementation of `Pictures`, without topics and files."""
 
     def topics(self) -> Sequence[str]:
@@ -58,7 +58,7 @@ class NoPictures:
         """Raise `KeyError`, because there are no topics."""
         raise KeyError(topic)
 
-    def ask_file(self, folder: str, take: Callable[[Path], None]) -> None:
+    def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
         """Do nothing."""
 
 
@@ -112,7 +112,7 @@ class PictureChoice(QWidget):
 
     changed = Signal()
 
-    def __init__(self, theme: Theme, parameter: Parameter, pictures: Pictures) -> None:
+    def __init__(self, theme: Theme, parameter: Parameter, pictures: ImageSource) -> None:
         super().__init__()
         self._theme, self._parameter, self._pictures = theme, parameter, pictures
         self._stream: ImageStream | None = None
@@ -134,10 +134,10 @@ class PictureChoice(QWidget):
         self._lay_out()
         self._timer = QTimer(self)
         self._timer.setInterval(POLL_MS)
-        self._timer.timeout.connect(self._look)
-        self.field.textEdited.connect(self._typed)
-        self.choose.clicked.connect(self._ask)
-        self.camera.clicked.connect(self._offer)
+        self._timer.timeout.connect(self._poll_stream)
+        self.field.textEdited.connect(self._text_edited)
+        self.choose.clicked.connect(self._prompt_file)
+        self.camera.clicked.connect(self._show_topic_menu)
 
     def _lay_out(self) -> None:
         row = Flow()
@@ -156,32 +156,34 @@ class PictureChoice(QWidget):
     def value(self) -> str | None:
         """Return the encoded image or the typed address; None without an image."""
         if self._stream is not None:
-            self._look()
-            if self._stream.awaits_picture:
+            self._poll_stream()
+            if self._stream.is_awaiting_picture:
                 return None  # the last image may have been received before the stream was suspended
         if self._image is not None:
-            return encoded(self._image, bare=self._parameter.bare)
+            return encode_image(self._image, bare=self._parameter.is_bare_base64)
         return None if self._stream is not None else self.field.text().strip() or None
 
     def set_value(self, value: object) -> None:
         """Show an address or a file."""
         self.close_stream()
-        self._show_none()
+        self._clear_image()
         text = "" if value is None else str(value)
         if text.startswith("data:"):
-            self._image = _image_in(text)
+            self._image = _image_from_url(text)
             self.thumbnail.show_image(self._image)
             self.field.setText(_("earlier image") if self._image is not None else "")
         else:
-            self._typed(text)
+            self._text_edited(text)
             self.field.setText(text)
 
     # -- file ---------------------------------------------------------------------------------------------
 
-    def _ask(self) -> None:
-        self._pictures.ask_file(str(self._file.parent) if self._file is not None else "", self._take_file)
+    def _prompt_file(self) -> None:
+        self._pictures.prompt_file(
+            str(self._file.parent) if self._file is not None else "", self._file_selected
+        )
 
-    def _take_file(self, path: Path) -> None:
+    def _file_selected(self, path: Path) -> None:
         if isValid(self):  # the form may have been deleted while the dialog was open
             self.use_file(path)
 
@@ -193,18 +195,18 @@ class PictureChoice(QWidget):
         self.thumbnail.show_image(self._image)
         self.field.setText(path.name if self._image is not None else str(path))
         self.field.setToolTip(plain.tip(str(path)))
-        self._judge(said)
+        self._show_error(said)
         self.changed.emit()
 
-    def _typed(self, text: str) -> None:
+    def _text_edited(self, text: str) -> None:
         self.close_stream()
-        self._show_none()
+        self._clear_image()
         url = QUrl(text.strip())
         path = Path(url.toLocalFile() if url.isLocalFile() else text.strip())
         if text.strip() and path.suffix and path.is_file():
             self._image, said = read_picture(path)
             self.thumbnail.show_image(self._image)
-            self._judge(said)
+            self._show_error(said)
         self.changed.emit()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
@@ -219,40 +221,40 @@ class PictureChoice(QWidget):
 
     # -- camera -------------------------------------------------------------------------------------------
 
-    def _offer(self) -> None:
+    def _show_topic_menu(self) -> None:
         menu = Menu(self._theme, self)
         topics = list(self._pictures.topics())
         for topic in topics:
-            menu.addAction(plain.entry(topic)).triggered.connect(
+            menu.addAction(plain.escape_menu_text(topic)).triggered.connect(
                 lambda _on=False, topic=topic: self.use_topic(topic)
             )
         if not topics:
             menu.addAction(_("No camera is publishing images")).setEnabled(False)
         menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        drop_below(menu, self.camera)
+        open_below(menu, self.camera)
 
     def use_topic(self, topic: str) -> None:
         """Show the images of a topic. The newest one is sent with the action."""
         self.close_stream()
-        self._show_none()
+        self._clear_image()
         self._stream = self._pictures.stream(topic)
         self.field.setText(_("newest picture of {topic}").format(topic=topic))
         self._timer.start()
         self.changed.emit()
 
-    def _look(self) -> None:
+    def _poll_stream(self) -> None:
         stream = self._stream
         if stream is None:
             return
         picture = stream.picture
-        if picture is not None and picture is not self._seen and not stream.awaits_picture:
+        if picture is not None and picture is not self._seen and not stream.is_awaiting_picture:
             self._seen = picture
             data = picture.bgra.data
             rows, columns = picture.bgra.shape[:2]
             held = QImage(data, columns, rows, QImage.Format.Format_RGB32)
             self._image = held.copy()
             self.thumbnail.show_image(self._image)
-        self._judge(f"{stream.error}." if stream.error else "")
+        self._show_error(f"{stream.error}." if stream.error else "")
 
     def close_stream(self) -> None:
         """Close the stream of the topic, if any."""
@@ -261,19 +263,19 @@ class PictureChoice(QWidget):
             self._stream.close()
         self._stream, self._seen = None, None
 
-    def _show_none(self) -> None:
+    def _clear_image(self) -> None:
         self._image = None
         self.thumbnail.show_image(None)
         self.field.setToolTip("")
-        self._judge("")
+        self._show_error("")
 
-    def _judge(self, sentence: str) -> None:
+    def _show_error(self, sentence: str) -> None:
         self.sentence = sentence
         self._wrong.setText(sentence)
         self._wrong.setVisible(bool(sentence))
 
 
-def _image_in(address: str) -> QImage | None:
+def _image_from_url(address: str) -> QImage | None:
     # Decodes an image from a ``data:`` URL.
     try:
         return image_of(base64.b64decode(address.partition(",")[2]))
@@ -281,7 +283,7 @@ def _image_in(address: str) -> QImage | None:
         return None
 
 
-def picture_control(theme: Theme, parameter: Parameter, pictures: Pictures) -> Control:
+def picture_control(theme: Theme, parameter: Parameter, pictures: ImageSource) -> Control:
     """Return the input control for an image parameter."""
     choice = PictureChoice(theme, parameter, pictures)
     show: Callable[[object], None] = choice.set_value

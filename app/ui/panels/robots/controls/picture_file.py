@@ -16,7 +16,7 @@ from PySide6.QtGui import QImage, QImageReader, QTransform
 
 from nep.errors import DecodeError
 from nep.i18n import _
-from nep.messages.image_files import MAX_BYTES, ImageFile, examine
+from nep.messages.image_files import MAX_BYTES, ImageFile, parse_header
 
 MAX_SIDE_PX, QUALITY = 1280, 85
 MAX_FILE_BYTES = 40_000_000
@@ -50,7 +50,7 @@ def image_of(data: bytes) -> QImage:
     Raises:
         DecodeError: The data is not a supported image.
     """
-    file = examine(data)
+    file = parse_header(data)
     # Qt's default of 256 MB is lower than the limit that was checked before
     QImageReader.setAllocationLimit(MAX_BYTES // 1_000_000)
     buffer = QBuffer()
@@ -61,10 +61,10 @@ def image_of(data: bytes) -> QImage:
     image = reader.read()
     if image.isNull():
         raise DecodeError("image", len(data), _("not a readable image"))
-    return upright(image, file)
+    return apply_orientation(image, file)
 
 
-def upright(image: QImage, file: ImageFile) -> QImage:
+def apply_orientation(image: QImage, file: ImageFile) -> QImage:
     """Rotate an image by its EXIF orientation, which Qt reads from JPEG files only."""
     if file.orientation >= 5:
         image = image.transformed(QTransform(0, 1, 1, 0, 0, 0))
@@ -73,7 +73,7 @@ def upright(image: QImage, file: ImageFile) -> QImage:
     return image.flipped(Qt.Orientation.Vertical) if file.orientation in (3, 4, 7, 8) else image
 
 
-def encoded(image: QImage, *, bare: bool = False) -> str:
+def encode_image(image: QImage, *, bare: bool = False) -> str:
     """Return an image as base64 JPEG, scaled to at most 1280 px on its longer side.
 
     If `bare` is True, the ``data:`` prefix is left out.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from app.robots.description.description import Parameter
-from app.robots.description.inputs import from_words, to_words
+from app.robots.description.inputs import format_for_editing, parse_value
 from app.ui.panels.robots.controls.base import Control, connect, line_field
 from app.ui.theme.theme import Theme
 from app.ui.widgets.inputs.fields import LongText
@@ -27,8 +27,8 @@ def text_control(theme: Theme, parameter: Parameter) -> Control:
     field = line_field(theme, parameter)
     made = Control(
         field,
-        lambda: _given(parameter, field.text()),
-        lambda given: field.setText(_words(given)),
+        lambda: _text_or_none(parameter, field.text()),
+        lambda given: field.setText(_field_text(given)),
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),
     )
@@ -40,8 +40,8 @@ def _long(theme: Theme, parameter: Parameter) -> Control:
     field = LongText(theme, parameter.title)
     made = Control(
         field,
-        lambda: _given(parameter, field.text()),
-        lambda given: field.set_text(_words(given)),
+        lambda: _text_or_none(parameter, field.text()),
+        lambda given: field.set_text(_field_text(given)),
         lambda tell: connect(field.changed, tell),
         finished=lambda tell: connect(field.finished, tell),
     )
@@ -51,18 +51,18 @@ def _long(theme: Theme, parameter: Parameter) -> Control:
 
 def _list(theme: Theme, parameter: Parameter) -> Control:
     field = line_field(theme, parameter)
-    field.setPlaceholderText(_hint(parameter))
+    field.setPlaceholderText(_placeholder(parameter))
 
     def value() -> object:
         words = field.text().strip()
         if not words and not parameter.required and (parameter.nullable or parameter.kind == "object"):
             return None
-        return from_words(parameter, words)
+        return parse_value(parameter, words)
 
     made = Control(
         field,
         value,
-        lambda given: field.setText(_words(given)),
+        lambda given: field.setText(_field_text(given)),
         lambda tell: connect(field.textChanged, tell),
         finished=lambda tell: connect(field.editingFinished, tell),
     )
@@ -70,25 +70,25 @@ def _list(theme: Theme, parameter: Parameter) -> Control:
     return made
 
 
-def _given(parameter: Parameter, text: str) -> str | None:
+def _text_or_none(parameter: Parameter, text: str) -> str | None:
     # Empty text omits an optional parameter; validation reports a missing required one.
     return text if text or parameter.required else None
 
 
-def _hint(parameter: Parameter) -> str:
+def _placeholder(parameter: Parameter) -> str:
     if parameter.kind == "object":
         names = ", ".join(f'"{field.name}": …' for field in parameter.fields) or '"name": …'
         return f"{{{names}}}"
-    held = [parameter.each] if parameter.each is not None else list(parameter.places)
+    held = [parameter.item] if parameter.item is not None else list(parameter.prefix_items)
     if any(each.kind in ("list", "object") for each in held):
         return "[…, …]"
-    if parameter.places:
-        return ", ".join(each.kind for each in parameter.places)
-    is_number = parameter.each is not None and parameter.each.kind in ("number", "integer", "angle")
+    if parameter.prefix_items:
+        return ", ".join(each.kind for each in parameter.prefix_items)
+    is_number = parameter.item is not None and parameter.item.kind in ("number", "integer", "angle")
     return _("Numbers separated by commas") if is_number else _("Words separated by commas")
 
 
-def _words(given: object) -> str:
+def _field_text(given: object) -> str:
     if isinstance(given, (list, tuple, Mapping)):
-        return to_words(given)
+        return format_for_editing(given)
     return "" if given is None else str(given)

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.core.network.web_pages import WebPages
-from app.core.network.web_words import address_words
+from app.core.network.web_words import address_text
 from app.ui.shell.dialogs.web_pages.fields import CopyField, RoleIcon
 from app.ui.shell.dialogs.web_pages.qr_code import SIDE, QrCode
 from app.ui.theme.theme import Theme
@@ -16,19 +16,19 @@ from app.ui.widgets import Button, ComboBox, IconButton, Segments, label, set_ro
 from nep.i18n import _
 from nep.system.addresses import OwnAddress
 
-LABEL_WIDE = 80
+LABEL_WIDTH = 80
 _MAX_SEGMENTS = 2
 _MASK = "•••• •••• {end}"
 _VISIBLE_CHARS = 4
 
 
-class OpenTo(QWidget):
+class AddressChoice(QWidget):
     """Choice of the address on which the server is reachable.
 
     Emits `chosen` with one of this computer's addresses, or "" for this computer only.
     """
 
-    chosen = Signal(str)
+    selected = Signal(str)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -38,25 +38,25 @@ class OpenTo(QWidget):
         self._choice: Segments | ComboBox | None = None
         self._hosts: tuple[str, ...] = ()
 
-    def offer(self, addresses: Sequence[OwnAddress], value: str) -> None:
+    def set_addresses(self, addresses: Sequence[OwnAddress], value: str) -> None:
         """Set the available addresses, with ``value`` selected."""
         if value and value not in {own.host for own in addresses}:  # the computer no longer has this address
             addresses = (*addresses, OwnAddress(value, ""))
         options: list[tuple[str, str, str | None]] = [("", _("This computer"), None)]
-        options += [(own.host, address_words(own), None) for own in addresses]
+        options += [(own.host, address_text(own), None) for own in addresses]
         if self._choice is not None:
             self._row.removeWidget(self._choice)
             self._choice.deleteLater()
         if len(options) <= _MAX_SEGMENTS:
             segments = Segments(self._theme, options, value, check=True, name=_("Available on"), wraps=True)
-            segments.changed.connect(self.chosen)
+            segments.changed.connect(self.selected)
             self._choice = segments
         else:
             combo = ComboBox(
                 self._theme, [(host, words) for host, words, _icon in options], name=_("Available on")
             )
             combo.set_value(value)
-            combo.activated.connect(lambda _index: self.chosen.emit(combo.value))
+            combo.activated.connect(lambda _index: self.selected.emit(combo.value))
             self._choice = combo
         self._row.addWidget(self._choice)
         if isinstance(self._choice, Segments):
@@ -73,7 +73,7 @@ class OpenTo(QWidget):
             self._choice.set_value(value)
 
     @property
-    def choice(self) -> QWidget | None:
+    def input_widget(self) -> QWidget | None:
         """Widget of the choice that gets the focus."""
         return self._choice
 
@@ -83,7 +83,7 @@ class AccessForm(QWidget):
 
     copy_address = Signal()
     copy_token = Signal()
-    new_token_wanted = Signal()
+    new_token_requested = Signal()
 
     def __init__(self, theme: Theme, web: WebPages) -> None:
         super().__init__()
@@ -92,16 +92,16 @@ class AccessForm(QWidget):
         self.reveal = IconButton(theme, "eye", _("Show the token"), checkable=True, size=26)
         self.token = CopyField(theme, _("Token"), _("Copy the token"), self.reveal)
         self.new_token = Button(theme, _("New"), "refresh-cw")
-        self.open_to = OpenTo(theme)
+        self.open_to = AddressChoice(theme)
         self.reach_icon = RoleIcon(theme, "lock", side=14, is_at_top=True)
         self.reach = label("", "small", wrap=True)
         self.works_with = label("", "small", role="textTertiary", wrap=True)
         self.qr = QrCode(theme)
         self.qr_words = label("", "small", role="textSecondary", wrap=True)
         self.qr_words.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-        self.address.copy_wanted.connect(self.copy_address)
-        self.token.copy_wanted.connect(self.copy_token)
-        self.new_token.clicked.connect(self.new_token_wanted)
+        self.address.copy_requested.connect(self.copy_address)
+        self.token.copy_requested.connect(self.copy_token)
+        self.new_token.clicked.connect(self.new_token_requested)
         self.reveal.toggled.connect(self._show_token)
         self._lay_out()
 
@@ -140,7 +140,7 @@ class AccessForm(QWidget):
         self._measure()
 
     def _measure(self) -> None:
-        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDE)))
+        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
         self.qr_words.setFixedWidth(round(self._theme.scaled(SIDE)))
 
     def show_state(self, *, is_foxglove: bool) -> None:
@@ -182,15 +182,15 @@ class AccessForm(QWidget):
     def _show_code(self, *, is_foxglove: bool) -> None:
         web = self._web
         if is_foxglove:
-            self.qr.show_words(
+            self.qr.show_message(
                 _("Copy the link below. In Foxglove or Lichtblick: Open connection, Foxglove WebSocket.")
             )
         elif not web.host:
-            self.qr.show_words(
+            self.qr.show_message(
                 _("To scan a code with a tablet, select a network address instead of “This computer”.")
             )
         elif web.state != "on" or "rosbridge" not in web.protocols:
-            self.qr.show_words(_("The code appears here once web pages can connect."))
+            self.qr.show_message(_("The code appears here once web pages can connect."))
         else:
             self.qr.show_code(web.page_url, web.host_and_port)
         self.qr_words.setText(_("Scan with the tablet") if self.qr.text else "")

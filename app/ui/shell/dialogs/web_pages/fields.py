@@ -17,29 +17,29 @@ _PADDING, _BUTTON = 10, 26
 class _ReadOnlyLine(QLineEdit):
     """Read-only line edit. If nothing is selected, Ctrl+C copies the full text, even if parts are masked."""
 
-    copy_wanted = Signal()
-    focused = Signal()
+    copy_requested = Signal()
+    focus_changed = Signal()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Copy) and not self.hasSelectedText():
-            self.copy_wanted.emit()
+            self.copy_requested.emit()
         else:
             super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.deselect()
-        self.focused.emit()
+        self.focus_changed.emit()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        self.focused.emit()
+        self.focus_changed.emit()
 
 
 class CopyField(QWidget):
     """Field with a text to copy; emits `copy_wanted` for its button and Ctrl+C."""
 
-    copy_wanted = Signal()
+    copy_requested = Signal()
 
     def __init__(self, theme: Theme, name: str, copy_words: str, *buttons: IconButton) -> None:
         # `copy_words` is the name of the copy button; `buttons` are placed before it.
@@ -52,9 +52,9 @@ class CopyField(QWidget):
         self.line.setProperty("ownFocus", True)
         EditMenu(theme, self.line)
         self.copy = IconButton(theme, "copy", copy_words, size=_BUTTON)
-        self.copy.clicked.connect(self.copy_wanted)
-        self.line.copy_wanted.connect(self.copy_wanted)
-        self.line.focused.connect(self.update)
+        self.copy.clicked.connect(self.copy_requested)
+        self.line.copy_requested.connect(self.copy_requested)
+        self.line.focus_changed.connect(self.update)
         self.setFocusProxy(self.line)
         row = QHBoxLayout(self)
         row.setContentsMargins(_PADDING, 2, 4, 2)

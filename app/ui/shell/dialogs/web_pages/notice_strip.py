@@ -21,7 +21,7 @@ _BUTTONS = {
 class NoticeStrip(AlertBox):
     """Strip with one notice; emits `helped` for its button and `dismissed` for its close button."""
 
-    helped = Signal()
+    fix_requested = Signal()
     dismissed = Signal()
 
     def __init__(self, theme: Theme) -> None:
@@ -37,7 +37,7 @@ class NoticeStrip(AlertBox):
         self.text_column.addLayout(line)
         self.button_row.addWidget(self.button)
         self.button_row.addWidget(self.close_button)
-        self.button.clicked.connect(self.helped)
+        self.button.clicked.connect(self.fix_requested)
         self.close_button.clicked.connect(self.dismissed)
         self.hide()
 
@@ -51,10 +51,10 @@ class NoticeStrip(AlertBox):
         if notice != self.notice:
             self.notice = notice
             self.set_status(notice.status)
-            self.words.setText(notice.sentence)
-            self.setAccessibleName(notice.sentence)
+            self.words.setText(notice.message)
+            self.setAccessibleName(notice.message)
             word = _BUTTONS.get(notice.next_step, "")
-            self.button.set_word(_(word) if word else "")
+            self.button.set_label(_(word) if word else "")
             paint.show_when(self.button, bool(word))
         more = ngettext("and {count} more", "and {count} more", others).format(count=others) if others else ""
         if more != self.more.text():

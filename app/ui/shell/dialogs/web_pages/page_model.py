@@ -11,7 +11,7 @@ from PySide6.QtCore import QAbstractItemModel, QModelIndex, QObject, QPersistent
 
 from app.core.network.web_page_list import ListedPage
 from app.core.network.web_words import page_name
-from app.ui.shell.dialogs.web_pages.page_words import page_sentence, topic_sentence
+from app.ui.shell.dialogs.web_pages.page_words import page_description, topic_description
 from nep.i18n import _
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class PageRow:
 
     listed: ListedPage
     topics: list[PageTopic] = field(default_factory=list)
-    place: int = 0
+    number: int = 0
 
     @property
     def id(self) -> int:
@@ -65,7 +65,7 @@ class PageTreeModel(QAbstractItemModel):
 
     def parent(self, index: Index = _ROOT) -> QModelIndex:  # type: ignore[override]
         row = self._by_id.get(index.internalId() - 1) if index.isValid() else None
-        return QModelIndex() if row is None else self.createIndex(row.place, 0, 0)
+        return QModelIndex() if row is None else self.createIndex(row.number, 0, 0)
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> object:
         row, topic = self.page_row(index), self.topic(index)
@@ -74,7 +74,7 @@ class PageTreeModel(QAbstractItemModel):
         if role == Qt.ItemDataRole.DisplayRole:
             return page_name(row.listed.page) if topic is None else topic.topic
         if role == Qt.ItemDataRole.AccessibleTextRole:
-            return page_sentence(row.listed) if topic is None else topic_sentence(topic)
+            return page_description(row.listed) if topic is None else topic_description(topic)
         return None
 
     def headerData(
@@ -108,7 +108,7 @@ class PageTreeModel(QAbstractItemModel):
             row = self._by_id.get(each.page.id)
             if row is not None and row.listed != each:
                 row.listed = each
-                self._emit_changed(self.createIndex(row.place, 0, 0), self.createIndex(row.place, 0, 0))
+                self._emit_changed(self.createIndex(row.number, 0, 0), self.createIndex(row.number, 0, 0))
                 self._show_topics(row, each.page.topics)
         if new:
             self._append_pages(new)
@@ -127,7 +127,7 @@ class PageTreeModel(QAbstractItemModel):
         row = self._rows.pop(place)
         del self._by_id[row.id]
         for number, each in enumerate(self._rows):
-            each.place = number
+            each.number = number
         self.endRemoveRows()
 
     def _show_topics(self, row: PageRow, topics: Sequence[PageTopic]) -> None:
@@ -136,9 +136,9 @@ class PageTreeModel(QAbstractItemModel):
             changed = [place for place, each in enumerate(topics) if each != before[place]]
             row.topics = [*topics]
             if changed:
-                self._tell_topics(row, changed[0], changed[-1])
+                self._emit_topics_changed(row, changed[0], changed[-1])
             return
-        parent = self.createIndex(row.place, 0, 0)
+        parent = self.createIndex(row.number, 0, 0)
         wanted = {_key(each) for each in topics}
         for place in reversed(range(len(before))):
             if _key(before[place]) not in wanted:
@@ -155,9 +155,9 @@ class PageTreeModel(QAbstractItemModel):
             del before[len(topics) :]
             self.endRemoveRows()
         row.topics = [*topics]
-        self._tell_topics(row, 0, len(topics) - 1)
+        self._emit_topics_changed(row, 0, len(topics) - 1)
 
-    def _tell_topics(self, row: PageRow, first: int, last: int) -> None:
+    def _emit_topics_changed(self, row: PageRow, first: int, last: int) -> None:
         if first <= last:
             id_ = row.id + 1
             self._emit_changed(self.createIndex(first, 0, id_), self.createIndex(last, 0, id_))

@@ -36,16 +36,16 @@ from PySide6.QtWidgets import (
 )
 
 from app.core.network.web_page_list import ListedPage
-from app.core.network.web_words import page_icon, page_name, where_words
+from app.core.network.web_words import location_text, page_icon, page_name
 from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel
 from app.ui.shell.dialogs.web_pages.page_words import (
-    does_words,
-    dropped_words,
-    limit_words,
-    since_words,
+    direction_text,
+    dropped_text,
+    limit_text,
+    since_text,
 )
 from app.ui.text import plain
-from app.ui.text.numbers import bandwidth_words, rate_words
+from app.ui.text.numbers import bandwidth_text, rate_text
 from app.ui.theme.icons import paint_icon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -85,9 +85,9 @@ class _PageHeader(QHeaderView):
         painter.drawLine(rect.bottomLeft(), rect.bottomRight())
         box = QRectF(rect)
         for column, title in column_titles().items():
-            paint.words(painter, self._tree.cell(column, box), title, font, ink, paint.RIGHT)
+            paint.text_line(painter, self._tree.cell(column, box), title, font, ink, paint.RIGHT)
         box.setRight(self._tree.cell("rate", box).left())
-        paint.words(painter, box.adjusted(_EDGE, 0, 0, 0), _("Page and topics"), font, ink)
+        paint.text_line(painter, box.adjusted(_EDGE, 0, 0, 0), _("Page and topics"), font, ink)
         painter.restore()
 
 
@@ -113,7 +113,7 @@ class _RowHeights(QStyledItemDelegate):
 class PageTree(QTreeView):
     """Tree of pages; emits `disconnect_wanted` with the id of a page, and `copied` with the copied text."""
 
-    disconnect_wanted = Signal(int)
+    disconnect_requested = Signal(int)
     copied = Signal(str)
 
     def __init__(self, theme: Theme, model: PageTreeModel) -> None:
@@ -152,7 +152,7 @@ class PageTree(QTreeView):
         """Emit `disconnect_wanted` for the page of the current row."""
         listed = self.current_page()
         if listed is not None and listed.gone_s is None:
-            self.disconnect_wanted.emit(listed.page.id)
+            self.disconnect_requested.emit(listed.page.id)
 
     def copy_current(self) -> None:
         """Copy the name of the current topic or the address of the current page."""
@@ -197,7 +197,7 @@ class PageTree(QTreeView):
         at = event.position().toPoint()
         row = self._pages.page_row(self.indexAt(at))
         if event.button() == Qt.MouseButton.LeftButton and row is not None and self._is_on_button(at):
-            self.disconnect_wanted.emit(row.id)
+            self.disconnect_requested.emit(row.id)
             return
         super().mouseReleaseEvent(event)
 
@@ -287,7 +287,7 @@ class PageTree(QTreeView):
         elif self._hovered == index and self._hovered.isValid():
             painter.fillRect(rect, theme.colour("hover"))
         if topic is None:
-            if row.place:
+            if row.number:
                 paint.hairline(painter, rect, Qt.Edge.TopEdge, theme.colour("border"))
             self._paint_page(painter, rect, row.listed, index)
         else:
@@ -333,19 +333,21 @@ class PageTree(QTreeView):
             painter, left, rect, page_icon(listed.page), _GONE_ROLE if is_gone else "textSecondary"
         )
         small = self._font("small")
-        since = since_words(listed)
+        since = since_text(listed)
         button = self.cell("disconnect", rect)
         end = button.left() - _PADDING
         room = QRectF(end - paint.width_of(small, since) - 2, rect.top(), 0, rect.height())
         room.setRight(end)
-        paint.words(painter, room, since, small, theme.colour("textSecondary"), paint.RIGHT)
+        paint.text_line(painter, room, since, small, theme.colour("textSecondary"), paint.RIGHT)
         name, font = page_name(listed.page), self._font("body", bold=True, struck=is_gone)
         words = QRectF(left, rect.top(), max(20.0, room.left() - left - _GAP), rect.height())
-        paint.words(painter, words, name, font, theme.colour(_GONE_ROLE if is_gone else "text"))
+        paint.text_line(painter, words, name, font, theme.colour(_GONE_ROLE if is_gone else "text"))
         words.setLeft(words.left() + paint.width_of(font, name) + 8)
         if words.width() > theme.scaled(40):
             role = _GONE_ROLE if is_gone else "textSecondary"
-            paint.words(painter, words, where_words(listed.page), self._font("body"), theme.colour(role))
+            paint.text_line(
+                painter, words, location_text(listed.page), self._font("body"), theme.colour(role)
+            )
         if not is_gone:
             is_over = self._over_button and self._hovered == index
             side = theme.scaled(_ICON)
@@ -365,33 +367,33 @@ class PageTree(QTreeView):
         body, small = self._font("body"), self._font("small")
         verbs = max(paint.width_of(body, each) for each in (_("reads"), _("publishes")))
         quiet = theme.colour(_GONE_ROLE if is_gone else "textSecondary")
-        paint.words(
-            painter, QRectF(left, rect.top(), verbs + 2, rect.height()), does_words(topic), body, quiet
+        paint.text_line(
+            painter, QRectF(left, rect.top(), verbs + 2, rect.height()), direction_text(topic), body, quiet
         )
         left += verbs + 10
-        limit = limit_words(topic)
+        limit = limit_text(topic)
         wide = paint.width_of(small, limit) + 2 if limit else 0.0
         end = self.cell("rate", rect).left() - 2 * _PADDING
-        paint.words(
+        paint.text_line(
             painter, QRectF(end - wide, rect.top(), wide, rect.height()), limit, small,
             theme.colour(_GONE_ROLE if is_gone else "textTertiary"), paint.RIGHT,
         )  # fmt: skip
         name = QRectF(left, rect.top(), max(20.0, end - wide - left - _GAP), rect.height())
-        paint.words(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))
+        paint.text_line(painter, name, topic.topic, self._font("code", struck=is_gone), theme.colour(role))
         if is_gone:
             return
         figures: dict[PageColumn, str] = {
-            "rate": rate_words(topic.rate),
-            "bandwidth": bandwidth_words(topic.bytes_per_s),
+            "rate": rate_text(topic.rate_hz),
+            "bandwidth": bandwidth_text(topic.bytes_per_s),
         }
         for column, text in figures.items():
-            paint.words(painter, self.cell(column, rect), text, body, theme.colour(role), paint.RIGHT)
+            paint.text_line(painter, self.cell(column, rect), text, body, theme.colour(role), paint.RIGHT)
         self._paint_dropped(painter, self.cell("dropped", rect), topic, body)
 
     def _paint_dropped(self, painter: QPainter, cell: QRectF, topic: PageTopic, font: QFont) -> None:
-        theme, words = self.theme, dropped_words(topic)
+        theme, words = self.theme, dropped_text(topic)
         is_bad = topic.dropped_count > 0
-        paint.words(painter, cell, words, font, theme.colour("warn" if is_bad else "text"), paint.RIGHT)
+        paint.text_line(painter, cell, words, font, theme.colour("warn" if is_bad else "text"), paint.RIGHT)
         if is_bad:
             side = theme.scaled(13)
             left = cell.right() - paint.width_of(font, words) - side - 5

@@ -6,54 +6,54 @@ import datetime as dt
 from typing import TYPE_CHECKING
 
 from app.core.network.web_page_list import ListedPage, dropped_share
-from app.core.network.web_words import page_name, share_words, where_words
-from app.ui.text.dates import clock_words
-from app.ui.text.numbers import bandwidth_words, rate_words
+from app.core.network.web_words import location_text, page_name, share_text
+from app.ui.text.dates import clock_text
+from app.ui.text.numbers import bandwidth_text, rate_text
 from nep.i18n import _, number
 
 if TYPE_CHECKING:
     from nep.programs.web.context import PageTopic
 
 
-def since_words(listed: ListedPage) -> str:
+def since_text(listed: ListedPage) -> str:
     """Format the state of a page, such as "since 8:32" or "gone 4 s"."""
     if listed.gone_s is not None:
         return _("gone for {seconds} s").format(seconds=int(listed.gone_s))
     then = dt.datetime.fromtimestamp(listed.page.since_s).astimezone()
-    return _("since {time}").format(time=clock_words(then))
+    return _("since {time}").format(time=clock_text(then))
 
 
-def does_words(topic: PageTopic) -> str:
+def direction_text(topic: PageTopic) -> str:
     """Return "publishes" or "reads", translated, for a topic of a page."""
     return _("publishes") if topic.is_published else _("reads")
 
 
-def limit_words(topic: PageTopic) -> str:
+def limit_text(topic: PageTopic) -> str:
     """Format the rate limit of a topic, such as "at most 15/s"; "" without a limit."""
-    limit = topic.at_most_per_s
+    limit = topic.max_rate_hz
     return _("at most {rate}/s").format(rate=number(limit, ".3g")) if limit else ""
 
 
-def dropped_words(topic: PageTopic) -> str:
+def dropped_text(topic: PageTopic) -> str:
     """Format the share of dropped messages, such as "0" or "0.3 %"."""
     if topic.dropped_count <= 0:
         return "0"
-    return share_words(dropped_share(topic.sent_count, topic.dropped_count))
+    return share_text(dropped_share(topic.sent_count, topic.dropped_count))
 
 
-def page_sentence(listed: ListedPage) -> str:
+def page_description(listed: ListedPage) -> str:
     """Return the text that screen readers read for a page."""
-    return ", ".join((page_name(listed.page), where_words(listed.page), since_words(listed)))
+    return ", ".join((page_name(listed.page), location_text(listed.page), since_text(listed)))
 
 
-def topic_sentence(topic: PageTopic) -> str:
+def topic_description(topic: PageTopic) -> str:
     """Return the text that screen readers read for a topic of a page."""
-    rate = rate_words(topic.rate)
+    rate = rate_text(topic.rate_hz)
     words = (
-        f"{does_words(topic)} {topic.topic}",
-        limit_words(topic),
+        f"{direction_text(topic)} {topic.topic}",
+        limit_text(topic),
         f"{rate}/s" if rate else "",
-        bandwidth_words(topic.bytes_per_s),
-        _("{share} dropped").format(share=dropped_words(topic)) if topic.dropped_count else "",
+        bandwidth_text(topic.bytes_per_s),
+        _("{share} dropped").format(share=dropped_text(topic)) if topic.dropped_count else "",
     )
     return ", ".join(filter(None, words))

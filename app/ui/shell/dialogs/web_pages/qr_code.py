@@ -53,7 +53,7 @@ class QrCode(QWidget):
         try:
             modules = modules_of(text)
         except ImportError:
-            self.show_words(_("Install segno to show the QR code: pip install segno"))
+            self.show_message(_("Install segno to show the QR code: pip install segno"))
             return
         self._text, self._modules, self._words = text, modules, ""
         self.setAccessibleName(
@@ -61,7 +61,7 @@ class QrCode(QWidget):
         )
         self.update()
 
-    def show_words(self, words: str) -> None:
+    def show_message(self, words: str) -> None:
         """Show a message with the reason why there is no code."""
         if words != self._words:
             self._text, self._modules, self._words = "", (), words
@@ -80,7 +80,7 @@ class QrCode(QWidget):
         if self._modules:
             self._paint_code(painter)
         else:
-            self._paint_words(painter)
+            self._paint_message(painter)
         painter.end()
 
     def _paint_code(self, painter: QPainter) -> None:
@@ -99,7 +99,7 @@ class QrCode(QWidget):
                     square = QRectF(left + column * side, left + row * side, side, side)
                     painter.fillRect(square, Qt.GlobalColor.black)
 
-    def _paint_words(self, painter: QPainter) -> None:
+    def _paint_message(self, painter: QPainter) -> None:
         theme, whole = self._theme, QRectF(self.rect())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         pen = QPen(theme.colour("controlBorder"), 1)

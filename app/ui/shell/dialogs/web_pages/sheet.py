@@ -12,16 +12,16 @@ from PySide6.QtWidgets import QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
 
 from app.core.network.web_pages import WebPages, WebProtocol
 from app.core.network.web_words import notices, page_name, terminal_command
-from app.ui.other_programs import open_outside
+from app.ui.other_programs import open_externally
 from app.ui.panels.base import ShowToast
-from app.ui.shell.dialogs.overlay import BELOW_STOP, Overlay, stops_in
+from app.ui.shell.dialogs.overlay import STOP_GAP, Overlay, stop_buttons_in
 from app.ui.shell.dialogs.web_pages.access_form import AccessForm
 from app.ui.shell.dialogs.web_pages.fields import RoleIcon
 from app.ui.shell.dialogs.web_pages.notice_strip import NoticeStrip
 from app.ui.shell.dialogs.web_pages.page_model import PageTreeModel, sorted_topics
 from app.ui.shell.dialogs.web_pages.page_tree import PageTree
 from app.ui.shell.dialogs.web_pages.who_may import PermissionForm
-from app.ui.text.numbers import bandwidth_words, grouped
+from app.ui.text.numbers import bandwidth_text, group_digits
 from app.ui.theme.theme import Theme
 from app.ui.widgets import (
     Button,
@@ -36,7 +36,7 @@ from app.ui.widgets import (
     set_role,
 )
 from app.ui.widgets.flow_layout import Flow
-from app.ui.widgets.keyboard import stops_of
+from app.ui.widgets.keyboard import tab_stops_of
 from nep.i18n import _, ngettext
 
 WIDE = 640
@@ -52,7 +52,7 @@ class WebPagesSheet(Overlay):
     """
 
     top = _BELOW_BARS
-    docks_right = True
+    is_docked_right = True
 
     def __init__(
         self,
@@ -61,7 +61,7 @@ class WebPagesSheet(Overlay):
         web: WebPages,
         robots: Callable[[], tuple[str, ...]],
         say: ShowToast,
-        open_url: Callable[[QUrl], bool] = open_outside,
+        open_url: Callable[[QUrl], bool] = open_externally,
     ) -> None:
         # `robots` returns the names of connected robots; `open_url` opens a page in the browser.
         super().__init__(theme, window, _("Web pages and tablets"))
@@ -143,7 +143,7 @@ class WebPagesSheet(Overlay):
         row.addWidget(RoleIcon(self.theme, "globe", side=20))
         row.addWidget(label(_("Web pages and tablets"), "heading", wrap=True))
         row.addWidget(self.count)
-        head = self.head(title)
+        head = self.make_header(title)
         head.setContentsMargins(_SIDE, 0, 10, 0)
         return head
 
@@ -190,17 +190,19 @@ class WebPagesSheet(Overlay):
     def _connect(self) -> None:
         access, table = self.access, self.table
         self.tabs.changed.connect(lambda _tab: self.refresh())
-        self.switch.clicked.connect(lambda on: self._do(partial(self._web.serve, self._tab, on=on)))
-        self.other_port.clicked.connect(lambda: self._do(self._web.use_free_port))
+        self.switch.clicked.connect(
+            lambda on: self._apply(partial(self._web.set_protocol_enabled, self._tab, on=on))
+        )
+        self.other_port.clicked.connect(lambda: self._apply(self._web.use_free_port))
         access.copy_address.connect(self._copy_address)
         access.copy_token.connect(lambda: self._copy(self._web.token, _("Copied the token")))
-        access.new_token_wanted.connect(self._replace_token)
-        access.open_to.chosen.connect(lambda host: self._do(partial(self._web.open_to, host)))
+        access.new_token_requested.connect(self._replace_token)
+        access.open_to.selected.connect(lambda host: self._apply(partial(self._web.listen_on, host)))
         self.permissions.robots.changed.connect(self.refresh)
         self.permissions.origins.settled.connect(self.refresh)
-        table.disconnect_wanted.connect(self._disconnect)
+        table.disconnect_requested.connect(self._disconnect)
         table.copied.connect(lambda text: self._copy(text, _("Copied {text}").format(text=text)))
-        self.notice.helped.connect(self._help)
+        self.notice.fix_requested.connect(self._fix_notice)
         self.notice.dismissed.connect(self._dismiss)
         self.copy_command.clicked.connect(
             lambda: self._copy(terminal_command(self._web), _("Copied the command"))
@@ -211,19 +213,19 @@ class WebPagesSheet(Overlay):
     def first(self) -> QWidget:
         return self.switch
 
-    def wanted_size(self, room: QSize) -> QSize:
+    def preferred_size(self, room: QSize) -> QSize:
         least = self._inside.minimumSizeHint().width() + _SCROLL_BAR
         return QSize(min(room.width(), max(round(self.theme.scaled(WIDE)), least)), room.height())
 
-    def _placed(self, top: int) -> QRect:
-        window = self.window_below()
+    def _geometry_at(self, top: int) -> QRect:
+        window = self.covered_window()
         bottom = window.height() - _EDGE
         for bar in window.findChildren(QWidget, "statusBar"):
             if bar.isVisible():
                 bottom = min(bottom, bar.mapTo(window, QPoint()).y() - _EDGE)
-        for stop in stops_in(window):  # Stop buttons at the right end of a bar would overlap the sheet
-            top = max(top, stop.mapTo(window, QPoint()).y() + stop.height() + BELOW_STOP)
-        size = self.wanted_size(QSize(window.width() - 2 * _EDGE, max(1, bottom - top)))
+        for stop in stop_buttons_in(window):  # Stop buttons at the right end of a bar would overlap the sheet
+            top = max(top, stop.mapTo(window, QPoint()).y() + stop.height() + STOP_GAP)
+        size = self.preferred_size(QSize(window.width() - 2 * _EDGE, max(1, bottom - top)))
         return QRect(QPoint(window.width() - size.width() - _EDGE, top), size)
 
     def place(self) -> None:
@@ -235,7 +237,7 @@ class WebPagesSheet(Overlay):
 
     def open(self) -> None:
         """Open the sheet; it is updated until it is closed."""
-        self.access.open_to.offer(self._web.addresses(), self._web.host)
+        self.access.open_to.set_addresses(self._web.addresses(), self._web.host)
         if self._tab not in self._web.protocols and self._web.protocols:
             self.tabs.set_value(next(iter(self._web.protocols)))
         self.refresh()
@@ -257,7 +259,7 @@ class WebPagesSheet(Overlay):
         self._show_pages()
         self.notice.show_notices(notices(web, self._dismissed))
         self.command.setText(terminal_command(web))
-        self.copy_page.set_word(_("Copy the link") if is_foxglove else _("Copy a starter page"))
+        self.copy_page.set_label(_("Copy the link") if is_foxglove else _("Copy a starter page"))
         paint.show_when(self.test_page, not is_foxglove)
         self._order_tabs()
         self.test_page.setEnabled(web.state == "on")
@@ -279,17 +281,17 @@ class WebPagesSheet(Overlay):
             paint.show_when(self.state, bool(said))
             self.switch.setAccessibleDescription(said)
         if web.free_port:
-            self.other_port.set_word(_("Use {port}").format(port=web.free_port))
+            self.other_port.set_label(_("Use {port}").format(port=web.free_port))
         paint.show_when(self.other_port, bool(web.free_port))
 
     def _show_pages(self) -> None:
         web = self._web
         listed, count = web.listed, len(web.connected)
         self.model.show_pages([sorted_topics(each) for each in listed])
-        words = ngettext("{count} connected", "{count} connected", count).format(count=grouped(count))
+        words = ngettext("{count} connected", "{count} connected", count).format(count=group_digits(count))
         self.count.set(words if count else "", "ok")
         sums = _("{count}, {bandwidth} in total").format(
-            count=grouped(count), bandwidth=bandwidth_words(web.bytes_per_s)
+            count=group_digits(count), bandwidth=bandwidth_text(web.bytes_per_s)
         )
         self.sums.setText(sums if count else "")
         paint.show_when(self.table, bool(listed))
@@ -312,13 +314,13 @@ class WebPagesSheet(Overlay):
             access.open_to, *origins.tokens, origins.edit, self.permissions.robots, self.table, self.notice,
             self.copy_command, self.copy_page, self.test_page,
         )  # fmt: skip
-        stops = [stop for part in parts for stop in stops_of(part)]
+        stops = [stop for part in parts for stop in tab_stops_of(part)]
         if stops != self._tab_order:
             self._tab_order = stops
             for before, after in itertools.pairwise(stops):
                 QWidget.setTabOrder(before, after)
 
-    def _do(self, change: Callable[[], object]) -> None:
+    def _apply(self, change: Callable[[], object]) -> None:
         change()
         self.refresh()
 
@@ -334,7 +336,7 @@ class WebPagesSheet(Overlay):
             self._copy(self._web.full_url, _("Copied the link"))
         else:
             words = _("Copied a starter page. Paste it into a file such as page.html.")
-            self._copy(self._web.starter_page(), words)
+            self._copy(self._web.template_page(), words)
 
     def _replace_token(self) -> None:
         web, before = self._web, self._web.token
@@ -346,24 +348,24 @@ class WebPagesSheet(Overlay):
 
         def undo() -> None:
             if web.token and web.host:
-                self._do(partial(web.set_token, before))
+                self._apply(partial(web.set_token, before))
 
-        self._say(words.format(count=grouped(count)) if count else _("New token"), _("Undo"), undo)
+        self._say(words.format(count=group_digits(count)) if count else _("New token"), _("Undo"), undo)
 
     def _disconnect(self, page_id: int) -> None:
         page = next((each for each in self._web.connected if each.id == page_id), None)
         if page is None:
             return
-        self._web.keep_out(page)
+        self._web.block_page(page)
         self.refresh()
         words = _("Disconnected {page}. It is now blocked.")
         self._say(
             words.format(page=page_name(page)),
             _("Undo"),
-            lambda: self._do(partial(self._web.let_in, page_id)),
+            lambda: self._apply(partial(self._web.unblock_page, page_id)),
         )
 
-    def _help(self) -> None:
+    def _fix_notice(self) -> None:
         notice = self.notice.notice
         if notice is None:
             return
@@ -373,7 +375,7 @@ class WebPagesSheet(Overlay):
         elif notice.next_step == "allow origin":
             self._web.add_origin(notice.value)
         elif notice.next_step == "let in":
-            self._web.let_in(int(notice.value))
+            self._web.unblock_page(int(notice.value))
         self.refresh()
 
     def _dismiss(self) -> None:

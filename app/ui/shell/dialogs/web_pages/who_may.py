@@ -9,7 +9,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.core.network.web_pages import WebPages
-from app.ui.shell.dialogs.web_pages.access_form import LABEL_WIDE
+from app.ui.shell.dialogs.web_pages.access_form import LABEL_WIDTH
 from app.ui.shell.dialogs.web_pages.fields import RoleIcon
 from app.ui.theme.theme import Theme
 from app.ui.widgets import Button, label, paint, set_role
@@ -17,7 +17,7 @@ from app.ui.widgets.flow_layout import Flow
 from app.ui.widgets.inputs.check_box import CheckBox
 from app.ui.widgets.inputs.token_field import Token, TokenField
 from nep.errors import NepError
-from nep.i18n import _, listed
+from nep.i18n import _, format_list
 
 _FIELD_HEIGHT = 31
 EXAMPLE = "http://192.168.1.20:8080"
@@ -36,13 +36,13 @@ class OriginField(TokenField):
         if [each.entry for each in self.tokens] == [*origins]:
             return
         for token in self.tokens:
-            self._drop(token)
+            self._delete_token(token)
         for origin in origins:
             self._add_token(Token(self._theme, origin))
         self._arrange()
 
-    def _edited(self, text: str) -> None:
-        self._mark(wrong=False)
+    def _on_edited(self, text: str) -> None:
+        self._show_invalid(wrong=False)
         if text.strip() and text[-1] in " ,":
             self._end_typing()
         self.changed.emit()
@@ -56,16 +56,16 @@ class OriginField(TokenField):
                 wrong.append(word)
         self.edit.setText(" ".join(wrong))
         self.show_origins(self._web.origins)
-        self._mark(wrong=bool(wrong))
+        self._show_invalid(wrong=bool(wrong))
         self.settled.emit()
 
     def _remove(self, token: Token) -> None:
         self._web.set_origins([each.entry for each in self.tokens if each is not token])
         super()._remove(token)
 
-    def _mark(self, *, wrong: bool) -> None:
+    def _show_invalid(self, *, wrong: bool) -> None:
         self.is_wrong = wrong
-        self.set_wrong(wrong)
+        self.set_invalid(wrong)
 
 
 class _Box(QWidget):
@@ -125,7 +125,7 @@ class RobotChoice(QWidget):
     def show_state(self) -> None:
         """Show the allowed robots, and check boxes for connected and allowed ones."""
         names = self._web.robots
-        said = listed(list(names)) if names else _("none")
+        said = format_list(list(names)) if names else _("none")
         words = _("May command robots: {robots}").format(robots=said)
         if words != self.words.text():
             self.words.setText(words)
@@ -136,7 +136,7 @@ class RobotChoice(QWidget):
             self._show_boxes()
 
     def _open(self, is_open: bool) -> None:
-        self.choose.set_word(_("Done") if is_open else _("Choose robots"))
+        self.choose.set_label(_("Done") if is_open else _("Choose robots"))
         self.list.setVisible(is_open)
         if is_open:
             self._show_boxes()
@@ -197,7 +197,7 @@ class PermissionForm(QWidget):
         self._grid.addWidget(said, place + 1, 1)
 
     def _measure(self) -> None:
-        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDE)))
+        self._grid.setColumnMinimumWidth(0, round(self._theme.scaled(LABEL_WIDTH)))
         for title in self._titles:  # aligned with the first line of a field that can grow
             title.setMinimumHeight(round(self._theme.scaled(_FIELD_HEIGHT)))
 
