@@ -40,7 +40,7 @@ PROCESSES = (
 )
 
 GRACE_S = 5.0
-"""Time that non-daemon threads have to end after the window was closed."""
+"""Time in seconds that non-daemon threads have to end after the window is closed."""
 
 _log = logging.getLogger("studio")
 
@@ -114,7 +114,11 @@ def run_parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run Studio with these command-line arguments and return the exit code (0 on success)."""
+    """Run Studio and return the exit code (0 on success).
+
+    Args:
+        arguments: Command-line arguments (default: those of the process).
+    """
     prepare_streams()
     try:
         return _main(command_line_arguments() if arguments is None else list(arguments))
@@ -170,7 +174,11 @@ def _main(given: Sequence[str]) -> int:
 
 
 def restart(theme: str | None) -> None:
-    """Start Studio in a new process. Call this after all resources of this process were closed."""
+    """Start Studio in a new process, after all resources of this process were closed.
+
+    Args:
+        theme: Value of the option ``--theme``; None for the theme in the settings.
+    """
     from app.core.own_process import fresh_environ, studio_command  # noqa: PLC0415  needed only here
     from nep.masters.process import NO_CONSOLE  # noqa: PLC0415  needed only here
 
@@ -183,9 +191,14 @@ def restart(theme: str | None) -> None:
 
 
 def self_test(folder: Path, *, web: bool) -> int:
-    """Run the self-test in a real window and write its report to ``folder``.
+    """Run the self-test in a real window and write its report.
 
-    Returns 0 if all steps passed, 1 if one failed (see the report), 2 if ``folder`` can't be written.
+    Args:
+        folder: Folder for the report.
+        web: False to skip the block editor.
+
+    Returns:
+        Exit code: 0 if all steps passed, 1 if a step failed (see the report), 2 if `folder` can't be written.
     """
     from app.core.self_test import SelfTest, UnwritableFolderError, prepare  # noqa: PLC0415  needed only here
 
@@ -227,7 +240,12 @@ def run_behaviour(arguments: Sequence[str]) -> int:
 
 
 def run_child_module(module: str, arguments: Sequence[str]) -> int:
-    """Run one of `PROCESSES` as ``__main__`` in this process; return 2 if ``module`` is not in the list."""
+    """Run a module as ``__main__`` in this process and return the exit code.
+
+    Args:
+        module: One of `PROCESSES`; for any other module, the exit code is 2.
+        arguments: Command-line arguments of the module.
+    """
     if module not in PROCESSES:
         sys.stderr.write(
             _("no process '{module}'; available: {names}").format(module=module, names=", ".join(PROCESSES))
@@ -240,7 +258,11 @@ def run_child_module(module: str, arguments: Sequence[str]) -> int:
 
 
 def join_threads(within_s: float) -> tuple[str, ...]:
-    """Return the names of non-daemon threads that don't end within ``within_s`` seconds."""
+    """Wait for all other non-daemon threads, and return the names of those that are still running.
+
+    Args:
+        within_s: Maximum wait in seconds, for all threads together.
+    """
     until = time.monotonic() + within_s
     others = [
         each
@@ -253,10 +275,14 @@ def join_threads(within_s: float) -> tuple[str, ...]:
 
 
 def end_process(code: int, within_s: float = GRACE_S) -> int:
-    """Return ``code`` once all threads have ended; otherwise log the remaining ones and exit the process.
+    """Wait for all non-daemon threads and return ``code``; if some don't end, log them and exit at once.
 
     Python waits for every non-daemon thread at exit. A plug-in's thread that never ends, or a thread that
     writes to a disk that doesn't respond, would keep a process without a window alive forever.
+
+    Args:
+        code: Exit code of the process.
+        within_s: Maximum wait in seconds.
     """
     left = join_threads(within_s)
     if not left:

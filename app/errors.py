@@ -17,8 +17,8 @@
     ├── RobotValueError      a driver's value doesn't match its declared type
     └── RobotUnknownError    a robot is not connected
 
-Each sentence is built from the exception's attributes: lower case, no full stop, values in quotes, the
-next step after a semicolon.
+Messages start with a lower-case letter and have no full stop; values are in quotes, and the next step
+follows after a semicolon.
 """
 
 from __future__ import annotations
@@ -33,7 +33,11 @@ MAX_NAME_LENGTH, MAX_PROBLEM_LENGTH = 40, 300
 
 
 class AppError(Exception):
-    """Base class of errors that are shown to the user as one sentence, ``str(error)``."""
+    """Base class of errors that are shown to the user as one sentence.
+
+    Attributes:
+        sentence: The message, also returned by ``str(error)``.
+    """
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
@@ -41,12 +45,12 @@ class AppError(Exception):
 
 
 class DocumentError(AppError):
-    """A behaviour file can't be read or written.
+    """Raised when a behaviour file can't be read or written.
 
     Attributes:
-        path: The file.
-        reason: Sentence that contains the name of the file.
-        advice: What the user can do, if known.
+        path: Path of the file; None if there is none.
+        reason: What happened, with the name of the file.
+        advice: What the user can do; "" if unknown.
     """
 
     def __init__(self, path: Path | None, reason: str, advice: str = "") -> None:
@@ -57,9 +61,11 @@ class DocumentError(AppError):
 
 
 class CompileError(AppError):
-    """A workspace can't be compiled to a program.
+    """Raised when a workspace can't be compiled to a program.
 
-    ``block`` is the id of the block that causes this, if any.
+    Attributes:
+        reason: Message.
+        block: Id of the block that causes the error; None if there is none.
     """
 
     def __init__(self, reason: str, block: str | None = None) -> None:
@@ -69,11 +75,16 @@ class CompileError(AppError):
 
 
 class RunnerError(AppError):
-    """The process of a program can't be started or reached."""
+    """Raised when the process of a program can't be started or reached."""
 
 
 class SettingsError(AppError):
-    """Settings can't be saved; ``path`` is their file."""
+    """Raised when settings can't be saved.
+
+    Attributes:
+        path: Path of the settings file.
+        reason: Reason as text.
+    """
 
     def __init__(self, path: Path, reason: str) -> None:
         self.path = path
@@ -82,11 +93,16 @@ class SettingsError(AppError):
 
 
 class BackpackError(AppError):
-    """The backpack can't be read or saved, or it is full."""
+    """Raised when the backpack can't be read or saved, or when it is full."""
 
 
 class ReportError(AppError):
-    """A problem report can't be written; ``path`` is its file."""
+    """Raised when a problem report can't be written.
+
+    Attributes:
+        path: Path of the report.
+        reason: Reason as text.
+    """
 
     def __init__(self, path: Path, reason: str, advice: str) -> None:
         self.path = path
@@ -97,15 +113,20 @@ class ReportError(AppError):
 
 
 class CurveError(AppError):
-    """A text is not a valid curve expression."""
+    """Raised for a text that is not a valid curve expression."""
 
 
 class QueryError(AppError):
-    """A text is not a valid message query."""
+    """Raised for a text that is not a valid message query."""
 
 
 class DescriptionError(AppError):
-    """The description of a robot is invalid. ``problems`` contains a sentence for each problem."""
+    """Raised when the description of a robot is invalid.
+
+    Attributes:
+        name: Name of the robot.
+        problems: One message for each problem.
+    """
 
     def __init__(self, name: str, problems: tuple[str, ...]) -> None:
         # The description comes from another program, so its text is escaped and shortened.
@@ -122,9 +143,11 @@ class DescriptionError(AppError):
 
 
 class DeclarationError(DescriptionError):
-    """The declaration of a driver is invalid.
+    """Raised when the declaration of a driver is invalid.
 
-    ``declared`` is the declared name, ``where`` the line in the source.
+    Attributes:
+        declared: Declared name.
+        where: File and line of the declaration; "" if unknown.
     """
 
     def __init__(self, declared: str, problem: str, where: str = "") -> None:
@@ -136,10 +159,11 @@ class DeclarationError(DescriptionError):
 
 
 class InputProblem(NamedTuple):
-    """Problem of one value in the input of an action.
+    """Problem in the input of an action.
 
-    ``parameter`` is the name of the value, or "" if the problem concerns no single value; ``sentence``
-    describes it.
+    Attributes:
+        parameter: Name of the invalid value; "" if the problem concerns no single value.
+        message: Message.
     """
 
     parameter: str
@@ -147,9 +171,11 @@ class InputProblem(NamedTuple):
 
 
 class RobotInputError(AppError):
-    """The input of an action is invalid. ``sentences`` contains a sentence for each invalid value.
+    """Raised when the input of an action is invalid.
 
-    ``problems`` assigns each sentence to its parameter.
+    Attributes:
+        sentences: One message for each problem.
+        problems: The messages with the names of the invalid values.
     """
 
     def __init__(self, sentences: tuple[str, ...], problems: tuple[InputProblem, ...] = ()) -> None:
@@ -159,9 +185,10 @@ class RobotInputError(AppError):
 
 
 class RobotValueError(AppError, ValueError):
-    """A value of a driver doesn't match its declared type.
+    """Raised when a value of a driver doesn't match its declared type.
 
-    ``place`` is the part of the value that is invalid; "" means the whole value.
+    Attributes:
+        place: Name of the invalid part of the value; "" for the whole value.
     """
 
     def __init__(self, words: str, place: str = "", **holes: object) -> None:
@@ -171,13 +198,21 @@ class RobotValueError(AppError, ValueError):
         super().__init__(_(words).format(place=place or _("the value"), **holes))
 
     def nested_in(self, outer: str) -> RobotValueError:
-        """Return this error for a value that contains the invalid value."""
+        """Return this error for an outer value.
+
+        Args:
+            outer: Name of the part of the outer value that contains the invalid value.
+        """
         place = _("{place} {inner}").format(place=outer, inner=self.place) if self.place else outer
         return RobotValueError(self._words, place, **self._holes)
 
 
 class UnknownRobotError(AppError):
-    """A robot is not connected; ``name`` is its name."""
+    """Raised when a robot is not connected.
+
+    Attributes:
+        name: Name of the robot.
+    """
 
     def __init__(self, name: str) -> None:
         self.name = name

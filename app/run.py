@@ -41,7 +41,7 @@ OK, FAILED, UNUSABLE, ROBOT_MISSING, MAY_NOT_MOVE, INTERRUPTED = 0, 1, 2, 3, 4, 
 ROBOT_WAIT_S = 10.0
 POLL_INTERVAL_S = 0.1
 ALL_ROBOTS_WAIT_S = 3.0
-"""Time that a behaviour with publish blocks waits for the descriptions of all robots on the network."""
+"""Time in seconds to wait for the descriptions of all robots, if a behaviour contains publish blocks."""
 LATE_ROBOT_CHECK_INTERVAL_S = 1.0
 _START_BLOCK_TYPE = re.compile(r"events_|robot_.*_when_")
 
@@ -58,17 +58,18 @@ def run_file(
 ) -> int:
     """Run a behaviour file to its end and return the exit code (see the module docstring).
 
-    Ctrl+C stops the behaviour and waits for the proof that its robots have stopped. If ``out`` can't be
-    written (its reader has closed it, the disk is full), the behaviour is stopped in the same way and the
-    exit code is 1.
+    Ctrl+C stops the behaviour and waits until its robots have confirmed the stop. If ``out`` can't be written
+    (its reader has closed it, the disk is full), the behaviour is stopped in the same way and the exit code
+    is 1.
 
     Args:
         path: Behaviour file.
-        robot_wait_s: Seconds to wait for the robots that the blocks use.
+        robot_wait_s: Maximum wait in seconds for the robots that the blocks use.
         master: Master address; default as for `nep.node`.
         out: Stream for the output, one event per line; default stdout.
         interrupted: Event that another thread can set to stop the behaviour like Ctrl+C.
-        allow_moving: True to let the behaviour move real robots; otherwise it is rejected if it would.
+        allow_moving: True to let the behaviour move real robots; otherwise a behaviour that would move one is
+            rejected.
         keep_position: True to leave virtual robots where they are; otherwise they are moved to their start
             position.
     """
@@ -128,9 +129,9 @@ def _with_trusted_virtual(found: FoundRobots) -> FoundRobots:
 
 
 def used_robot_names(workspace: Mapping[str, object]) -> tuple[str, ...]:
-    """Return the names of the robots used in scripts that an event starts.
+    """Return the sorted names of the robots used in scripts that have a start block.
 
-    Includes robots that the file does not describe.
+    The result includes robots that the file does not describe.
     """
     parsed = parse_workspace(workspace)
     started = tuple(script for script in parsed.scripts if _START_BLOCK_TYPE.match(script[0].type))
@@ -139,7 +140,12 @@ def used_robot_names(workspace: Mapping[str, object]) -> tuple[str, ...]:
 
 
 class _LineWriter:
-    """Writes lines to a stream. Thread-safe. Sets ``ending`` if the stream can't be written any more."""
+    """Writer of lines to a stream. Thread-safe.
+
+    Args:
+        stream: Stream for the output.
+        ending: Event that is set if the stream can't be written any more.
+    """
 
     def __init__(self, stream: TextIO, ending: threading.Event) -> None:
         self._stream = stream
@@ -229,7 +235,13 @@ def _reset_positions(node: nep.Node, robots: Sequence[Robot]) -> None:
 
 @dataclass(frozen=True)
 class _Connection:
-    """Connection to the network: master address, node, and the stopper of robots."""
+    """Connection to the network.
+
+    Attributes:
+        master: Address of the master; None for the default.
+        node: Node of the runner.
+        stopper: Stopper of the behaviour's robots.
+    """
 
     master: str | None
     node: nep.Node
@@ -269,7 +281,7 @@ def _run(
 
 
 class _LateRobotMonitor:
-    """Reports newly found robots to a program with publish blocks, which must not move these robots."""
+    """Monitor that informs a program about new robots, which it must not move by publishing."""
 
     def __init__(self, node: nep.Node, runner: Runner) -> None:
         self._node, self._runner = node, runner
@@ -292,7 +304,7 @@ class _LateRobotMonitor:
 
 
 class _RunEvents:
-    """Writes the runner's events as lines and stores the result of the run."""
+    """Handler of the runner's events: writes them as lines and stores the result of the run."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
@@ -314,7 +326,7 @@ class _RunEvents:
 
 
 def stop_lines(report: StopReport) -> list[str]:
-    """Return the result of a stop as lines, including one for each robot that has not stopped."""
+    """Format the result of a stop as lines, with one line for each robot that has not stopped."""
     strange = [
         _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored.").format(
             program=program, robot=name

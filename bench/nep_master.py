@@ -45,7 +45,7 @@ with nep.master("127.0.0.1:0", learn_s=0.0) as master:
 NODES = """
 import os, sys, time, zmq
 from nep.backends.zeromq.master_session import RenewalTimer
-from nep.protocol.encoding import decode_answer, encode_request
+from nep.protocol.encoding import decode_reply, encode_request
 from nep.protocol.requests import (NodeRecord, PublisherCount, PublisherRecord,
     SubscriberCount, SubscriberRecord)
 from nep.protocol.requests import Found, Join, Renew, Renewed
@@ -70,7 +70,7 @@ def read(ms):
     for socket, _ in poller.poll(ms):
         n = numbers[socket]
         while socket.getsockopt(zmq.EVENTS) & zmq.POLLIN:
-            answer = decode_answer(socket.recv())[1]
+            answer = decode_reply(socket.recv())[1]
             epoch = answer.epoch
             if isinstance(answer, Found | Renewed):
                 revisions[n] = answer.revision

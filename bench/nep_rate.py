@@ -41,7 +41,7 @@ NATIVE = ("listen", "spin", "sink", "json", "text")
 
 SENDER = """
 import json, os, sys, time, zmq, nep
-from nep.backends.zeromq.bindings import has_local_names
+from nep.backends.zeromq.bindings import has_unix_sockets
 count, state = int(sys.argv[1]), json.loads(sys.argv[2])
 data = os.urandom(1000)
 node = nep.node("sender")
@@ -49,7 +49,7 @@ payloads = {"json": state, "text": {"text": "x" * 989}}
 topics = {name: node.new_pub(name, "json" if name in payloads else "bytes") for name in sys.argv[3:]}
 context = zmq.Context()
 plains = [context.socket(zmq.PUB) for _ in range(3)]
-local = f"ipc://@nep-bench-{os.getpid()}" if has_local_names() else "tcp://127.0.0.1:*"
+local = f"ipc://@nep-bench-{os.getpid()}" if has_unix_sockets() else "tcp://127.0.0.1:*"
 for plain, end in zip(plains, ("tcp://127.0.0.1:*", "tcp://127.0.0.1:*", local)):
     plain.setsockopt(zmq.SNDHWM, 0)
     plain.bind(end)

@@ -43,7 +43,7 @@ WAIT_S = 30.0
 
 ECHO = """
 import sys, threading, time, nep
-from nep.backends.ros.library import library
+from nep.backends.ros.get_rospy import get_rospy
 native, carried = nep.node("echo"), nep.node("echo", "ros", master=sys.argv[1])
 def echo(node):
     sub, pub = node.new_sub("ping_nep", "string"), node.new_pub("pong_nep", "string")
@@ -53,7 +53,7 @@ def echo(node):
 for node in (native, carried):
     threading.Thread(target=echo, args=(node,), daemon=True).start()
 carried.new_sub("any")  # now rospy is there
-rospy = library()
+rospy = get_rospy()
 from std_msgs.msg import String
 back = rospy.Publisher("pong", String, queue_size=10, tcp_nodelay=True)
 there = rospy.Subscriber("ping", String, lambda message: back.publish(String(message.data)), tcp_nodelay=True)

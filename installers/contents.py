@@ -1,8 +1,8 @@
 """Selection of the library files that go into a package.
 
-Qt is the largest part of a package. `is_wanted` decides on each file that PyInstaller collects, by its path
-below the frozen program's folder. Files are omitted if no code of Studio uses them and no library in the
-package is linked with them; the packages' self-test would fail otherwise.
+Qt is the largest part of a package. `is_wanted` checks each file that PyInstaller collects by its path
+below the frozen program's folder. A file is omitted if no code of Studio uses it and no library in the
+package is linked with it; the packages' self-test would fail otherwise.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _PLUGINS = frozenset({
 _FFMPEG_OF_QT = re.compile(r"(?:lib)?(?:av(?:codec|format|util)|sw(?:scale|resample))(?:-\d+\.dll|\.)")
 """FFmpeg libraries for video; Studio plays only tones, which don't need them."""
 _NOT_PLUGINS = re.compile(r"(?:lib)?(?:qgtk3|qtvirtualkeyboardplugin|qtexttospeech_mock|ffmpegmediaplugin)\b")
-"""Unwanted plug-ins in wanted folders: the GTK theme (with all of GTK), virtual keyboard, mock voice."""
+"""Excluded plug-ins in included folders: the GTK theme (with all of GTK), virtual keyboard, mock voice."""
 _IMAGE_FORMATS = re.compile(r"(?:lib)?q(?:gif|ico|icns|jpeg|svg|webp)\b")
 _PLATFORMS = re.compile(r"(?:lib)?q(?:xcb|wayland|windows|cocoa|offscreen|minimal)\b")
 _UNUSED = re.compile(
@@ -74,7 +74,11 @@ _OF_THE_BUILD = frozenset({"direct_url.json", "RECORD"})
 
 
 def is_wanted(name: str) -> bool:
-    """Return whether a collected file goes into the package; `name` may contain slashes or backslashes."""
+    """Return True if a collected file goes into the package.
+
+    Args:
+        name: Path below the frozen program's folder, with slashes or backslashes.
+    """
     path = PurePosixPath(name.replace("\\", "/"))
     parts = path.parts
     # Test all parts: a macOS framework is a folder of this name, and a partial one can't be signed.

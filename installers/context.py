@@ -21,7 +21,7 @@ SYSTEMS = ("windows", "macos", "linux")
 
 
 class PackageError(Exception):
-    """Error that a package can't be built; the text contains the reason and the solution."""
+    """A package can't be built; the message contains the reason and the solution."""
 
 
 def this_system() -> str:
@@ -35,7 +35,11 @@ def _machine() -> str:
 
 
 def last_commit_s(root: Path = ROOT) -> int:
-    """Return the timestamp for all files of a package: $SOURCE_DATE_EPOCH or that of the last commit."""
+    """Return the timestamp for all files of a package, in seconds since 1970.
+
+    The timestamp is $SOURCE_DATE_EPOCH if set, else the time of the last commit, else of
+    pyproject.toml.
+    """
     given = os.environ.get("SOURCE_DATE_EPOCH", "")
     if given.isdecimal():
         return int(given)
@@ -49,7 +53,13 @@ def last_commit_s(root: Path = ROOT) -> int:
 class Context:
     """Inputs of a packer.
 
-    `python` is the command of the interpreter whose environment is frozen.
+    Attributes:
+        system: One of `SYSTEMS`, or "clients".
+        python: Command of the interpreter whose environment is frozen.
+        root: Folder of the project.
+        version: Version of the package.
+        machine: Processor architecture.
+        epoch: Timestamp for all files of the package, in seconds since 1970.
     """
 
     system: str
@@ -76,7 +86,7 @@ class Context:
 
     @property
     def environ(self) -> Mapping[str, str]:
-        """Environment variables for reproducible output of the programs that are run."""
+        """Environment variables for programs started by `run`, chosen for reproducible output."""
         return {
             **os.environ,
             "SOURCE_DATE_EPOCH": str(self.epoch),
@@ -85,7 +95,11 @@ class Context:
         }
 
     def run(self, *command: str | Path, cwd: Path | None = None) -> None:
-        """Run a program.
+        """Run a program and wait until it exits.
+
+        Args:
+            command: Program and arguments.
+            cwd: Working folder. Default: the project's folder.
 
         Raises:
             PackageError: The program is missing or has failed.

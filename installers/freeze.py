@@ -1,4 +1,4 @@
-"""Freezing: build a folder with Studio and its dependencies that runs without Python."""
+"""Freezing of Studio and its dependencies into a folder that runs without Python."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ __all__ = ["add_licences", "freeze"]
 
 
 def freeze(context: Context) -> Path:
-    """Freeze Studio and return the folder.
+    """Freeze Studio and return the folder with the frozen program.
 
-    `context.python` must have Studio installed, not as an editable checkout, so that the result equals an
-    installation. On macOS the application bundle is next to the folder.
+    Studio must be installed for `context.python`, and not as an editable checkout, so that the result
+    contains the same files as an installation. On macOS the application bundle is next to the folder.
 
     Raises:
         PackageError: Freezing has failed.
@@ -33,7 +33,12 @@ def freeze(context: Context) -> Path:
 
 
 def add_licences(context: Context, inside: Path, folder: Path) -> Path:
-    """Write licence texts and notice of the content of `inside`; return the bill of materials in `dist`.
+    """Write licence texts, notice and bill of materials of a frozen program; return the bill of materials.
+
+    Args:
+        context: Version and folders; the bill of materials is written to `dist`.
+        inside: Folder of the frozen program.
+        folder: Folder for licence texts and notice.
 
     Raises:
         PackageError: A part has no known licence, or writing has failed.

@@ -1,4 +1,4 @@
-"""Access to the painted icons; runs `icons.py` once with the interpreter that is frozen."""
+"""Access to the painted icons, for which `icons.py` runs once with the interpreter that is frozen."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from installers.context import Context
 __all__ = ["ICON_SIZES", "paint_icons"]
 
 ICON_SIZES = (16, 22, 24, 32, 48, 64, 128, 256, 512)
-"""Sizes for desktops; macOS also uses 1024."""
+"""Icon sizes in pixels for desktops; macOS also uses 1024."""
 
 
 def paint_icons(context: Context) -> Path:

@@ -26,19 +26,30 @@ CLIENTS = "clients"
 
 
 class Packer(Protocol):
-    """Interface of each system's `packer` module."""
+    """Interface of the `packer` module of each system."""
 
     def build(self, context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-        """Freeze, unless ``keep_frozen``, and return the packages; raises `PackageError`."""
+        """Build the packages of the system and return their paths.
+
+        Args:
+            context: System, version and folders.
+            keep_frozen: True to reuse the frozen program of an earlier build.
+
+        Raises:
+            PackageError: A step has failed.
+        """
 
 
 def packer_for(system: str) -> Packer:
-    """Return the packer of one of `SYSTEMS` or of the client libraries."""
+    """Return the packer of a system: one of `SYSTEMS`, or "clients" for the client libraries."""
     return cast("Packer", importlib.import_module(f"installers.{system}.packer"))
 
 
 def write_sums(folder: Path) -> Path:
-    """Write the SHA-256 checksums of a folder's packages in the format of `sha256sum --check`."""
+    """Write the SHA-256 checksums of a folder's packages to a file and return its path.
+
+    The file has the format of `sha256sum --check`.
+    """
     lines = [
         f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"
         for path in sorted(folder.iterdir())
@@ -55,7 +66,7 @@ def told(made: Iterable[Path]) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Build the packages; return 0, or 2 if this computer can't."""
+    """Build the packages; return 0, or 2 if a package can't be built."""
     parser = argparse.ArgumentParser(
         prog="dev.py package", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -9,14 +9,17 @@ __all__ = ["remove_dead_links", "remove_unneeded", "size_of"]
 
 
 def size_of(folder: Path) -> int:
-    """Return the size in bytes of the files directly in a folder."""
+    """Return the total size in bytes of the files in a folder, without subfolders."""
     return sum(path.stat().st_size for path in folder.iterdir())
 
 
 def remove_unneeded(folder: Path, users: Iterable[Path], needed_by: Callable[[Path], Iterable[str]]) -> None:
-    """Remove the libraries of a folder that no file of `users` needs directly or indirectly.
+    """Remove the libraries of a folder that no file in `users` needs directly or indirectly.
 
-    ``needed_by`` returns the names of the libraries that a file is linked with.
+    Args:
+        folder: Folder of the libraries.
+        users: Binaries that may be linked with the libraries.
+        needed_by: Returns the names of the libraries that a file is linked with.
     """
     waiting, kept = list(users), set[str]()
     while waiting:
@@ -30,7 +33,10 @@ def remove_unneeded(folder: Path, users: Iterable[Path], needed_by: Callable[[Pa
 
 
 def remove_dead_links(links: Iterable[Path]) -> None:
-    """Remove dangling links, which PyInstaller has created in other folders."""
+    """Remove those of the given links whose target doesn't exist any more.
+
+    PyInstaller creates links to libraries in other folders.
+    """
     for link in links:
         if link.is_symlink() and not link.exists():
             link.unlink()

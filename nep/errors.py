@@ -45,7 +45,15 @@ _MAX_REASON_LENGTH = 500
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """Return `did you mean 'zeromq'?` for a similar known word; `known are 'a', 'b'` if there is none."""
+    """Return a hint for an unknown word, for use in an error message.
+
+    The hint is "did you mean 'zeromq'?" if a known word is similar, else "known names: 'zeromq',
+    'memory'".
+
+    Args:
+        word: The unknown word.
+        known: The known words.
+    """
     near = nearest(word, known)
     if near is not None:
         return _("did you mean '{near}'?").format(near=near)
@@ -284,7 +292,7 @@ class BadTopicError(NepError, ValueError):
 
     Attributes:
         topic: The rejected name.
-        reason: The rule that it breaks.
+        reason: The rule that the name breaks.
     """
 
     def __init__(self, topic: str, reason: str) -> None:
@@ -302,7 +310,7 @@ class BadNameError(NepError, ValueError):
 
     Attributes:
         name: The rejected name.
-        reason: The rule that it breaks.
+        reason: The rule that the name breaks.
     """
 
     def __init__(self, name: str, reason: str) -> None:

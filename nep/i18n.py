@@ -8,8 +8,8 @@
 Messages are whole sentences with named placeholders. Mark a module constant with `lazy` and translate it with
 `_` when it is shown, so that a language selected later applies.
 
-A program with a window or a command line selects its language with `begin`. Otherwise the environment
-variable NEP_LANG selects it; the default is English. The catalogue is in ``nep/locale``; see
+A program with a window or a command line selects its language with `set_initial_language`. Otherwise the
+environment variable NEP_LANG selects it; the default is English. The catalogue is in ``nep/locale``; see
 docs/translate.md.
 """
 
@@ -166,8 +166,8 @@ def install(wanted: str, folder: Path = LOCALE_FOLDER) -> _Catalogue:
 def set_initial_language(chosen: str = "") -> None:
     """Set the language at program start: NEP_LANG, else `chosen`, else the system's language.
 
-    The system's language is used only if enough of it is translated (`LEAST_SHARE`). Child processes inherit
-    the language through the environment, and argparse's own messages use it, too.
+    The system's language is used only if enough of it is translated (`MIN_SHARE`). Child processes
+    inherit the language through the environment, and argparse's own messages use it, too.
     """
     install(os.environ.get(LANG_VARIABLE) or chosen or _supported_system_language())
     os.environ[LANG_VARIABLE] = language()
@@ -224,7 +224,11 @@ def pgettext(context: str, message: str) -> str:
 
 
 def translate(context: str | None, message: str) -> str:
-    """Translate a text of a data file. `tools/words.py` doesn't extract messages from its calls."""
+    """Translate a text from a data file.
+
+    Unlike for `pgettext` and `gettext`, `tools/words.py` doesn't extract messages from calls of this
+    function.
+    """
     return _current_catalogue().translate(context, message)
 
 
@@ -247,7 +251,12 @@ def plazy(context: str, message: str) -> str:
 
 
 def format_list(items: Sequence[str], kind: Literal["and", "or"] = "and") -> str:
-    """Join items to a list in the current language: "a, b and c" or "a, b or c"."""
+    """Join items to a list in the current language: "a, b and c" or "a, b or c".
+
+    Args:
+        items: Texts to join.
+        kind: Conjunction before the last item.
+    """
     if len(items) < 2:
         return "".join(items)
     pattern = _current_catalogue().list_pattern(kind)

@@ -69,10 +69,10 @@ node = Node
 """Alias of `Node`, in the spelling of the NEP paper."""
 
 server = FixedServer
-"""Alias of `FixedServer`: its name in the original module."""
+"""Alias of `FixedServer`, as in the original module."""
 
 client = FixedClient
-"""Alias of `FixedClient`: its name in the original module."""
+"""Alias of `FixedClient`, as in the original module."""
 
 master = Master
 """Alias of `Master`."""

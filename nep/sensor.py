@@ -30,7 +30,10 @@ def _matrix() -> list[float]:
 
 @dataclass
 class JointState:
-    """Positions, velocities and efforts of joints, by name. As sensor_msgs/JointState; lists may be empty."""
+    """Positions, velocities and efforts of joints, by name.
+
+    Same as sensor_msgs/JointState; lists may be empty.
+    """
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/JointState"
 
@@ -43,7 +46,7 @@ class JointState:
 
 @dataclass
 class Imu:
-    """Orientation, angular velocity and linear acceleration. As sensor_msgs/Imu.
+    """Orientation, angular velocity and linear acceleration. Same as sensor_msgs/Imu.
 
     If the first element of a covariance is -1, the value is not measured.
     """
@@ -61,7 +64,7 @@ class Imu:
 
 @dataclass
 class LaserScan:
-    """Planar range scan from `angle_min` to `angle_max`, counterclockwise. As sensor_msgs/LaserScan."""
+    """Planar range scan from `angle_min` to `angle_max`, counterclockwise. Same as sensor_msgs/LaserScan."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/LaserScan"
 
@@ -79,7 +82,7 @@ class LaserScan:
 
 @dataclass
 class Range:
-    """Single range measurement. As sensor_msgs/Range."""
+    """Single range measurement. Same as sensor_msgs/Range."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Range"
     ULTRASOUND: ClassVar[int] = 0
@@ -95,7 +98,7 @@ class Range:
 
 @dataclass
 class BatteryState:
-    """Battery state. As sensor_msgs/BatteryState.
+    """Battery state. Same as sensor_msgs/BatteryState.
 
     `percentage` is from 0 to 1; `current` is negative while discharging.
     """
@@ -127,7 +130,7 @@ class BatteryState:
 
 @dataclass
 class NavSatStatus:
-    """Status of the position fix, and satellite systems in use. As sensor_msgs/NavSatStatus."""
+    """Status of the position fix, and satellite systems in use. Same as sensor_msgs/NavSatStatus."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatStatus"
     STATUS_NO_FIX: ClassVar[int] = -1
@@ -145,7 +148,10 @@ class NavSatStatus:
 
 @dataclass
 class NavSatFix:
-    """Position in degrees (WGS 84) and altitude in metres above the ellipsoid. As sensor_msgs/NavSatFix."""
+    """Position in degrees (WGS 84) and altitude in metres above the ellipsoid.
+
+    Same as sensor_msgs/NavSatFix.
+    """
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/NavSatFix"
     COVARIANCE_TYPE_UNKNOWN: ClassVar[int] = 0
@@ -164,7 +170,7 @@ class NavSatFix:
 
 @dataclass
 class Temperature:
-    """Temperature in degrees Celsius. As sensor_msgs/Temperature; a variance of 0 means unknown."""
+    """Temperature in degrees Celsius. Same as sensor_msgs/Temperature; a variance of 0 means unknown."""
 
     MSG_TYPE: ClassVar[str] = "sensor_msgs/Temperature"
 

@@ -41,7 +41,8 @@ def escaped(text: str, *, lines: bool = False) -> str:
 
     Args:
         text: The text.
-        lines: Keep newlines and tabs, where a forged line can't be mistaken for another message.
+        lines: True to leave newlines and tabs unescaped. Set this only where a forged line can't be
+            mistaken for another message.
     """
     return (_CONTROL_EXCEPT_NEWLINES if lines else _CONTROL).sub(_escape_match, text)
 
@@ -51,7 +52,7 @@ def strip_controls(text: str, *, lines: bool = False) -> str:
 
     Args:
         text: The text.
-        lines: True to keep newlines and tabs; otherwise they are replaced by spaces.
+        lines: True to leave newlines and tabs unchanged; otherwise they are replaced by spaces.
     """
     if lines:
         return _CONTROL_EXCEPT_NEWLINES.sub("", text)
@@ -59,7 +60,7 @@ def strip_controls(text: str, *, lines: bool = False) -> str:
 
 
 def shortened(text: str, most: int) -> str:
-    """Return `text` unchanged, or its first `most` characters followed by its length."""
+    """Return `text` if it has at most `most` characters, else its beginning followed by its length."""
     if len(text) <= most:
         return text
     return _("{beginning}… ({count} characters)").format(beginning=text[:most], count=len(text))

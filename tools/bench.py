@@ -1,6 +1,6 @@
 """Run the benchmarks one after the other.
 
-    python tools/bench.py                   all except those in ASKED, such as nep_tail and film
+    python tools/bench.py                   all except the slow and special ones in ASKED
     python tools/bench.py nep_rate -- ARGS  one benchmark; arguments after -- are passed on to it
 
 Exits with 1 if a result is invalid because the computer was busy. See `bench/README.md`.
@@ -36,7 +36,10 @@ NAMES = (
     "studio_tabs",
 )
 ASKED = ("nep_clients", "nep_tail", "nep_ros", "paper", "soak", "ways", "film", "package_start", "recorder")
-"""Benchmarks that run only when named: slow, dependent on ROS 1, Node.js or a package, or without times."""
+"""Benchmarks that run only if they are named on the command line.
+
+They are slow, need ROS 1, Node.js or a package of Studio, or don't measure times.
+"""
 
 
 def main() -> int:

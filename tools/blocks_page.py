@@ -33,7 +33,7 @@ def tables() -> str:
 
 
 def page(text: str) -> str:
-    """Replace the tables in the text of docs/blocks.md."""
+    """Return the text of docs/blocks.md with the current tables in place of the old ones."""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END)
     return f"{before}{BEGIN}\n\n{tables()}\n{END}{after}"

@@ -27,12 +27,13 @@ MAX_WORKERS = 6
 
 
 class Check(NamedTuple):
-    """Check to run.
+    """Command that checks the project.
 
     Attributes:
         name: Name in the output.
         command: Command and arguments.
-        is_beside: True to run the check in parallel with the others and show its output only if it fails.
+        is_beside: True to run the check in parallel with the others and show its output only if it
+            fails.
     """
 
     name: str
@@ -41,7 +42,13 @@ class Check(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Result and duration of a check."""
+    """Result of a check.
+
+    Attributes:
+        name: Name of the check.
+        passed: True if the exit code was 0.
+        elapsed_s: Duration in seconds.
+    """
 
     name: str
     passed: bool
@@ -66,11 +73,11 @@ def checks(*, fast: bool, pytest_arguments: Sequence[str] = ()) -> tuple[Check, 
 
 
 def side_by_side() -> tuple[str, ...]:
-    """Return options of pytest-xdist: two workers more than cores, at most six. See tests/scheduler.py.
+    """Return the options for parallel tests with pytest-xdist: two workers more than cores, at most six.
 
-    Many tests wait for processes and windows: on two cores, one extra worker leaves a fifth of the time idle.
-    With two extra workers, some tests would wait too long for a robot or a page, so the last worker opens no
-    windows.
+    Many tests wait for processes and windows: on two cores, one extra worker leaves a fifth of the time
+    idle. With two extra workers, some tests would wait too long for a robot or a page, so the last
+    worker opens no windows (tests/scheduler.py).
     """
     workers = min(MAX_WORKERS, (os.cpu_count() or 1) + 2)
     return ("-n", str(workers), "--dist", "loadfile")
@@ -102,7 +109,7 @@ def run(check: Check) -> Outcome:
 def run_all(found: Sequence[Check]) -> list[Outcome]:
     """Run the checks in order and return their outcomes.
 
-    Parallel checks start with the first and end last.
+    Checks with `is_beside` run in the background from the beginning, and their results come last.
     """
     with ThreadPoolExecutor() as pool:
         beside = {check: pool.submit(run, check) for check in found if check.is_beside}

@@ -36,7 +36,8 @@ def _ask(command: Sequence[str]) -> str:
 def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None = None) -> int:
     """Run a command and return its exit code; its output goes to the terminal or to `log`.
 
-    Ctrl+C also reaches the command, which is in the same process group, and gives it time to stop.
+    Ctrl+C also reaches the command, which is in the same process group. The command then has some
+    seconds to stop (`end`).
     """
     with open(log, "ab") if log else contextlib.nullcontext() as output:  # noqa: PTH123 (a path or nothing)
         process = subprocess.Popen(command, cwd=ROOT, env=dict(environ), stdout=output, stderr=output)
@@ -48,7 +49,7 @@ def watch(command: Sequence[str], environ: Mapping[str, str], log: Path | None =
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """Wait for a process to exit, then terminate and finally kill it. Takes at most `END_S` seconds."""
+    """Wait for a process to exit; terminate it after half of `END_S` seconds, and then kill it."""
     for harder in (process.terminate, process.kill):
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(END_S / 2)
@@ -58,7 +59,19 @@ def end(process: subprocess.Popen[bytes]) -> None:
 
 @dataclass(frozen=True)
 class Computer:
-    """Properties of a computer, and the functions that run commands on it; tests replace them."""
+    """Computer on which dev.py runs. Tests replace the properties and the functions that run commands.
+
+    Attributes:
+        platform: `sys.platform`.
+        machine: Processor architecture.
+        environ: Environment variables.
+        root: True if the process runs as root.
+        version: Python version: (major, minor).
+        has_ensurepip: True if virtual environments can be created with pip.
+        which: Returns the path of a command, or None.
+        ask: Runs a command and returns its output.
+        do: Runs a command and returns its exit code. See `watch`.
+    """
 
     platform: str = sys.platform
     machine: str = machine()

@@ -30,14 +30,22 @@ MIN_S = 1
 
 
 def seconds_each(weights: Mapping[str, int], minutes: float) -> dict[str, int]:
-    """Distribute the total time among the targets, in seconds; slow targets get twice as much."""
+    """Distribute a total time among the targets; return the seconds per target.
+
+    Args:
+        weights: Weight of each target; targets with a weight above 1 get twice the time of the others.
+        minutes: Total time. Each target gets at least `MIN_S` seconds.
+    """
     shares = {name: 2 if weight > 1 else 1 for name, weight in weights.items()}
     one = minutes * 60 / max(1, sum(shares.values()))
     return {name: max(MIN_S, round(one * share)) for name, share in shares.items()}
 
 
 def findings_in(folder: Path) -> list[Path]:
-    """Return the files in a folder with inputs that made a parser fail; each has a traceback next to it."""
+    """Return the input files in a folder that made a parser fail.
+
+    The traceback of each is in a .txt file next to it.
+    """
     return sorted(path for path in folder.glob("*") if path.suffix != ".txt") if folder.is_dir() else []
 
 

@@ -73,7 +73,7 @@ def hello() -> list[Block]:
 
 
 def beginning() -> list[Block]:
-    """Return one script: a start block and one block below."""
+    """Return one script: a start block with one block below it."""
     say = pepper("do_say", id=TALK, TEXT=text("Hello! I am Pepper."))
     return [placed(28, 28, chain(block("events_started"), say))]
 
@@ -107,14 +107,17 @@ SCRIPTS = {
     "Reaction to touch": counting,
     "A careful walk": wrong,
 }
-"""Functions that create the scripts of a behaviour, by its name.
+"""Functions that create the scripts of a behaviour, by the name of the behaviour.
 
-The names are those of the examples, so their translations exist.
+The names are taken from the examples, so that their translations exist.
 """
 
 
 def write_behaviour(folder: Path, name: str) -> Path:
-    """Write a behaviour with the format and robots of an example, whose texts are translated when opened."""
+    """Write one of the behaviours in `SCRIPTS`, with the robots of an example, and return its path.
+
+    The file has the format of an example, whose texts Studio translates when it is opened.
+    """
     content = {
         "format": "nep-behaviour",
         "version": 1,
@@ -131,7 +134,7 @@ def write_behaviour(folder: Path, name: str) -> Path:
 
 
 class GuidePictures(SelfDrive):
-    """Self-driving window that takes the images of the guide in one theme."""
+    """Studio window that operates itself and takes the images of the guide in one theme."""
 
     def __init__(self, window: MainWindow, folder: Path, home: Path, theme: str) -> None:
         self._home, self._theme = home, theme

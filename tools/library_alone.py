@@ -29,7 +29,7 @@ MESSAGES = {
 }
 WAIT_S = 30.0
 EXTRAS = {"nanomsg": "nanomsg", "zenoh": "zenoh", "ros2": "ros2"}
-"""Names of back ends and the extras that must be named in their error."""
+"""Extra that the error for an unavailable back end must mention, by name of the back end."""
 
 
 def installed() -> list[str]:

@@ -26,7 +26,7 @@ OLDEST_PYTHON = "3.10"
 PLAIN = "library"
 """Name of the file with the requirements of nep without extras."""
 LOCKED = ("studio", "dev", "test", "fuzz", "package", PLAIN)
-"""Names of the files, each constrained by the previous ones; all but the last are named after their extra."""
+"""Names of the files in order; each is constrained by the previous ones. All but the last name an extra."""
 INSTALLER = "installer"
 """Name of the file that pins uv, which installs the other files and has no dependencies."""
 EDITABLE = ("editables",)
@@ -34,7 +34,14 @@ EDITABLE = ("editables",)
 
 
 def command(uv: str, extra: str, output: Path, upgrade: bool) -> list[str]:
-    """Return the uv command that writes a file; it reads build requirements from stdin."""
+    """Return the uv command that writes one file of pins; it expects build requirements on stdin.
+
+    Args:
+        uv: Path of uv.
+        extra: Extra of pyproject.toml, `PLAIN` or `INSTALLER`.
+        output: File to write.
+        upgrade: True to pin the newest versions; otherwise existing pins are retained.
+    """
     found = [uv, "pip", "compile", "--quiet", "--universal", "--python-version", OLDEST_PYTHON]
     found += ["--generate-hashes", "--no-annotate", "--no-header", "--no-emit-package", "nep-studio"]
     found += ["--output-file", str(output)]

@@ -44,9 +44,9 @@ def graph() -> grimp.ImportGraph:
 
 
 def child_imports(of: grimp.ImportGraph, package: str) -> Imports:
-    """Return the imports between a package's children, each including its subpackages.
+    """Return the imports between a package's children; imports of a child's subpackages are included.
 
-    There are no cycles.
+    The children have no import cycles.
     """
     children = of.find_children(package)
     return {
@@ -60,7 +60,7 @@ def child_imports(of: grimp.ImportGraph, package: str) -> Imports:
 
 
 def transitive_reduction(imports: Imports) -> Imports:
-    """Remove the imports that are implied by others."""
+    """Return the imports without those that are implied by others."""
 
     def reachable(begin: str, seen: set[str]) -> set[str]:
         for each in imports[begin] - seen:

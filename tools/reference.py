@@ -3,9 +3,10 @@
     python tools/reference.py          write the pages
     python tools/reference.py --check  exit with 1 if a page is out of date
 
-The sources are parsed without importing nep. Google style sections become tables of arguments and attributes,
-followed by exceptions and results; so do sentences that begin with the name of an argument or with "Raises".
-`tests/test_reference.py` compares the pages with the code.
+The sources are parsed without importing nep. Google style sections become tables of arguments and
+attributes, followed by exceptions and results. Sentences that begin with the name of an argument or
+with "Raises" are moved to these tables, too. `tests/test_reference.py` compares the pages with the
+code.
 """
 
 from __future__ import annotations
@@ -82,9 +83,9 @@ OWN_PAGES = ("nep.geometry", "nep.sensor")
 MADE_BY_HAND = frozenset(
     {"Node", "Master", "FixedServer", "FixedClient", "Blackboard", "ImageFormat", "Encoded"}
 )
-"""Classes that programs instantiate, so that their constructor is documented.
+"""Classes that programs instantiate themselves, so that their constructor is documented.
 
-The other classes are instantiated by nep, except for those on the page of types.
+All other classes are instantiated by nep, except for the message types.
 """
 INTERNAL = frozenset({
     "Blackboard.deliver", "BlackboardWatch.attach", "BlackboardWatch.store_messages", "Client.join",
@@ -100,7 +101,7 @@ INTERNAL = frozenset({
 INTERNAL_EVERYWHERE = frozenset({"args", "forked", "node_closes"})
 """Names of members that are omitted in all classes."""
 _BEGINNINGS: Mapping[str, str] = {"0": "int", "''": "str"}
-"""Types of default values, by the beginning of their source text."""
+"""Types of default values, keyed by the beginning of the value's source text."""
 
 _SENTENCE = re.compile(r"(?<=[.!?]) +(?=[A-Z`\"(])")
 _SAID = re.compile(r"`(\w+)`(?::| (?=(?:is|are|as|tells|says|has|counts|are|may)\b))\s*(.*)", re.DOTALL)
@@ -214,7 +215,7 @@ class Reference:
 
     @property
     def names(self) -> frozenset[str]:
-        """All public names that are documented on a page."""
+        """Public names that are documented on a page."""
         return frozenset(self._pages)
 
     def page(self, name: str) -> str:
@@ -266,7 +267,7 @@ class Reference:
                 yield str(name), _target(module.members[str(name)])
 
     def find(self, name: str) -> griffe.Object:
-        """Return the object with this public name."""
+        """Return the object with the public name `name`."""
         return next(found for each, found in self._public() if each == name)
 
     def members(self, of: griffe.Class) -> list[griffe.Object]:

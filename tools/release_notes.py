@@ -3,8 +3,8 @@
     python3 -m tools.release_notes v1.2.3                   the version's section as Markdown
     python3 -m tools.release_notes v1.2.3 --links ADDRESS   with links to project files below ADDRESS
 
-Exits with 1 and a message if the tag isn't the version in nep/version.py, or if the changelog has no section
-for it. Then .github/workflows/release.yml builds nothing.
+Exits with 1 and a message if the tag isn't the version in nep/version.py, or if the changelog has no
+section for the version. In this case .github/workflows/release.yml builds nothing.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class RefusedError(Exception):
 
 
 def checked_version(tag: str, version: str = __version__) -> str:
-    """Return the version that a tag names.
+    """Return the version that a tag such as "v1.2.3" names.
 
     Raises:
         RefusedError: The tag doesn't match the project's version.

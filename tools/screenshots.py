@@ -123,7 +123,7 @@ def write_behaviour(path: Path) -> None:
 
 
 class Pictures(SelfDrive):
-    """Self-driving window that takes the README's images."""
+    """Studio window that operates itself and takes the README's images."""
 
     def __init__(self, window: MainWindow, folder: Path, behaviour: Path) -> None:
         self._behaviour = behaviour

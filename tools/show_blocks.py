@@ -43,7 +43,10 @@ def options() -> argparse.Namespace:
 
 
 class Photographer(QObject):
-    """Saves three images of the sample (light and running, dark and stopped, with errors), then exits."""
+    """Controller that saves three images of the block editor and then exits the program.
+
+    The images are: light theme and running, dark theme and stopped, and with errors.
+    """
 
     def __init__(self, view: BlocklyView, folder: Path, category: str | None) -> None:
         super().__init__(view)

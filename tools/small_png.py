@@ -1,6 +1,8 @@
 """Reduce screenshots to 256 colours; flat surfaces and text keep their exact colours.
 
-python tools/small_png.py PICTURE.png ...
+    python tools/small_png.py PICTURE.png ...
+
+The files are overwritten.
 """
 
 from __future__ import annotations

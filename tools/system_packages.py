@@ -58,7 +58,7 @@ TEST_PACKAGES = {
 
 
 def wanted_packages(computer: Computer) -> list[str]:
-    """Return the required packages, with ``|`` between alternative names."""
+    """Return the required packages; ``a|b`` stands for a package with different names in some releases."""
     wanted = list(QT_LIBRARIES)
     if not computer.has_screen:
         wanted.append("xvfb")
@@ -68,7 +68,7 @@ def wanted_packages(computer: Computer) -> list[str]:
 
 
 def missing_packages(computer: Computer) -> list[str]:
-    """Return the entries of `wanted_packages` of which no name is installed."""
+    """Return the entries of `wanted_packages` that are not installed under any of their names."""
     wanted = wanted_packages(computer)
     names = [name for entry in wanted for name in entry.split("|")]
     lines = computer.ask(["dpkg-query", "-W", "-f", "${Package} ${db:Status-Status}\n", *names]).splitlines()
@@ -77,7 +77,15 @@ def missing_packages(computer: Computer) -> list[str]:
 
 
 def available(computer: Computer, entries: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the first available name of each entry, and the entries of which apt knows no name."""
+    """Look up packages in apt's package lists.
+
+    Args:
+        computer: Computer to run on.
+        entries: Entries in the format of `wanted_packages`.
+
+    Returns:
+        The first available name of each entry, and the entries of which apt knows no name.
+    """
     names = [name for entry in entries for name in entry.split("|")]
     can: set[str] = set()
     name = ""
@@ -129,9 +137,18 @@ def bring_test_packages(computer: Computer) -> None:
 
 
 def apt_install(computer: Computer, missing: Sequence[str], names: list[str], unknown: list[str]) -> None:
-    """Install `names` as root; raise `Trouble` with apt's last output on failure.
+    """Install packages with apt. Must run as root.
 
-    `unknown` are entries that apt doesn't know; if there are any, the package lists are updated first.
+    The package lists are updated if a package is unknown or the installation fails.
+
+    Args:
+        computer: Computer to run on.
+        missing: Missing entries in the format of `wanted_packages`.
+        names: Available names of the entries, from `available`.
+        unknown: Entries that apt doesn't know, from `available`.
+
+    Raises:
+        Trouble: The installation failed; the message contains the last lines of apt's output.
     """
     log = ROOT / "build" / "apt.log"
     log.parent.mkdir(exist_ok=True)

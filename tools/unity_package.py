@@ -1,8 +1,8 @@
 """Build the Unity package of the C# client: ``python -m tools.unity_package FOLDER``.
 
-The package contains the library's sources. Unity ignores files of an installed package that have no ``.meta``
-file, so one is generated for each. Its id is derived from the file's path, so that references to a script
-survive an update of the package.
+The package contains the library's sources. Unity ignores files of an installed package that have no
+``.meta`` file, so a ``.meta`` file is generated for each. Its id is derived from the path of the file,
+so that references to a script survive an update of the package.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ IMPORTERS = {
     ".md": "TextScriptImporter",
 }
 HIDDEN = ("Documentation~", "Samples~")
-"""Folders that Unity does not import. Samples are copied into a project with their ``.meta`` files."""
+"""Folders that Unity does not import.
+
+A user can copy the samples, with their ``.meta`` files, to a project.
+"""
 
 
 def package_files() -> dict[str, bytes]:

@@ -29,12 +29,17 @@ TESTS = ("tests/nep", "tests/interop")
 WHO = "import sys; print('{}.{}'.format(*sys.version_info[:2]), sys.implementation.name, sys.executable)"
 PYENV = ".pyenv/versions"
 OLDEST_MACOS = "13_0"
-"""Minimum version of the macOS package (installers/macos/information.py) in the format of wheel tags."""
+"""Minimum macOS version of the package (installers/macos/information.py), in the format of wheel tags."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result for one Python version, with the names of the failed steps in order."""
+    """Result of the tests with one Python version.
+
+    Attributes:
+        version: Python version.
+        failed: Names of the failed steps in order; empty if all steps passed.
+    """
 
     version: str
     failed: list[str] = field(default_factory=list)
@@ -92,8 +97,8 @@ def environment(
         python: Interpreter that creates the environment.
         folder: Folder of the environment.
         requirements: Name of the file in requirements/, without its extension.
-        is_for_oldest: On a Mac, install wheels that run on `OLDEST_MACOS`. By default pip chooses those for
-            the current macOS; numpy's require macOS 14.
+        is_for_oldest: On a Mac, install wheels that run on `OLDEST_MACOS`. By default pip chooses
+            wheels for the current macOS, which may not run on older ones (numpy's require macOS 14).
     """
     made = venv_python(folder, computer.platform)
     stamp = folder / "nep-stamp"

@@ -4,9 +4,9 @@
     python tools/wire_vectors.py --check  exit with 1 if a file is out of date
 
 `filters.json`, `notices.json`, `master.json` and `malformed.json` are generated; `messages.json`,
-`batches.json`, `ids.json` and `services.json` are written by hand. See tests/data/wire/README.md for their
-format. The error code of a malformed message follows from its generator, independently of the parser under
-test.
+`batches.json`, `ids.json` and `services.json` are edited manually. See tests/data/wire/README.md for
+their format. The error code of a malformed message follows from its generator, independently of the
+parser under test.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ ALL = requests.PublisherRecord(
 COUNTS = requests.PublisherCount(PUBLISHER, 12, 2**40, 12, STAMP_NS)
 RECEIVED = requests.SubscriberCount(LISTENS.id, 11, 1)
 Asked = tuple[str, requests.Request]
-"""Connection name ("talker" or "listener") and request."""
+"""Request of the native wire, with the name of the connection that sends it ("talker" or "listener")."""
 
 ASKED: tuple[tuple[str, Sequence[Asked], Asked], ...] = (
     ("ping", (), ("talker", requests.Ping())),

@@ -66,7 +66,12 @@ _HEADER = "# All sentences of NEP Studio; made by tools/words.py (docs/translate
 
 
 class Key(NamedTuple):
-    """Identity of a catalogue entry."""
+    """Key of a catalogue entry.
+
+    Attributes:
+        context: Translation context, or None.
+        ids: English text, or singular and plural.
+    """
 
     context: str | None
     ids: tuple[str, ...]
@@ -259,9 +264,10 @@ def _json(value: Mapping[str, object]) -> str:
 
 
 def facts(language: str, catalog: Catalog) -> dict[str, object]:
-    """Return name, completeness and formats of a language.
+    """Return the native name of a language, its share of translated messages, and its formats.
 
-    The formats are from Unicode's CLDR and stored in languages.json, so that programs don't need Babel.
+    The formats are taken from Unicode's CLDR and stored in languages.json, so that programs don't need
+    Babel.
     """
     locale = Locale.parse(FORMATS.get(language, language))
     entries = [each for each in catalog if each.id]
@@ -298,7 +304,7 @@ def _date_part(found: re.Match[str]) -> str:
 
 
 def is_done(string: str | Sequence[str] | None) -> bool:
-    """Return True if all plural forms are translated."""
+    """Return True if a catalogue entry is translated, including all plural forms."""
     return all(_ids(string)) and bool(string)
 
 
@@ -313,7 +319,7 @@ def pseudo_catalog(pot: Catalog) -> Catalog:
 
 
 def check(folder: Path = LOCALE_FOLDER) -> list[str]:
-    """Return a message for each inconsistency between sources, template and translations."""
+    """Return a sentence for each inconsistency between sources, template and translations."""
     made, pot = template(), read(pot_file(folder))
     wrong = [
         f"'{_shown(key)}' is {place}; run 'python tools/words.py update'"

@@ -1,7 +1,8 @@
 """Commands of an exported program: ``from app.blocks.commands import robot, run, wait``.
 
-The commands are the same functions as in Studio, for the single program of this process. ``run("Greeting")``
-at the end of the file finds the robots, runs all scripts, and finally stops the robots, also after Ctrl+C.
+The commands are the functions that programs in Studio use, bound to the single program of this process.
+``run("Greeting")`` at the end of the file connects to the robots, runs all scripts, and finally stops the
+robots, also after Ctrl+C.
 
 Example::
 

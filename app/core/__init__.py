@@ -1,5 +1,5 @@
-"""State and logic of the window without Qt: session, mailbox, runner.
+"""State and logic of the window, independent of Qt.
 
-`app.core.session.Session` connects its parts; threads pass data to it only through
+`app.core.session.Session` owns all parts; background threads pass data to it only through
 `app.core.network.mailbox`.
 """

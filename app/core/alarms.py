@@ -1,4 +1,4 @@
-"""Alarms of a session: stored in one file, evaluated on messages and graphs, shown as alerts."""
+"""Alarms of a session: loaded from a file, evaluated on messages and graphs, and shown as alerts."""
 
 from __future__ import annotations
 
@@ -36,16 +36,15 @@ from nep.protocol.graph_view import GraphView
 
 FILE = "alarms.json"
 SHOW = "panel:alarms"
-"""Window command that shows the alarms panel."""
+"""Name of the window command that shows the alarms panel."""
 MAX_AGE_S = 10.0
-"""Maximum age of a message that waits for a master; older messages may no longer be valid and are discarded.
-"""
+"""Maximum age in seconds of an unsent message. Older messages may be outdated and are discarded."""
 SOUND: Notes = ((880.0, 0.16), (0.0, 0.06), (880.0, 0.16), (0.0, 0.06), (660.0, 0.3))
 VOLUME = 0.6
 ACTION_FAILED = lazy("an alarm can't carry out its action: {error}")
 _MAX_FILE_BYTES = 4_000_000
 WARNING_KINDS = frozenset({*EVENT_KINDS, "loses", "rate_below", "rate_above"})
-"""Kinds of conditions that are warnings; all others are errors."""
+"""Kinds of conditions with severity "warn"; all other kinds are errors."""
 
 
 def severity_of(condition: AlarmCondition) -> str:
@@ -54,7 +53,7 @@ def severity_of(condition: AlarmCondition) -> str:
 
 
 class AlarmSession(Protocol):
-    """Parts of the session that alarms use."""
+    """Parts of the session that `SessionAlarms` uses."""
 
     settings: Settings
     alerts: Alerts
@@ -65,24 +64,25 @@ class AlarmSession(Protocol):
     runs: Runs
 
     def watch(self, topic: str) -> Watch:
-        """Subscribe to a topic until the watch is closed."""
+        """Open a watch, which subscribes to the topic until it is closed."""
 
 
 @dataclass(frozen=True, slots=True)
 class _PendingSend:
-    """Message of an alarm, held until the user has answered the motion question."""
+    """Message to be sent by an alarm once the user confirms that the robot may move."""
 
     question: Question
     done: DoneCallback
 
 
 class SessionAlarms:
-    """Alarms of a session. Not thread-safe, except `take`: use it from the window's thread.
+    """Alarms of a session. Not thread-safe, except `evaluate`; use it from the main thread.
 
     Attributes:
-        keep: Saves the flight recorder. The action fails with a reason until its owner sets this.
-        run_behaviour: Runs a behaviour by name; returns an error message or "". Likewise.
-        on_event: Called for each alarm that was raised, cleared or is still on.
+        keep: Callback that saves the flight recorder. While None, the action fails.
+        run_behaviour: Callback that runs a behaviour by name and returns an error message or "". While
+            None, the action fails.
+        on_event: Callback for each alarm that was raised or cleared, or that is still active.
     """
 
     def __init__(
@@ -141,17 +141,23 @@ class SessionAlarms:
 
     @property
     def active(self) -> Sequence[AlarmRule]:
-        """Alarms whose condition is true and that are not snoozed."""
+        """Active alarms: the condition is true and the alarm is not snoozed."""
         return [rule for rule in self.rules if rule.id in self._on and not rule.is_snoozed(self._clock_s())]
 
     def create(self, condition: AlarmCondition) -> AlarmRule:
-        """Add an alarm that shows a banner. Evaluation starts as soon as the alarm is complete."""
+        """Add and return an alarm that shows a banner while a condition is true.
+
+        Evaluation starts as soon as all fields of the condition are filled in.
+        """
         rule = AlarmRule(new_id(), condition, (AlarmAction("banner"),))
         self.set_rule(rule)
         return rule
 
     def set_rule(self, rule: AlarmRule) -> None:
-        """Add an alarm or replace the one with this id; raise an alert when the list is full."""
+        """Add an alarm, or replace the alarm with the same id.
+
+        If the list is full, an alert is raised instead.
+        """
         if self.alarms.rule(rule.id) is not None or self._has_room():
             self.alarms.set_rule(rule)
             self._update_watches()
@@ -167,7 +173,7 @@ class SessionAlarms:
         return False
 
     def remove(self, rule_id: str) -> AlarmRule | None:
-        """Remove and return an alarm; `put_back` undoes it."""
+        """Remove an alarm and return it; None if the id is unknown. Undo with `restore`."""
         rule = self.alarms.rule(rule_id)
         if rule is not None:
             self._removed = (rule, self.rules.index(rule))
@@ -194,20 +200,24 @@ class SessionAlarms:
     # ---- interface of the session
 
     def evaluate(self, topic: str, messages: Sequence[Message]) -> None:
-        """Evaluate messages of a topic. Called in the thread that receives them."""
+        """Evaluate the alarms on new messages of a topic. Called in the receiving thread."""
         self.alarms.evaluator.evaluate(topic, messages)
 
     def update_graph(self, view: GraphView | None) -> None:
-        """Evaluate a new graph; None if the connection to the master was lost."""
+        """Evaluate the alarms on a new graph.
+
+        Args:
+            view: New graph; None if the connection to the master was lost.
+        """
         self._view = view
         self.alarms.evaluator.update_graph(view)
 
     def start(self) -> None:
-        """Subscribe to the topics of the alarms."""
+        """Subscribe to the topics that the alarms use."""
         self._update_watches()
 
     def tick(self) -> None:
-        """Process the events and actions that are due."""
+        """Process pending alarm events and run the actions that are due."""
         for event in self.alarms.tick():
             self._show(event)
         self.alarms.take_action_results()
@@ -222,7 +232,7 @@ class SessionAlarms:
             )
 
     def check(self) -> None:
-        """Refresh the alerts and save changes. Called once a second."""
+        """Update the alerts and save changed alarms. Called once a second."""
         for rule in self.rules:
             if rule.id in self._on:
                 self._update_alert(rule, self.alarms.evaluator.state(rule).value, count=0)
@@ -241,7 +251,7 @@ class SessionAlarms:
             )
 
     def close(self) -> None:
-        """Close the watches and save pending changes."""
+        """Close all watches and save pending changes."""
         for watch in self._watches.values():
             watch.close()
         self._watches.clear()

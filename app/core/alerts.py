@@ -1,4 +1,4 @@
-"""Active alerts, each with an id, a sentence and a next step. Alerts are removed when resolved."""
+"""Active alerts: problems with an id, a description and a next step. Resolved alerts are removed."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ class ActiveAlert:
     """One active problem.
 
     Attributes:
-        title: The problem, in one sentence.
-        detail: What the problem means.
-        button: Label of the button for the next step.
-        action: Name of the window command that the button runs.
-        since_s: Time of the first occurrence, on the clock given to `Alerts`.
+        title: Problem in one sentence.
+        detail: Explanation of the problem; may be empty.
+        button: Label of the button for the next step, or None.
+        action: Name of the window command that the button runs, or None.
+        since_s: Time of the first occurrence, on the clock passed to `Alerts`.
         count: Number of occurrences since the alert was last resolved.
-        for_developers: True if only the Developer layout shows the alert.
+        for_developers: True if the alert is shown in the Developer layout only.
     """
 
     id: str
@@ -35,7 +35,7 @@ class ActiveAlert:
 
 
 class Alerts:
-    """Active alerts, worst first. Not thread-safe: use it from the window's thread."""
+    """Active alerts, most severe first. Not thread-safe; use it from the main thread."""
 
     def __init__(self, clock: Callable[[], float] = time.time) -> None:
         self._clock = clock
@@ -46,7 +46,7 @@ class Alerts:
 
     @property
     def active(self) -> Sequence[ActiveAlert]:
-        """All active alerts: errors, then warnings, then infos; the oldest first within a severity."""
+        """All active alerts, sorted by severity (errors, warnings, infos) and then by age, oldest first."""
         if self._sorted is None:
             order = {severity: place for place, severity in enumerate(SEVERITIES)}
             self._sorted = tuple(
@@ -55,7 +55,11 @@ class Alerts:
         return self._sorted
 
     def errors_and_warnings(self, *, for_developers: bool = False) -> Sequence[ActiveAlert]:
-        """Return errors and warnings, worst first. Alerts for developers are included only on request."""
+        """Return the active errors and warnings, most severe first.
+
+        Args:
+            for_developers: True to include alerts that are shown in the Developer layout only.
+        """
         return [
             alert
             for alert in self.active
@@ -74,9 +78,20 @@ class Alerts:
         count: int = 1,
         for_developers: bool = False,
     ) -> None:
-        """Raise or update an alert; on an update, ``count`` is added to its occurrences.
+        """Raise an alert, or update the active alert with the same id.
 
-        Raises: ValueError: ``severity`` is not in `SEVERITIES`.
+        Args:
+            id: Id of the alert.
+            severity: One of `SEVERITIES`.
+            title: Problem in one sentence.
+            detail: Explanation of the problem.
+            button: Label of the button for the next step.
+            action: Name of the window command that the button runs.
+            count: Number of new occurrences, added to the previous ones.
+            for_developers: True to show the alert in the Developer layout only.
+
+        Raises:
+            ValueError: ``severity`` is not in `SEVERITIES`.
         """
         if severity not in SEVERITIES:
             raise ValueError(f"no severity '{severity}'; use one of {', '.join(SEVERITIES)}")
@@ -100,7 +115,7 @@ class Alerts:
             self._changed()
 
     def resolve(self, id: str) -> None:
-        """Remove an alert; no effect when it isn't active."""
+        """Remove an alert. Does nothing if the alert isn't active."""
         self._dismissed.discard(id)
         if self._alerts.pop(id, None) is not None:
             self._changed()
@@ -125,7 +140,7 @@ class Alerts:
             self.revision += 1
 
     def is_dismissed(self, id: str) -> bool:
-        """Return True if the user closed the banner of the alert."""
+        """Return True if the user has closed the banner of the alert."""
         return id in self._dismissed
 
     def _changed(self) -> None:

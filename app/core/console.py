@@ -1,7 +1,7 @@
 """Console: the newest 5000 log records of Studio and of programs on the network.
 
-Records from the network (`nep.nodes.log_handler`) are stored as messages and decoded when `Console.records`
-is read, so a hidden console costs almost nothing.
+Records from the network (`nep.nodes.log_handler`) are stored as messages and decoded when
+`Console.records` is read, so a hidden console needs hardly any CPU time.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class ConsoleRecord:
     Attributes:
         stamp_s: Time in seconds since 1970.
         level: "debug", "info", "warn", "error" or "critical".
-        origin: Program that logged the record.
-        number: Running number, from 1.
-        logger: Name of the logger, if known.
-        place: File and line, if known.
+        origin: Name of the program that logged the record.
+        number: Serial number of the record, starting at 1.
+        logger: Name of the logger; "" if unknown.
+        place: Source file and line number; "" if unknown.
     """
 
     stamp_s: float
@@ -46,7 +46,7 @@ class ConsoleRecord:
 
 
 class Console:
-    """Ring buffer of log records, oldest first. Not thread-safe: use it from the window's thread."""
+    """Ring buffer of log records, oldest first. Not thread-safe; use it from the main thread."""
 
     def __init__(self, clock: Callable[[], float] = time.time, capacity: int = CAPACITY) -> None:
         self._clock = clock
@@ -61,16 +61,21 @@ class Console:
 
     @property
     def records(self) -> Sequence[ConsoleRecord]:
-        """Records, oldest first; decodes pending messages."""
+        """All records, oldest first. Pending messages are decoded at access."""
         self._decode_pending()
         return self._lines  # type: ignore[return-value]  # all entries are decoded
 
     def add(self, level: str, origin: str, text: str) -> None:
-        """Add a record. Text longer than `TEXT_LIMIT` is truncated visibly."""
+        """Append a record. Text longer than `TEXT_LIMIT` is shortened."""
         self._append([ConsoleRecord(self._clock(), level, origin, _truncate(text))])
 
     def add_messages(self, messages: Sequence[Message], dropped: int = 0) -> None:
-        """Add log messages from the network; ``dropped`` is the number of messages lost before them."""
+        """Add log messages from the network.
+
+        Args:
+            messages: Log messages, oldest first.
+            dropped: Number of messages lost before ``messages``.
+        """
         if dropped:
             self.left_out += dropped
             words = ngettext(
@@ -83,7 +88,11 @@ class Console:
             self._append(messages)
 
     def ignore_process(self, pid: int | None) -> None:
-        """Ignore log messages of a process whose output already arrives through a pipe."""
+        """Ignore log messages of a process whose output Studio already reads through a pipe.
+
+        Args:
+            pid: Process id; None has no effect.
+        """
         if pid is not None:
             self._own.append(pid)
 
@@ -94,7 +103,10 @@ class Console:
         self.revision += 1
 
     def rewind(self) -> None:
-        """Remove all records and known errors, because a replay jumped and sends its records again."""
+        """Remove all records and the list of known errors.
+
+        Called when a replay seeks, because the records are then sent again.
+        """
         self._errors = log_handler.ShownErrors()
         self.clear()
 

@@ -1,7 +1,8 @@
 """Unexpected errors of Studio: logged once, shown as an alert, and isolated from the following steps.
 
-All errors go through `logging`: uncaught exceptions of any thread (`install_hooks`), exceptions caught by a
-guard (`log_errors`), and messages of Qt. Handlers whose output people read have a `RepeatFilter`.
+All errors go through `logging`: uncaught exceptions of any thread (`install_hooks`), exceptions caught
+by a guard (`log_errors`), and messages of Qt. Handlers whose output is read by people have a
+`RepeatFilter`.
 """
 
 from __future__ import annotations
@@ -27,17 +28,18 @@ from nep.version import __version__
 FILE_BYTES, FILES_KEPT = 1_000_000, 3
 MAX_COUNTED_FAULTS = 500
 CONSOLE_EXTRA: dict[str, object] = {"in_console": True}
-"""``extra`` of a record that the Console already shows in other words, and that only the log file needs."""
+"""``extra`` of a record for the log file only, because the Console already shows the event in other words."""
 WRITER_MESSAGE = "NEP Studio %s writes from here on"
 FORMAT = "%(asctime)s %(levelname)s %(threadName)s %(name)s: %(message)s"
 
 ALERT = "studio"
 RECOVERY_S = 5.0
-"""Time without a failure after which a fault is resolved. Keeps the banner steady when errors are
-intermittent.
+"""Time in seconds without a failure after which a fault is resolved.
+
+Prevents the banner from flickering when errors are intermittent.
 """
 EXPIRY_S = 60.0
-"""Time after which a fault of a one-time step, such as an event, is resolved. The log keeps the record."""
+"""Time in seconds after which the fault of a one-time step, such as an event, is resolved."""
 MAX_FAULTS = 100
 
 _log = logging.getLogger("studio")
@@ -51,7 +53,7 @@ def log_folder() -> Path:
 
 @contextmanager
 def log_errors(what: str) -> Iterator[None]:
-    """Return a context that logs exceptions as "can't ``what``" with the traceback and suppresses them."""
+    """Return a context manager that logs exceptions as "can't ``what``" and suppresses them."""
     try:
         yield
     except Exception:  # noqa: BLE001  the caller must continue after any error
@@ -59,22 +61,20 @@ def log_errors(what: str) -> Iterator[None]:
 
 
 class RepeatFilter:
-    """Logging filter that passes a fault when it is new and at its 10th, 100th, 1000th ... occurrence.
+    """Logging filter that passes a record at its 1st, 10th, 100th, 1000th ... occurrence.
 
-    Records count as repetitions if they have the same logger and level, and were raised at the same line or
-    have the same text. The newest 500 faults are remembered; an older one counts as new. Thread-safe only
-    under the handler's lock, which logging holds.
+    A record is a repetition if logger, level, and either the line of the exception or the text are the
+    same. The newest 500 faults are remembered; an older fault counts as new. Thread-safe only under the
+    handler's lock, which `logging` holds.
     """
 
     def __init__(self) -> None:
         self._counts: dict[tuple[object, ...], int] = {}
 
     def filter(self, record: logging.LogRecord) -> logging.LogRecord | None:
-        """Return the record to write, or None to suppress it.
+        """Return the record to write, or None to suppress it. Never raises.
 
-        A repetition is given its number of occurrences.
-
-        Never raises, not even if the record's arguments can't be formatted.
+        The number of occurrences is appended to the text of a repetition.
         """
         record = _make_formattable(record)
         key = (record.name, record.levelno, _raise_location(record) or record.getMessage())
@@ -120,9 +120,9 @@ def _raise_location(record: logging.LogRecord) -> tuple[object, ...] | None:
 class LogFile(RotatingFileHandler):
     """Log file of warnings and errors: ``studio.log`` and three older files of 1 MB each.
 
-    The first line that a run writes to a file contains Studio's version, because files are continued after an
-    update. Only the user can read the files. Records that can't be written (disk full or read-only) are
-    dropped.
+    Each run starts with a line that contains Studio's version, because an updated Studio appends to the
+    same file. Only the user can read the files. Records that can't be written (disk full or read-only)
+    are dropped.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -150,11 +150,11 @@ class LogFile(RotatingFileHandler):
         return stream
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  logging's name
-        """Ignore errors of writing, which can't be reported elsewhere; the Console has the record."""
+        """Ignore write errors, which can't be reported elsewhere; the Console still shows the record."""
 
 
 def install_hooks() -> None:
-    """Log uncaught exceptions of this thread, of other threads and of finalizers."""
+    """Install hooks that log uncaught exceptions of all threads and of finalizers."""
     sys.excepthook = _log_uncaught
     threading.excepthook = _log_uncaught_in_thread
     sys.unraisablehook = _log_unraisable
@@ -190,14 +190,20 @@ def _log_unraisable(raised: sys.UnraisableHookArgs) -> None:
 
 
 def error_text(error: BaseException) -> str:
-    """Return an exception as one line: type and message."""
+    """Format an exception as one line: type and message."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 @dataclass(slots=True)
 class _Fault:
-    """Failed step: its message, the time of the last failure, and True if it succeeded since."""
+    """Failed step.
+
+    Attributes:
+        said: Error message for the user.
+        last_s: Time of the last failure.
+        has_recovered: True if the step has succeeded since the last failure.
+    """
 
     message: str
     last_s: float
@@ -205,7 +211,7 @@ class _Fault:
 
 
 class FaultAlerts:
-    """Alert about steps of Studio that failed. Not thread-safe: use it from the window's thread."""
+    """Alert about failed steps of Studio. Not thread-safe; use it from the main thread."""
 
     def __init__(self, alerts: Alerts, clock: Callable[[], float]) -> None:
         self._alerts, self._clock = alerts, clock
@@ -213,10 +219,10 @@ class FaultAlerts:
 
     @contextmanager
     def guarded(self, what: str, **holes: object) -> Iterator[None]:
-        """Return a context that suppresses exceptions of one step after logging them and raising an alert.
+        """Return a context manager that logs exceptions of one step, raises an alert and suppresses them.
 
         Args:
-            what: Completes the sentence "can't ..."; use `lazy` for it.
+            what: Translatable phrase that completes "can't ..."; mark it with `lazy`.
             holes: Values for the placeholders in ``what``.
         """
         try:

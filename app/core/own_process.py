@@ -1,4 +1,4 @@
-"""Commands that start Studio or one of its modules in a new process, also from a frozen build."""
+"""Commands that start Studio or one of its modules in a new process, including from a frozen build."""
 
 from __future__ import annotations
 
@@ -20,21 +20,25 @@ def module_command(module: str) -> list[str]:
 
 
 def studio_command(theme: str | None = None) -> list[str]:
-    """Return the command that starts Studio in the same way as this process, without file arguments."""
+    """Return the command that starts Studio like the current process, without files to open.
+
+    Args:
+        theme: Theme to use instead of the current one.
+    """
     own = [sys.executable] if getattr(sys, "frozen", False) else [sys.executable, "-m", "app"]
     return [*own, *(("--theme", theme) if theme is not None else ())]
 
 
 def fresh_environ(environ: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment without the language set by `nep.i18n.begin`.
+    """Return a copy of the environment without the language that `nep.i18n.set_initial_language` sets.
 
-    A new process then uses the language in the settings.
+    A process started with this environment uses the language in the settings.
     """
     return {name: value for name, value in environ.items() if name not in {LANG_VARIABLE, "LANGUAGE"}}
 
 
 class OwnProgram:
-    """Executable file of a frozen build, needed to load modules and start child processes."""
+    """Executable file of a frozen build, which is needed to load modules and to start child processes."""
 
     def __init__(self, file: Path | None = None) -> None:
         # By default the executable of a frozen build; without one, nothing is checked.
@@ -43,7 +47,7 @@ class OwnProgram:
         self._initial = self._signature()
 
     def executable_state(self) -> ExecutableState:
-        """Return the state of the executable file: "" (unchanged), "replaced" by an update, or "gone"."""
+        """Return the state of the executable file: "" (unchanged), "replaced" (by an update), or "gone"."""
         now = self._signature()
         if now == self._initial:
             return ""

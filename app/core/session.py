@@ -1,4 +1,4 @@
-"""State of one window: the network with its topics and robots, the behaviours and their run.
+"""State of one window: the network with its topics and robots, and the behaviours with their run.
 
 The window reads the state 30 times a second. No method blocks: threads post to the mailbox, and
 `Session.tick` applies the posted events and messages.
@@ -80,19 +80,20 @@ else:
 CHECK_INTERVAL_S = 1.0
 MONITORING_FAILED = lazy("can't monitor the robots: {error}")
 LOG_TOPICS = {LOG_TOPIC: LOG_TYPE, LAST_ERRORS_TOPIC: LAST_ERRORS_TYPE}
-"""Topics shown in the Console, with their message types."""
+"""Message types of the topics that are shown in the Console, by topic."""
 
 
 class Session:
-    """State shown by the panels. Not thread-safe: use it from the window's thread; `close` stops all threads.
+    """State of the window, which the panels show. Not thread-safe; use it from the main thread.
 
-    ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` belong to the source that is
-    shown: the live network (`live`), which stays connected, or a recording (``replay``).
+    ``topics``, ``nodes``, ``networks``, ``images``, ``series`` and ``graph`` belong to the source that
+    is shown: the live network (`live`), which always stays connected, or a recording (``replay``).
+    `close` stops all threads.
     """
 
     replay: replay_module.Replay | None = None
     source_revision = 0
-    """Counter that increases when another source is shown."""
+    """Counter that increases when another source (live network or recording) is shown."""
     _live: LiveNetwork | None = None  # while a recording is shown
     _closing_replays: list[replay_module.Replay]
 
@@ -195,7 +196,7 @@ class Session:
 
     @property
     def live(self) -> LiveNetwork:
-        """Live network, even while a recording is shown."""
+        """State of the live network, even while a recording is shown."""
         if self._live is not None:
             return self._live
         return LiveNetwork(self.topics, self.nodes, self.networks, self.images, self.series, self.graph)
@@ -211,10 +212,7 @@ class Session:
         return self.replay.console if self.replay is not None else self.console
 
     def open_recording(self, path: Path) -> replay_module.Replay:
-        """Show a recording instead of the live network, which stays connected.
-
-        The recording is read in a child process.
-        """
+        """Show and return a recording, which is read in a child process. The live network stays connected."""
         live = self.live
         self._end_replay()
         self._live = live
@@ -248,12 +246,12 @@ class Session:
 
     @property
     def starting_robots(self) -> tuple[str, ...]:
-        """Names of virtual robots that are starting."""
+        """Names of the virtual robots that are starting."""
         there = {link.name for link in self.fleet.connected}
         return tuple(name for name in self.launcher.starting_robots if name not in there)
 
     def start(self) -> None:
-        """Start the threads, and a master if none replies."""
+        """Start the threads. If no master replies, start a master."""
         self.source.start()
         self.networks.start()
         self.alarms.start()
@@ -263,16 +261,20 @@ class Session:
             self.launcher.ensure_master()
 
     def watch(self, topic: str) -> Watch:
-        """Subscribe to a topic of the live network until the watch is closed; messages arrive in `Topics`.
+        """Watch a topic of the live network until the watch is closed. Messages arrive in `Topics`.
 
-        Here and in `topic` and `mark_seen`, ``topic`` is a key among the topics of all networks (`key_of`).
+        Args:
+            topic: Key of the topic, see `key_of`.
         """
         return self._watches.open([topic])
 
     def watch_displayed(self, topic: str) -> Watch:
-        """Subscribe to a topic of the source that is shown.
+        """Watch a topic of the source that is shown (live network or recording).
 
-        Call this again when `sources_shown` has changed.
+        Watch the topic again after `source_revision` has changed.
+
+        Args:
+            topic: Key of the topic, see `key_of`.
         """
         return self.watch(topic) if self.replay is None else self.replay.watch(topic)
 
@@ -287,14 +289,14 @@ class Session:
         (network.topics if network is not None else self.topics).mark_seen(topic)
 
     def confirm_discard(self, document: Document) -> bool:
-        """Return True if the user discards work that can't be saved.
+        """Return True if the user confirms discarding work that can't be saved.
 
-        The first call raises an alert instead.
+        The first call raises an alert and returns False; a second call confirms.
         """
         return self._health.confirm_discard(document.name, document.journal_error or "")
 
     def tick(self) -> None:
-        """Apply the events and messages that threads posted since the last tick."""
+        """Apply the events and messages that threads have posted since the last tick."""
         now, now_ns = self._clock(), self._clock_ns()
         drained = self._mailbox.drain()
         for event in drained.events:
@@ -340,10 +342,10 @@ class Session:
             self.source_revision += 1  # its topics and start time are available from now on
 
     def guarded(self, what: str, **holes: object) -> AbstractContextManager[None]:
-        """Return a context that suppresses exceptions of one step of a tick after logging and alerting them.
+        """Return a context manager that logs exceptions of one step, raises an alert and suppresses them.
 
         Args:
-            what: Completes the sentence "can't ..."; use `lazy` for it.
+            what: Translatable phrase that completes "can't ..."; mark it with `lazy`.
             holes: Values for the placeholders in ``what``.
         """
         return self._faults.guarded(what, **holes)

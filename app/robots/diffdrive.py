@@ -1,7 +1,7 @@
 """Two-wheeled robot with a camera: its declaration, and its actions for any base with speed control.
 
 A driver supplies the base (:class:`Wheels`): a real one, or the virtual one of :mod:`app.robots.turtle`.
-Distances are measured by the odometry of the base.
+Distances are computed from the positions that the base measures.
 """
 
 from __future__ import annotations
@@ -38,32 +38,43 @@ Distance = Annotated[float, Range(-MAX_DISTANCE_M, MAX_DISTANCE_M, 0.05, "m")]
 
 
 class Wheels(Protocol):
-    """Base of the robot. All methods must be thread-safe."""
+    """Interface of the robot's base. All methods must be thread-safe."""
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Set the speed (m/s, positive forwards) and the turning speed (°/s, positive to the left).
+        """Set the speed of the base.
 
-        0, 0 brakes.
+        Args:
+            speed: Speed in m/s, positive forwards.
+            turn_speed: Turning speed in °/s, positive to the left. If both speeds are 0, the base brakes.
         """
 
     def pose(self) -> tuple[float, float, float]:
-        """Return the position in metres and the orientation in degrees: x, y, theta."""
+        """Return the position (x and y in m) and the orientation (theta in degrees)."""
 
     def still(self) -> bool:
         """Return True if the base is not moving."""
 
     def bumped(self) -> str:
-        """Return the side at which the base touches something, or ""."""
+        """Return the side at which the base touches something, such as "left"; "" if it touches nothing."""
 
     def light(self, colour: str) -> None:
-        """Set the colour of the light, ``#rrggbb``."""
+        """Set the colour of the light.
+
+        Args:
+            colour: Colour in the form ``#rrggbb``.
+        """
 
     def close(self) -> None:
         """Disconnect from the base."""
 
 
 class DiffDrive:
-    """Declaration and actions of the robot."""
+    """Declaration and actions of a two-wheeled robot with a camera.
+
+    Args:
+        link: Connection to the network.
+        wheels: Base of the robot.
+    """
 
     pose = position_sensor(rate_hz=30)
     distance = distance_sensor(most_m=4)
@@ -159,7 +170,7 @@ class DiffDrive:
 
     @safe_stop(watchdog_s=0.5, within_s=0.1)
     def stop(self) -> None:
-        """Brake; returns when it stands still."""
+        """Brake and return when the robot stands still. Raises Failed if the wheels still turn after 1 s."""
         with self._steering:  # running actions are canceled and don't steer any more
             self.wheels.drive(0.0, 0.0)
         waited = threading.Event()
@@ -182,7 +193,7 @@ class DiffDrive:
             self.wheels.drive(0.0, 0.0)
 
     def odometer(self) -> Callable[[], float]:
-        """Return a function that returns the metres driven since now, computed from the position."""
+        """Return a function that returns the distance in m from the current position."""
         start_x, start_y, _ = self.wheels.pose()
 
         def driven_m() -> float:
@@ -253,7 +264,7 @@ def _remaining(amount: float, done: float) -> float:
 
 
 class DiffDriveTemplate(DiffDrive):
-    """Robot without a base, for the description only; drivers replace it by their own class."""
+    """Robot without a base, used to generate the description; drivers replace this class by their own."""
 
     def __init__(self, link: Link) -> None:
         raise Failed(

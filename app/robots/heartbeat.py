@@ -1,4 +1,4 @@
-"""Heartbeat to robots, which stop when they don't receive any."""
+"""Heartbeats to robots, which stop when they no longer receive any."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Publish = Callable[[Mapping[str, object]], object]
 
 
 class Heartbeat:
-    """Thread that sends ``alive`` five times a second to each robot in motion.
+    """Thread that sends heartbeats (``alive``) five times a second to each robot in motion.
 
     Args:
-        sender: Program id in the commands.
+        sender: Id of this program in the messages.
         thread: Name of the thread.
     """
 
@@ -34,7 +34,12 @@ class Heartbeat:
         self._errors = SuppressedErrors(_log, thread)
 
     def start(self, robot: str, publish: Publish) -> None:
-        """Send heartbeats to a robot until `rest`; ``publish`` publishes on its command topic."""
+        """Send heartbeats to a robot until `stop`.
+
+        Args:
+            robot: Name of the robot.
+            publish: Publishes on the robot's command topic.
+        """
         with self._lock:
             self._robots[robot] = publish
             if self._thread is None and not self._closing:

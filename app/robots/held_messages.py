@@ -1,4 +1,4 @@
-"""Messages of publishers that the master does not list yet, limited per publisher and in total."""
+"""Buffer for messages of publishers that the master does not list yet, bounded per publisher and in total."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ MAX_PER_PUBLISHER = 4
 
 
 class HeldMessages:
-    """Bounded store of messages of unknown publishers.
+    """Bounded buffer of messages of unknown publishers.
 
-    A publisher that sends too many messages only evicts its own messages; a new publisher evicts none.
+    If a publisher sends too many messages, its own oldest message is evicted. If there are too many
+    publishers, messages of new publishers are dropped.
+
+    Args:
+        per_publisher: Maximum number of messages of one publisher.
+        publishers: Maximum number of publishers.
     """
 
     def __init__(self, *, per_publisher: int = MAX_PER_PUBLISHER, publishers: int = MAX_PUBLISHERS) -> None:
@@ -28,7 +33,7 @@ class HeldMessages:
         return publisher in self._messages
 
     def add(self, message: Message) -> None:
-        """Store a message."""
+        """Store a message; see the class for the limits."""
         held = self._messages.get(message.publisher)
         if held is None:
             if len(self._messages) >= self._publishers:
@@ -37,7 +42,7 @@ class HeldMessages:
         held.append(message)
 
     def pop_all(self) -> list[Message]:
-        """Remove and return all messages, in order for each publisher."""
+        """Remove and return all messages; messages of one publisher are in order of arrival."""
         taken = [message for held in self._messages.values() for message in held]
         self._messages.clear()
         return taken

@@ -1,8 +1,8 @@
-"""Identity of robots: which node is a robot, and which claims and subscribers are valid. No side effects.
+"""Identity of robots: which node is a robot, and which claims and subscribers are valid.
 
 A robot is defined by its name, its topics and the node that announced it first. The master's graph lists the
 node of each publisher, and every native message contains the id of its publisher. This protects against
-programs that don't lie to the master (docs/trust.md).
+programs that don't lie to the master (docs/trust.md). Except for `Senders`, the module has no state.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from nep.text import bounded_str, strip_controls
 
 GATEWAY = "gateway"
 SHARED_TOPICS = frozenset({RIZE_COMMAND_TOPIC, "action_state"})
-"""Topics that all robots of RIZE share (`app.robots.rize`)."""
+"""Topics that all robots of RIZE use (`app.robots.rize`)."""
 MAX_SENDERS = 20_000
 MAX_STOP_ERROR_LENGTH = 200
 MAY_MOVE_MESSAGE = lazy("{robot} may still move: {why}")
@@ -34,7 +34,14 @@ _NATIVE_GENERATIONS = frozenset({"native", GATEWAY})
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Program of a robot, as the master knows its node. ``pid`` is the process id on ``host``."""
+    """Program of a robot, as registered with the master.
+
+    Attributes:
+        node_id: Id of the node.
+        node: Name of the node; "" if unknown.
+        host: Name of the computer; "" if unknown.
+        pid: Process id on `host`; None if unknown.
+    """
 
     node_id: str
     node: str = ""
@@ -43,13 +50,13 @@ class Identity:
 
     @property
     def display_name(self) -> str:
-        """Display name, such as "“rover driver” on lab-2"."""
+        """Display name, such as ``“rover driver” on lab-2``."""
         name = f"“{self.node or self.node_id}”"
         return _("{program} on {host}").format(program=name, host=self.host) if self.host else name
 
 
 def identity_of(view: GraphView, node_id: str) -> Identity:
-    """Return the identity of a node as known to the master; only its id if it is not in the graph."""
+    """Return the identity of a node in the graph; only with its id if it is not in the graph."""
     node = view.nodes.get(node_id)
     return Identity(node_id) if node is None else Identity(node_id, node.name, node.host, node.pid)
 
@@ -67,7 +74,7 @@ def publisher_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
 def subscriber_nodes(view: GraphView, topic: str) -> tuple[str, ...]:
     """Return the ids of the nodes that subscribe to a topic.
 
-    Programs of the original NEP are listed instead of their gateway.
+    Programs of the original NEP are included instead of the gateway that subscribes for them.
     """
     info = view.topics.get(topic)
     found = (each.node_id for each in info.subscribers) if info is not None else ()
@@ -81,16 +88,21 @@ def _is_native(view: GraphView, node_id: str) -> bool:
 
 
 def first_announcer(view: GraphView, topic: str) -> Identity | None:
-    """Return the node that first announced a robot on its description topic, or None."""
+    """Return the program that first announced a robot; None if no program does.
+
+    Args:
+        view: Graph of the network.
+        topic: Description topic of the robot.
+    """
     found = publisher_nodes(view, topic)
     return identity_of(view, found[0]) if found else None
 
 
 def description_topic_problem(robot: Robot, topic: str) -> str | None:
-    """Return why a description is invalid on this topic, or None if it is valid.
+    """Return an error message if a description was received on a wrong topic, else None.
 
     A robot may only be announced on ``/NAME/description`` with its own name; otherwise a program could
-    announce the robot of another one.
+    announce the robot of another program.
     """
     home = topic_of(robot.name, "description")
     if topic == home and robot.topics.description == home:
@@ -101,39 +113,49 @@ def description_topic_problem(robot: Robot, topic: str) -> str | None:
 
 
 def reserved_topics(robot: Robot) -> tuple[str, ...]:
-    """Return the topics that move a robot or carry its replies. No other robot may use them."""
+    """Return the topics that move a robot or carry its replies; no other robot may use these topics."""
     topics = robot.topics
     return tuple(topic for topic in (topics.command, topics.answer, topics.world) if topic is not None)
 
 
 def controls_of(robot: Robot, earlier: Iterable[RobotTopics] = ()) -> RobotControls:
-    """Return the topics that move a robot or change its world, including its ``earlier`` topics."""
+    """Return the topics that move a robot or change its virtual world.
+
+    Args:
+        robot: Description of the robot.
+        earlier: Topics of earlier descriptions of the robot, which are included.
+    """
     topics = {topic for each in (robot.topics, *earlier) for topic in (each.command, each.world)}
     topics.update(action.topic for action in robot.actions)
     return RobotControls(robot.name, frozenset(filter(None, topics)))
 
 
 def program_of(key: str) -> str:
-    """Derive the name of a program in ``from`` from its secret key.
+    """Derive the id of a program, sent in ``from``, from its secret key.
 
-    A stop whose ``ends`` is the key makes robots reject later commands under this name. Names are public: if
-    the name were sufficient, any program could block another one.
+    A stop command with the key in ``ends`` makes robots reject later commands with this id. Ids are public:
+    if the id were sufficient, any program could block another one.
     """
     return f"program-{hashlib.sha256(key.encode('utf-8', 'replace')).hexdigest()[:16]}"
 
 
 def is_own_topic(robot_name: str, topic: str) -> bool:
-    """Return True if a topic belongs to a robot with this name: ``/NAME/...``."""
+    """Return True if a topic starts with the name of the robot: ``/NAME/...``."""
     return topic.startswith(topic_of(robot_name, ""))
 
 
 def safe_error_text(error: object) -> str:
-    """Return a robot's error as text that is safe to show, with limited length."""
+    """Return the error in a robot's reply as harmless text of limited length."""
     return strip_controls(bounded_str(error or "", MAX_ERROR_LENGTH), lines=True)
 
 
 def stop_error_text(name: str, error: object) -> str:
-    """Return the error of a failed stop in the robot's words: "Arm may still move: the brake is stuck"."""
+    """Return the error message of a failed stop, such as ``Arm may still move: the brake is stuck``.
+
+    Args:
+        name: Name of the robot.
+        error: Error in the robot's reply, of any type.
+    """
     words = "".join(
         sign if sign.isprintable() else " "
         for sign in bounded_str(error or _("the stop command failed"), MAX_ERROR_LENGTH)
@@ -151,9 +173,13 @@ def is_may_move_error(name: str, words: str) -> bool:
 
 
 def topic_conflict(robot: Robot, others: Iterable[Robot]) -> str | None:
-    """Return why a robot can't use its topics, because they belong to another robot; None if it can.
+    """Return an error message if a topic of a robot belongs to another robot, else None.
 
     ``/NAME/...`` belongs to the robot with that name; other topics belong to the first robot that uses them.
+
+    Args:
+        robot: Robot to check.
+        others: All known robots.
     """
     known = [other for other in others if other.name != robot.name]
     for topic in set(reserved_topics(robot)) - SHARED_TOPICS:
@@ -168,10 +194,10 @@ def topic_conflict(robot: Robot, others: Iterable[Robot]) -> str | None:
 
 
 class Senders:
-    """Nodes by publisher id, as reported by the master. Thread-safe.
+    """Table of the nodes by publisher id, as reported by the master. Thread-safe.
 
-    The last 20 000 entries are stored. A node that uses the publisher id of another node is ignored while
-    that one is present.
+    The table is limited to the newest 20 000 entries. A node that uses the publisher id of another node is
+    ignored while the other node is in the graph.
     """
 
     def __init__(self) -> None:
@@ -179,7 +205,12 @@ class Senders:
         self._nodes: dict[int, str] = {}
 
     def update(self, view: GraphView, topics: Iterable[str]) -> None:
-        """Add the publishers of these topics."""
+        """Add the publishers of topics.
+
+        Args:
+            view: Graph of the network.
+            topics: Names of the topics.
+        """
         with self._lock:
             for topic in topics:
                 info = view.topics.get(topic)
@@ -190,28 +221,28 @@ class Senders:
                 del self._nodes[next(iter(self._nodes))]
 
     def node_of(self, message: Message) -> str | None:
-        """Return the id of the sending node; None while its publisher is unknown."""
+        """Return the id of the node that sent a message; None if its publisher is unknown."""
         with self._lock:
             return None if message.publisher is None else self._nodes.get(message.publisher)
 
 
 class RobotProcesses(Protocol):
-    """Access to the processes of robots."""
+    """Interface for information about the processes of robots."""
 
     def is_started_by_studio(self, identity: Identity) -> bool:
-        """Return True if this program is a virtual robot started by Studio."""
+        """Return True if a program is a virtual robot started by Studio."""
 
     def has_ended(self, identity: Identity) -> bool:
-        """Return True if this program has certainly exited."""
+        """Return True if a program has certainly exited."""
 
 
 class AllVirtual:
-    """Accepts the claim of every robot to be virtual; for tests."""
+    """Implementation of `RobotProcesses` for tests, in which every robot was started by Studio."""
 
     def is_started_by_studio(self, identity: Identity) -> bool:  # noqa: ARG002
-        """Return True."""
+        """Return True for every program."""
         return True
 
     def has_ended(self, identity: Identity) -> bool:  # noqa: ARG002
-        """Return False."""
+        """Return False for every program."""
         return False

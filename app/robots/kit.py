@@ -1,8 +1,8 @@
 """Driver kit: everything a module needs to drive a robot (docs/robots.md has a complete example).
 
 A robot is declared as a class; its description, blocks, forms and input checks are generated from the typed
-methods. The :class:`Driver` adds cancel, time-outs, busy policies, the heartbeat watchdog, the confirmed stop
-and RIZE's dialect.
+methods. The :class:`Driver` adds cancelling, timeouts, busy policies, the heartbeat watchdog, the confirmed
+stop and RIZE's dialect.
 
 Example:
     ::

@@ -1,8 +1,7 @@
 """Robots of RIZE: their primitives, and conversion of ``robot_action`` messages in both directions.
 
-Robots of RIZE don't describe themselves, so all are assumed to have the primitives of RIZE's drivers. They
-don't reply to a stop: ``safe_stop.confirmed`` is False, and the user is informed that the robot can't
-confirm.
+Robots of RIZE don't describe themselves; all are assumed to have the primitives of RIZE's drivers. They don't
+reply to a stop: `SafeStop.confirmed` is False, and the user is informed that the stop can't be confirmed.
 """
 
 from __future__ import annotations
@@ -28,28 +27,41 @@ _FAILED_MESSAGE = lazy("{robot} could not {action}")
 
 @lru_cache(maxsize=1)
 def thing_model() -> Mapping[str, object]:
-    """Return the Thing Model of all robots of RIZE."""
+    """Return the Thing Model that all robots of RIZE share."""
     found = json.loads(resources.path("robots", "rize.tm.jsonld").read_text(encoding="utf-8"))
     return as_object(found)
 
 
 def robot(name: str) -> Robot:
-    """Return a robot of RIZE with the name of its driver. Its commands are sent on ``robot_action``."""
+    """Return the description of a robot of RIZE.
+
+    Args:
+        name: Name of the robot's driver, to which commands on ``robot_action`` are addressed.
+    """
     return parse({**thing_model(), "title": name})
 
 
 def ready(message: object) -> str | None:
-    """Return the name of the robot if a message on ``rize_event`` announces one, else None."""
+    """Return the name of the robot that a message on ``rize_event`` announces; None for other messages."""
     said = as_object(message)
     return text(said.get("name")) if said.get("robot") == "ready" else None
 
 
 def to_command(robot: Robot, action: str, given: Mapping[str, object], command_id: str) -> dict[str, object]:
-    """Return the message for ``robot_action``. Raises RobotInputError for invalid input.
+    """Return the message for ``robot_action`` that executes an action.
 
     A stop is sent as the cancel of RIZE's older drivers. The message has all keys of an action, because
-    drivers that don't support cancel read them: for those it is an unknown primitive, which fails without
-    effect.
+    drivers that don't support cancel read them: they treat the message as an unknown primitive, which fails
+    without effect.
+
+    Args:
+        robot: Description of the robot.
+        action: Name of the action.
+        given: Input of the action; defaults are added.
+        command_id: Id of the command.
+
+    Raises:
+        RobotInputError: The robot has no such action, or the input is invalid.
     """
     if action == robot.safe_stop.action:
         return {
@@ -93,7 +105,7 @@ def _as_text(value: object) -> str:
 
 
 def from_reply(message: object) -> dict[str, object] | None:
-    """Convert a message of ``action_state`` to the form of ``robot/answer``; None if it is not final."""
+    """Convert a message of ``action_state`` to a ``robot/answer`` payload; None if it isn't a final reply."""
     said = as_object(message)
     state = _STATES.get(bounded_str(said.get("state")))
     wanted = text(said.get("id"))

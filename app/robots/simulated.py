@@ -1,7 +1,7 @@
 """Virtual Pepper: ``python -m app.robots.simulated --name Pepper`` runs it as a process.
 
 The robot is simulated in a small room (:mod:`app.robots.virtual`). Studio draws the state published on
-``/<name>/state``; users change the room through ``/<name>/world``.
+``/<name>/state``; the user changes the room through ``/<name>/world``.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _rize_light(given: str, options: Mapping[str, object]) -> Mapping[str, objec
 
 
 class VirtualPepper(SimulatedActions):
-    """Virtual humanoid on wheels with head, arms, voice and lights."""
+    """Virtual Pepper: a humanoid on wheels with head, arms, voice and lights."""
 
     # ---- speech -----------------------------------------------------------------------------------
 
@@ -275,7 +275,10 @@ class VirtualPepper(SimulatedActions):
 
     @safe_stop(watchdog_s=1.0, within_s=0.2)
     def stop(self) -> None:
-        """Brake, hold the joints and be silent; returns when nothing moves any more."""
+        """Stop base, joints and speech, and return when nothing moves.
+
+        Raises Failed if the robot still moves after 2 s.
+        """
         with self._simulation.changed:
             self._simulation.body.halt()
         if not self._simulation.wait_for(lambda: self._simulation.body.is_still, timeout_s=2.0):
@@ -294,7 +297,11 @@ ROBOT = Kind(
 
 
 def create_room(seed: int | None) -> Room:
-    """Return the default room; with a seed, ball and person are at random but reproducible places."""
+    """Return the room at the start.
+
+    Args:
+        seed: Seed for random positions of ball and person; None for the default positions.
+    """
     if seed is None:
         return Room()
     places = random.Random(seed)  # noqa: S311 - furniture, not secrets
@@ -303,7 +310,12 @@ def create_room(seed: int | None) -> Room:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the virtual robot. ``--seed`` places ball and person randomly; other arguments are the kit's."""
+    """Run the virtual robot as a process and return the exit code.
+
+    Args:
+        arguments: Arguments of `app.robots.driver.process.main`, and ``--seed`` for random positions of ball
+            and person.
+    """
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument("--seed", type=int, default=None)
     chosen, others = parser.parse_known_args(arguments)

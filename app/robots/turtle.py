@@ -34,7 +34,14 @@ _JOIN_TIMEOUT_S = 2.0
 
 
 class VirtualWheels:
-    """Simulated base, with a thread for the body at 60 Hz and one for the camera at 15 Hz. Thread-safe."""
+    """Simulated base.
+
+    The body is simulated in one thread at 60 Hz, the camera in another at 15 Hz. Thread-safe.
+
+    Args:
+        link: Connection to the network.
+        clock: Clock of the simulation.
+    """
 
     def __init__(self, link: Link, clock: Clock) -> None:
         self.body = WheelBody()
@@ -61,17 +68,17 @@ class VirtualWheels:
     # ---- Wheels interface --------------------------------------------------------------------------------
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Set the target speeds (m/s, °/s)."""
+        """Set the target speed (m/s) and turning speed (°/s)."""
         with self._lock:
             self.body.drive(speed, turn_speed)
 
     def pose(self) -> tuple[float, float, float]:
-        """Return the pose: x, y in metres, theta in degrees."""
+        """Return the position (x and y in m) and the orientation (theta in degrees)."""
         with self._lock:
             return self.body.x, self.body.y, self.body.theta_deg
 
     def driven_m(self) -> float:
-        """Return the metres rolled so far; being carried by the user doesn't count."""
+        """Return the total distance rolled in m, without the distance that the user has carried the robot."""
         with self._lock:
             return self.body.driven_m
 
@@ -82,11 +89,11 @@ class VirtualWheels:
             return self.body.is_still
 
     def bumped(self) -> str:
-        """Return the side at which the base touches something, or ""."""
+        """Return the side at which the base touches something, such as "left"; "" if it touches nothing."""
         return self.body.pressed_bumper
 
     def light(self, colour: str) -> None:
-        """Set the colour of the light."""
+        """Set the colour of the light (``#rrggbb``)."""
         with self._lock:
             self.body.light = colour
 
@@ -160,7 +167,11 @@ class VirtualWheels:
             self._seen = set(found)
 
     def apply_change(self, change: Mapping[str, object]) -> None:
-        """Apply a change of the world by the user: move, hold, reset, start, or a simulated event."""
+        """Apply a change of the world by the user.
+
+        Args:
+            change: Payload of a message on ``/<name>/world``: move, hold, reset, start, or a simulated event.
+        """
         moved, x, y = change.get("move"), finite_float(change.get("x")), finite_float(change.get("y"))
         with self._lock:
             if isinstance(change.get("hold"), bool):
@@ -196,7 +207,7 @@ class VirtualTurtle(DiffDrive):
         wheels.start()
 
     def odometer(self) -> Callable[[], float]:
-        """Return a function that returns the metres rolled since now; being carried doesn't count."""
+        """Return a function that returns the distance in m rolled from now on, not counting being carried."""
         began = self._wheels.driven_m()
         return lambda: self._wheels.driven_m() - began
 
@@ -212,7 +223,11 @@ ROBOT = replace(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the virtual robot with the kit's arguments."""
+    """Run the virtual robot as a process and return the exit code.
+
+    Args:
+        arguments: Arguments of `app.robots.driver.process.main`.
+    """
     return drive(ROBOT, arguments)
 
 

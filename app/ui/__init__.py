@@ -1,6 +1,7 @@
 """Graphical user interface; the only package that imports PySide6.
 
-`application` starts it. Layers import downward: shell, panels, code shared by panels, widgets, theme.
+`application` is the entry point. Imports go from the shell to the panels, to code shared by panels, to
+the widgets and to the theme, never in the other direction.
 """
 
 from app.ui import overrides

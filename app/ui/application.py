@@ -1,4 +1,4 @@
-"""Startup and shutdown of the window: scheme, fonts, theme, session, panels, commands."""
+"""Startup and shutdown of the graphical user interface."""
 
 from __future__ import annotations
 
@@ -54,14 +54,22 @@ PRELOADED_MODULES = (
     "app.ui.shell.dialogs.settings",
     "app.ui.shell.dialogs.shortcuts",
 )
-"""Modules imported in advance after the first paint."""
+"""Modules to import after the first paint, so that their first use isn't delayed."""
 
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Options:
-    """Command-line options of the window."""
+    """Command-line options of the window.
+
+    Attributes:
+        files: Files to open.
+        demo: Open the first example and start a virtual robot.
+        theme: Theme to use instead of the saved one: "light", "dark" or "system".
+        self_drive: Folder for the screenshots of an unattended run, or None for normal use.
+        new_window: Open a window even if Studio is already running.
+    """
 
     files: tuple[Path, ...] = ()
     demo: bool = False
@@ -69,18 +77,21 @@ class Options:
     self_drive: Path | None = None
     new_window: bool = False
     make_driver: Callable[[MainWindow], SelfDrive] | None = None
-    """Creates a driver of the window, used from before it is shown until it closes."""
+    """Factory of the `SelfDrive` that operates the window; called before the window is shown."""
     web: bool = True
-    """Load the block editor's web page; False avoids loading the web engine."""
+    """True to load the block editor's web page; False avoids the start of the web engine."""
 
     @property
     def is_standalone(self) -> bool:
-        """True if the window neither receives start requests of other processes nor saves its tabs."""
+        """True if the window is independent of other instances.
+
+        Such a window doesn't receive start requests of other processes and doesn't save its tabs.
+        """
         return self.new_window or self.self_drive is not None or self.make_driver is not None
 
 
 def make_application() -> QApplication:
-    """Return the QApplication, creating it with name and fonts on first use."""
+    """Return the QApplication, creating it with its name and fonts on first use."""
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
@@ -101,7 +112,11 @@ def make_application() -> QApplication:
 
 
 def translate_qt(application: QCoreApplication) -> QTranslator | None:
-    """Load Qt's own translations for the current language; return None if there are none."""
+    """Install Qt's own translations for the current language.
+
+    Returns:
+        The installed translator, or None if the language is English or Qt has no translation for it.
+    """
     if language() == ENGLISH:
         return None
     translator = QTranslator(application)
@@ -113,9 +128,12 @@ def translate_qt(application: QCoreApplication) -> QTranslator | None:
 
 
 def deferred_steps(window: MainWindow, *, web: bool = True) -> list[Callable[[], object]]:
-    """Return the startup steps for the time after the first paint.
+    """Return the startup steps to run after the first paint.
 
-    They create panels, import modules and load the block editor.
+    The steps create panels, import modules and load the block editor.
+
+    Args:
+        web: True to load the block editor.
     """
     panels = window.panels.steps() if isinstance(window.panels, PanelRegistry) else ()
     modules = (partial(importlib.import_module, name) for name in PRELOADED_MODULES)
@@ -124,7 +142,7 @@ def deferred_steps(window: MainWindow, *, web: bool = True) -> list[Callable[[],
 
 
 def import_web_view(alerts: Alerts) -> None:
-    """Import the block editor, or raise an alert that names the missing system libraries."""
+    """Import the block editor; if system libraries are missing, raise an alert that names them."""
     try:
         importlib.import_module(WEB_VIEW)
     except ImportError as error:
@@ -136,7 +154,7 @@ def import_web_view(alerts: Alerts) -> None:
 
 
 def make_window(session: Session, options: Options) -> MainWindow:
-    """Create the window and restore its last state; the event loop is not running yet."""
+    """Create the window and restore its last state. Called before the event loop runs."""
     theme = Theme("light")
     # must come first: before the event loop runs, Qt doesn't notify widgets of a changed font
     WindowState(session.settings, _log.warning).apply_theme(theme)
@@ -154,7 +172,10 @@ def make_window(session: Session, options: Options) -> MainWindow:
 
 
 def raise_startup_alerts(session: Session) -> None:
-    """Raise alerts for stored files that can't be used: settings, and unsaved work of a newer version."""
+    """Raise alerts for stored data that can't be used.
+
+    These are invalid settings, and unsaved work of a newer version.
+    """
     if session.settings.notice:
         session.alerts.raise_alert("settings:notice", "warn", session.settings.notice)
     names = newer_work_names()
@@ -170,7 +191,7 @@ def raise_startup_alerts(session: Session) -> None:
 
 
 def report_crashes(session: Session, this_run: StudioRun) -> None:
-    """Log earlier runs that crashed. Offer a problem report once for those since the last start."""
+    """Store crash reports of earlier runs, and offer a problem report for crashes since the last start."""
     reports = CrashReports()
     for crash in this_run.left():
         reports.add(crash)
@@ -178,7 +199,11 @@ def report_crashes(session: Session, this_run: StudioRun) -> None:
 
 
 def save_version(window: MainWindow, now_s: float) -> None:
-    """Save a changed version in the settings, where problem reports read it."""
+    """Add this version to the version history in the settings if it is new; problem reports include it.
+
+    Args:
+        now_s: Current Unix time in s.
+    """
     settings = window.session.settings
     kept = studio_versions.add_this_version(settings.all(), now_s, is_first=settings.are_new)
     if kept is not None:
@@ -186,7 +211,7 @@ def save_version(window: MainWindow, now_s: float) -> None:
 
 
 def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
-    """Close the window on SIGINT, SIGTERM and SIGHUP."""
+    """Close the window on SIGINT, SIGTERM and SIGHUP, and when the desktop session ends."""
 
     def close(_number: int, _frame: FrameType | None) -> None:
         this_run.expect_exit()
@@ -205,7 +230,11 @@ def close_on_signals(window: MainWindow, this_run: StudioRun) -> None:
 
 
 def handle_start_request(window: MainWindow, asked: StartRequest) -> None:
-    """Execute a start request of this process or of one that was started later."""
+    """Execute a start request and bring the window to the front.
+
+    Args:
+        asked: Request of this process, or of a process that was started later.
+    """
     if asked.files:
         window.commands.files.open_all(asked.files)
     elif asked.demo:
@@ -217,17 +246,23 @@ def handle_start_request(window: MainWindow, asked: StartRequest) -> None:
 
 
 def last_layout(window: MainWindow) -> str:
-    """Return the name of the last layout, or "" for the start page if that layout has no content."""
+    """Return the name of the layout to show at startup, or "" for the start page.
+
+    This is the last layout, unless it was Behaviour and all behaviours are empty.
+    """
     last = window.state.layout
     there = {"developer": True, "behaviour": any(not each.is_blank for each in window.session.documents)}
     return last if there.get(last, False) else ""
 
 
 def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
-    """Offer the first steps on the very first start.
+    """Offer the first steps if Studio was never started before.
 
-    Skipped if ``asked`` names files to open, or unsaved work is offered. The first start is recorded
-    immediately, so that it counts even after a crash.
+    The first start is recorded immediately, so that it is not repeated after a crash. Nothing is
+    offered if there is unsaved work to recover.
+
+    Args:
+        asked: True if the command line names files or the demonstration, which suppresses the offer.
     """
     if not window.session.settings.are_new:
         return
@@ -238,7 +273,7 @@ def offer_first_steps(window: MainWindow, *, asked: bool) -> None:
 
 
 def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], object]]:
-    """Show the first page and return the steps that complete it after the first paint."""
+    """Prepare the first page and return the steps that complete it after the first paint."""
     left = "" if options.is_standalone else last_layout(window)
     asked = bool(options.files or options.demo)
     if options.self_drive is not None:
@@ -263,7 +298,7 @@ def show_first_page(window: MainWindow, options: Options) -> list[Callable[[], o
 
 
 def startup_problem(environ: Mapping[str, str], platform: str, user: int) -> str:
-    """Return the reason why no window can be opened, with the remedy; "" if one can.
+    """Return the reason why the window can't be opened, with a remedy; "" if it can be opened.
 
     Args:
         environ: Environment variables.
@@ -286,10 +321,11 @@ def startup_problem(environ: Mapping[str, str], platform: str, user: int) -> str
 
 
 def run(options: Options) -> int:
-    """Show the window until it is closed.
+    """Show the window and run the event loop until the window is closed.
 
     Returns:
-        Exit code 0, 2 if no window can be opened, or `RESTART`.
+        The exit code: 0 on success, 1 if an unattended run failed, 2 if no window can be opened, or
+        `RESTART`.
     """
     move_old_versions()
     meeting_place = single_instance.socket_name(home())

@@ -1,4 +1,4 @@
-"""Opens folders and web pages in the system's file manager and browser."""
+"""Functions that open folders and web pages in the system's file manager and browser."""
 
 from __future__ import annotations
 
@@ -17,10 +17,14 @@ _FREEZER_PREFIX = "_PYI_"
 
 @contextmanager
 def original_environment(environ: MutableMapping[str, str], *, is_frozen: bool) -> Iterator[None]:
-    """Temporarily restore the environment that was in place before the frozen Studio changed it.
+    """Temporarily restore the environment variables that the loader of a frozen Studio has changed.
 
-    The loader of a frozen Studio sets the library path to its bundled libraries. Another program that
-    inherits this path would load those instead of its own and may fail to start.
+    The loader sets the library path to the bundled libraries. Another program that inherits this path
+    would load those libraries instead of its own and may fail to start.
+
+    Args:
+        environ: Environment variables, modified in place.
+        is_frozen: True if Studio runs from a frozen bundle; otherwise nothing is changed.
     """
     kept = {
         name: value

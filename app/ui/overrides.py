@@ -1,8 +1,8 @@
-"""Guards that prevent exceptions in overridden Qt methods from propagating into Qt.
+"""Guards against exceptions that propagate from overridden Qt methods into Qt.
 
-With PySide 6.11 and Python before 3.12 an exception from an override ends the process (ADR 0018). Therefore
-the overrides of every QObject subclass are wrapped: exceptions are passed to `sys.excepthook`, and Qt gets a
-neutral return value.
+With PySide 6.11 and Python before 3.12 such an exception ends the process (ADR 0018). Therefore the
+overrides of all QObject subclasses are wrapped: an exception is passed to `sys.excepthook`, and Qt gets
+a neutral return value.
 """
 
 from __future__ import annotations
@@ -66,14 +66,17 @@ NEUTRAL_RESULTS: dict[str, Callable[[], object]] = {
     "canFetchMore": bool,
     "fetchMore": RETURN_NONE,
 }
-"""Factories of the neutral return value of a failed override, by method name.
+"""Factories of the value that Qt gets from a failed override, by method name.
 
-Event handlers (``...Event``) return None.
+Failed event handlers (``...Event``) return None.
 """
 
 
 def guard(cls: type) -> type:
-    """Guard the overrides defined in a class, in place, and return the class."""
+    """Wrap the Qt overrides that a class defines, and return the class.
+
+    The class is modified in place and can be decorated with this function.
+    """
     for name, made in list(vars(cls).items()):
         answer = NEUTRAL_RESULTS.get(name, RETURN_NONE if name.endswith("Event") else None)
         if answer is not None and isinstance(made, FunctionType) and _is_qt_override(cls, name):
@@ -86,7 +89,12 @@ def _is_qt_override(cls: type, name: str) -> bool:
 
 
 def guard_function(made: Callable[..., object], answer: Callable[[], object]) -> Callable[..., object]:
-    """Return a wrapper that reports exceptions of a function and then returns ``answer()``."""
+    """Return a wrapper that reports an exception and then returns a neutral value.
+
+    Args:
+        made: Method to wrap.
+        answer: Factory of the neutral return value.
+    """
 
     @functools.wraps(made)
     def override(*given: object, **named: object) -> object:
@@ -101,7 +109,7 @@ def guard_function(made: Callable[..., object], answer: Callable[[], object]) ->
 
 
 def guard_all() -> None:
-    """Guard all QObject subclasses defined after this call, including those of plug-ins."""
+    """Guard all QObject subclasses that are defined after this call, including those of plug-ins."""
 
     def init_subclass(cls: type, /, **more: object) -> None:
         super(QObject, cls).__init_subclass__(**more)  # type: ignore[misc]  # cls is below QObject

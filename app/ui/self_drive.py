@@ -1,6 +1,7 @@
-"""Unattended operation of the real window: runs a list of steps, each of which waits for its expected result.
+"""Unattended operation of the real window: a list of steps, each with an expected result to wait for.
 
-A screenshot is saved for each step. A step that isn't completed in time ends the run with an explanation.
+Each step can save a screenshot. A step that fails or exceeds its time limit ends the run with an
+explanation.
 """
 
 from __future__ import annotations
@@ -27,14 +28,15 @@ class Step:
     """Action on the window, with the condition to wait for.
 
     Attributes:
-        what: Description of the expected result.
-        do: Action.
-        seen: Returns True once the result is visible.
-        within_s: Timeout.
-        picture: Name of the screenshot, or "" for none.
-        settle_s: Pause before the screenshot.
-        wrong: Returns the reason why the result can't occur any more, which ends the wait, or "".
-        said: Returns details for the report.
+        expected: Description of the expected result.
+        action: Performs the action.
+        is_visible: Returns True once the result is visible.
+        within_s: Time limit in s.
+        picture: File name of the screenshot without extension, or "" for none.
+        settle_s: Pause in s between the result and the screenshot.
+        failure_reason: Returns the reason if the result can't occur any more, which fails the step, or
+            "".
+        details: Returns details for the report.
         name: Name of the step in the report.
     """
 
@@ -50,29 +52,31 @@ class Step:
 
 
 class Listener(Protocol):
-    """Receiver of the progress of the steps."""
+    """Observer of the progress of a `SelfDrive`."""
 
     def step_started(self, step: Step) -> None:
-        """Called when a step has started."""
+        """Called before the action of a step."""
 
     def step_finished(self, step: Step) -> None:
-        """Called when the result of a step is visible and its screenshot is saved."""
+        """Called after the result of a step was visible and its screenshot was saved."""
 
     def run_finished(self, well: bool, words: str) -> None:
-        """Called at the end, before the window closes.
+        """Called at the end of the run, before the window closes.
 
-        ``well`` is True if all steps succeeded; otherwise ``words`` describe the failure.
+        Args:
+            well: True if all steps succeeded.
+            words: Summary of the run, or description of the failure.
         """
 
 
 class ResultPrinter:
-    """Listener that prints the result of the run."""
+    """Listener that prints the result of the run to stdout, or a failure to stderr."""
 
     def step_started(self, step: Step) -> None:
-        """Print nothing for single steps."""
+        """Ignore the start of a step."""
 
     def step_finished(self, step: Step) -> None:
-        """Print nothing for single steps."""
+        """Ignore the result of a step."""
 
     def run_finished(self, well: bool, words: str) -> None:
         """Print the result to stdout, or a failure to stderr."""
@@ -80,7 +84,12 @@ class ResultPrinter:
 
 
 class SelfDrive(QObject):
-    """Runs the steps in order, then closes the window. ``well`` is True if all steps succeeded."""
+    """Runner that performs the steps in order and then closes the window.
+
+    Attributes:
+        well: True once all steps have succeeded.
+        pictures: Paths of the saved screenshots.
+    """
 
     def __init__(
         self,

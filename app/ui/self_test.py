@@ -1,7 +1,8 @@
-"""Self-test of the real window: start a robot, greet, run, Stop, take a screenshot, close.
+"""Self-test of the real window with a virtual robot.
 
-Each step checks the visible result: the painted window, the drawn blocks, and the robot's own reports that it
-moves and has stopped. Without the web view the Developer layout is used.
+The test starts the robot, runs a greeting, presses Stop, takes a screenshot and closes the window. Each
+step checks the visible result: the painted window, the rendered blocks, and the robot's own reports
+that it moves and has stopped. Without the web view, the Developer layout is used.
 """
 
 from __future__ import annotations
@@ -28,21 +29,27 @@ from nep.i18n import _
 ROBOT = "Pepper"
 STATE_TOPIC = f"/{ROBOT}/state"
 JOINT_PREFIXES = ("theta_deg", "head_", "arm_", "elbow_")
-"""Prefixes of joint names in the robot's state."""
+"""Prefixes of the robot's joint names in its state messages."""
 SETTLE_S = 1.0
-"""Pause in s before the screenshot, so that recent changes are painted."""
+"""Pause in s before the screenshot, so that pending repaints are completed."""
 REPORTED_LEVELS, MAX_REPORTED_RECORDS = ("warn", "error"), 40
 """Levels of the log records in the report, and their maximum number."""
 MIN_COLOURS = 24
-"""Minimum number of colours of a completely painted window; an empty or incomplete one has fewer."""
+"""Minimum number of colours in a screenshot; an empty or incomplete window has fewer."""
 
 
 @runtime_checkable
 class SupportsPictures(Protocol):
-    """Panel with a block editor that can render its blocks."""
+    """Interface of a panel that can render its blocks as an image."""
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Render all blocks; ``done`` gets b"" if there is no page or no blocks."""
+        """Render all blocks.
+
+        Args:
+            kind: Image format, "png" or "svg".
+            white: True for a white background, False for a transparent one.
+            done: Called with the image data; b"" if there is no page or there are no blocks.
+        """
 
 
 class FirstPaint(QObject):
@@ -62,7 +69,7 @@ class FirstPaint(QObject):
 
 
 class WindowSteps:
-    """Definition of the steps of the self-test and their checks."""
+    """Steps of the self-test, with their actions and checks."""
 
     def __init__(self, window: MainWindow, test: SelfTest, *, web: bool) -> None:
         # `web`: the page of the block editor is loaded.
@@ -77,7 +84,7 @@ class WindowSteps:
         FirstPaint(window, self._on_painted)
 
     def all(self) -> list[Step]:
-        """Return the steps in order."""
+        """Return all steps in the order of execution."""
         made = [
             self._step("window", _("the window"), lambda: None, lambda: self._painted),
             self._step("master", _("the master"), lambda: None, self._has_master, self._master_problem),
@@ -245,17 +252,17 @@ class WindowSteps:
 
 
 class SelfTestListener:
-    """Listener that reports the steps to the self-test."""
+    """Listener that forwards the progress of the steps to the self-test."""
 
     def __init__(self, test: SelfTest, session: Session) -> None:
         self._test, self._session = test, session
 
     def step_started(self, step: Step) -> None:
-        """Start the time limit of the step."""
+        """Start a step in the self-test, and with it the step's time limit."""
         self._test.start_step(step.name, step.expected)
 
     def step_finished(self, step: Step) -> None:
-        """Report the step as passed, or as failed if its screenshot is empty."""
+        """Record the step as passed, or as failed if its screenshot has too few colours."""
         if not step.picture:
             self._test.record_success(step.details())
             return
@@ -266,7 +273,7 @@ class SelfTestListener:
             self._test.record_success(_("{count} colours").format(count=shown))
 
     def run_finished(self, well: bool, words: str) -> None:
-        """Report the failure, if any. Closing the window is then measured as the last step."""
+        """Record a failure, if there was one, and start the last step, the closing of the window."""
         complaints = [each for each in self._session.console.records if each.level in REPORTED_LEVELS]
         self._test.report.add_computer(
             console=[
@@ -279,17 +286,21 @@ class SelfTestListener:
 
 
 def colour_count(picture: QImage) -> int:
-    """Return the number of colours in a sample of pixels; 0 for an empty image."""
+    """Count the distinct colours in a sample of an image's pixels; 0 for an empty image."""
     return len(
         {picture.pixel(x, y) for x in range(0, picture.width(), 7) for y in range(0, picture.height(), 7)}
     )
 
 
 def run_window_steps(test: SelfTest, *, web: bool) -> int:
-    """Show the window and run the steps in it; ``web`` loads the page of the block editor.
+    """Show the window and run the steps of the self-test in it.
+
+    Args:
+        test: Self-test that records the results.
+        web: True to load the page of the block editor.
 
     Returns:
-        The exit code of the window.
+        The exit code of the window; 0 if no window can be opened, which is recorded as a failure.
     """
     refused = startup_problem(os.environ, sys.platform, os.geteuid() if hasattr(os, "geteuid") else 1)
     if refused:

@@ -1,8 +1,8 @@
-"""Speech and tones of robots through Qt, in a separate thread.
+"""Speech and tones of robots, produced by Qt in a separate thread.
 
-Qt's modules are imported on first use and may take seconds to start; the window never waits for them. Speech
-engines are third-party code that may crash, so creating one is tested first in another process, which runs
-this module.
+Qt's modules for speech and audio are imported on first use, because they can take seconds to start.
+Speech engines are third-party code that can crash, so creating one is first tested in another process,
+which runs this module.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ ADVICE = {
         "Add a voice in System Settings, under “Accessibility” and “Spoken Content”, then start Studio again."
     ),
 }
-"""Instructions to install a speech engine, by `sys.platform`."""
+"""Instructions to install a voice, by `sys.platform`."""
 MAX_TONES = 4
 RATE_HZ, FADE_S, LOUDNESS = 44_100, 0.006, 0.5
 JOIN_TIMEOUT_S = 0.5
@@ -61,7 +61,7 @@ def no_voice_message(language: str) -> str:
 
 
 def has_voice_engine() -> bool:
-    """Return True if Qt finds a speech engine. The engine is not started."""
+    """Return True if Qt finds a speech engine, without starting it."""
     try:
         from PySide6.QtTextToSpeech import QTextToSpeech  # noqa: PLC0415 (heavy, and needs a sound system)
     except (ImportError, RuntimeError) as error:
@@ -71,9 +71,10 @@ def has_voice_engine() -> bool:
 
 
 def try_voice() -> int:
-    """Create a speech engine and query its languages, as `QtEngine` does. Run in the test process.
+    """Create a speech engine and query its languages; the main function of the test process.
 
-    Return the exit code, 0 on success. A faulty engine may end the process in any way.
+    Returns:
+        Exit code 0. A faulty engine can end the process with any other code or a signal.
     """
     with Path(os.devnull).open("w", encoding="utf-8") as nowhere:
         # ends the process even if its parent is gone
@@ -97,9 +98,12 @@ def _make_voice() -> int:
 
 
 def passes_trial(command: Sequence[str] = ()) -> bool:
-    """Return True if the test process could create a speech engine. A faulty engine would crash Studio.
+    """Return True if a test process could create a speech engine; blocks for up to `TRIAL_TIMEOUT_S`.
 
-    ``command`` runs the test, by default this module. Blocks for up to `TRIAL_S`.
+    A faulty engine then crashes the test process instead of Studio.
+
+    Args:
+        command: Command line of the test process, by default this module.
     """
     try:
         done = subprocess.run(
@@ -120,7 +124,7 @@ def passes_trial(command: Sequence[str] = ()) -> bool:
 
 
 def voice_text(problem: str, *, has_engine: bool, platform: str = sys.platform) -> str:
-    """Describe the state of the speech output: that it works, or the error and what to install.
+    """Return a description of the speech output: that it works, or the error and how to fix it.
 
     Args:
         problem: Error of the last speech output, or "".
@@ -134,7 +138,13 @@ def voice_text(problem: str, *, has_engine: bool, platform: str = sys.platform) 
 
 
 def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
-    """Return tones as 16-bit mono samples, faded in and out to avoid clicks."""
+    """Synthesize tones as 16-bit little-endian mono samples, with fades to avoid clicks.
+
+    Args:
+        notes: Frequency in Hz (0 for a pause) and duration in s of each tone.
+        volume: Volume from 0 to 1.
+        rate_hz: Sampling rate.
+    """
     import numpy as np  # noqa: PLC0415 (heavy; needed for tones only)
 
     made = []
@@ -152,23 +162,33 @@ def samples(notes: Notes, volume: float, rate_hz: int = RATE_HZ) -> bytes:
 
 
 class Engine(Protocol):
-    """Speech and audio output, used in one thread that runs a Qt event loop."""
+    """Interface of a speech and audio engine, which is used in one thread with a Qt event loop."""
 
     def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Start to speak; `ended` is called once at the end. Return an error sentence, or ""."""
+        """Start to speak a text.
+
+        Args:
+            words: Text.
+            language: Language code, such as "en".
+            volume: Volume from 0 to 1.
+            ended: Called once when the text was spoken; not called if this method returns an error.
+
+        Returns:
+            An error message, or "".
+        """
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start to play tones. Return an error sentence, or ""."""
+        """Start to play tones, given as (frequency in Hz, duration in s); return an error message, or ""."""
 
     def stop_voice(self) -> None:
-        """Stop speaking."""
+        """Stop speaking without calling `ended`."""
 
     def stop_tones(self) -> None:
         """Stop all tones."""
 
 
 class QtEngine:
-    """Speech and audio output of Qt, each created on first use."""
+    """Engine that uses Qt's speech and audio modules, which are loaded on first use."""
 
     def __init__(self) -> None:
         self._voice: QTextToSpeech | None = None
@@ -198,7 +218,7 @@ class QtEngine:
             ended()
 
     def speak(self, words: str, language: str, volume: float, ended: Callable[[], None]) -> str:
-        """Start to speak, if there is a voice for the language."""
+        """Start to speak a text; return an error message if there is no voice for the language."""
         voice = self._get_voice()
         locales = voice.availableLocales() if voice is not None else []
         locale = next((each for each in locales if each.name().split("_")[0] == language), None)
@@ -214,7 +234,7 @@ class QtEngine:
         return ""
 
     def play(self, notes: Notes, volume: float) -> str:
-        """Start to play on the default audio output, if there is one."""
+        """Start to play tones on the default audio output; return an error message if there is none."""
         try:
             from PySide6.QtMultimedia import QAudioFormat, QAudioSink, QMediaDevices  # noqa: PLC0415 (heavy)
         except (ImportError, RuntimeError) as error:
@@ -238,7 +258,7 @@ class QtEngine:
         return ""
 
     def stop_voice(self) -> None:
-        """Stop speaking immediately, even in the middle of a word."""
+        """Stop speaking immediately, even within a word."""
         self._ended = None
         if self._voice is not None:
             self._voice.stop(self._voice.BoundaryHint.Immediate)
@@ -251,7 +271,7 @@ class QtEngine:
 
 
 class _SpeechWorker(QObject):
-    """Executes requests in the engine's thread. Requests from before a stop are skipped."""
+    """Worker that executes requests in the engine's thread, skipping those that a stop has cancelled."""
 
     woken = Signal()
     ended = Signal(int)
@@ -304,7 +324,7 @@ class _SpeechWorker(QObject):
 
 
 class QtSpeaker(QObject):
-    """Speech and audio output of a window. Requests are queued for a thread and never block."""
+    """Speech and audio output of a window. Requests are queued for a worker thread and never block."""
 
     def __init__(self, make: Callable[[], Engine] = QtEngine, parent: QObject | None = None) -> None:
         # `make` creates the engine, in its thread, on first use.
@@ -325,32 +345,48 @@ class QtSpeaker(QObject):
 
     @property
     def problem(self) -> str:
-        """Error sentence of the last output, or ""."""
+        """Error message of the last output, or ""."""
         return self._problems.get("say", "") or self._problems.get("play", "")
 
     def is_valid(self, what: str, turn: int) -> bool:
-        """Return True if a request is valid, and False if a stop has cancelled it. Thread-safe."""
+        """Return True if a request is valid, False if a stop has cancelled it. Thread-safe.
+
+        Args:
+            what: Kind of the request, "say" or "play".
+            turn: Counter of its kind when the request was queued.
+        """
         return not self._closed and turn >= self._turns[what]
 
     def speak(self, words: str, language: str, volume: float) -> None:
-        """Queue a text to be spoken."""
+        """Queue a text to be spoken; an earlier text is cancelled.
+
+        Args:
+            words: Text.
+            language: Language code, such as "en".
+            volume: Volume from 0 to 1.
+        """
         self._turns["say"] += 1
         self._busy = True
         self._enqueue("say", words, language, volume)
 
     def play(self, notes: Notes, volume: float) -> None:
-        """Queue tones to be played; an empty sequence stops the tones."""
+        """Queue tones to be played, or stop all tones.
+
+        Args:
+            notes: Frequency in Hz and duration in s of each tone; empty to stop.
+            volume: Volume from 0 to 1.
+        """
         if notes:
             self._enqueue("play", tuple(notes), volume)
         else:
             self._stop("tones")
 
     def stop_voice(self) -> None:
-        """Stop speaking."""
+        """Stop speaking and cancel queued texts."""
         self._stop("voice")
 
     def stop(self) -> None:
-        """Stop speech and tones."""
+        """Stop speech and tones, and cancel all queued requests."""
         self._stop("all")
 
     def _stop(self, which: str) -> None:
@@ -363,7 +399,7 @@ class QtSpeaker(QObject):
             self._enqueue("stop", which)
 
     def close(self) -> None:
-        """Stop the thread. If the audio system blocks the thread, it is abandoned."""
+        """Stop all output and the worker thread, which is abandoned if the audio system blocks it."""
         self.stop()
         if self._thread is not None:
             self._enqueue("end")

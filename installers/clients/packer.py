@@ -20,7 +20,14 @@ __all__ = ["build", "check_nuget", "pack_built_javascript", "pack_javascript", "
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """Return the packages; those that need missing tools are skipped with a printed line."""
+    """Build the packages and return their paths.
+
+    A package whose build tool is missing is skipped with a printed message.
+
+    Args:
+        context: Version and folders.
+        keep_frozen: Ignored.
+    """
     del keep_frozen  # the clients aren't frozen
     return [
         *pack_javascript(context.root / "clients" / "javascript", context.dist),
@@ -30,7 +37,7 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 
 
 def pack_javascript(source: Path, target: Path) -> list[Path]:
-    """Return `nep-js-VERSION.tgz`, or nothing without npm."""
+    """Build the npm package and return [`nep-js-VERSION.tgz`], or an empty list without npm."""
     npm = shutil.which("npm")
     if npm is None:
         print("· nep-js is skipped: it needs npm, which is part of Node.js", flush=True)
@@ -43,13 +50,13 @@ def pack_javascript(source: Path, target: Path) -> list[Path]:
 
 
 def pack_built_javascript(npm: str, source: Path, target: Path) -> Path:
-    """Pack the output of `npm run build`; return the package."""
+    """Pack the output of `npm run build` and return the path of the package."""
     pack = [npm, "pack", "--silent", "--ignore-scripts", "--pack-destination", str(target)]
     return target / _run(pack, source).split()[-1]
 
 
 def pack_nuget(source: Path, target: Path) -> list[Path]:
-    """Return `Nep.VERSION.nupkg`, or nothing without the .NET SDK."""
+    """Build the NuGet package and return [`Nep.VERSION.nupkg`], or an empty list without the .NET SDK."""
     dotnet = shutil.which("dotnet")
     if dotnet is None:
         print("· Nep for NuGet is skipped: it needs the .NET SDK", flush=True)
@@ -64,7 +71,7 @@ def pack_nuget(source: Path, target: Path) -> list[Path]:
 
 
 def check_nuget(package: Path) -> None:
-    """Raise `PackageError` if the package lacks a file or a statement of its manifest."""
+    """Raise `PackageError` if the package lacks a file, or if its manifest lacks an entry."""
     with zipfile.ZipFile(package) as archive:
         names = archive.namelist()
         manifest = archive.read("Nep.nuspec") if "Nep.nuspec" in names else b"<package/>"

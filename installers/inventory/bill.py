@@ -23,11 +23,16 @@ __all__ = ["bill", "standard_texts", "write_licences"]
 NOTICE = LICENCES.parent / "notice.txt"
 CRATES = "rust-crates.txt"
 _SAME = {"Unicode-DFS-2016": "Unicode-3.0"}
-"""Licences with the same wording as another one apart from names."""
+"""Replacements for licences whose wording differs from another licence only in names."""
 
 
 def write_licences(parts: Iterable[Part], folder: Path, version: str) -> None:
-    """Write the licence texts and the notice.
+    """Write the licence texts and the notice of a package.
+
+    Args:
+        parts: Parts of the package.
+        folder: Folder to write to.
+        version: Version of Studio.
 
     Raises:
         InventoryError: A crate has no licence text.
@@ -68,7 +73,9 @@ def _write_crates(crates: Sequence[Part], licences: Path) -> None:
 
 
 def standard_texts(part: Part) -> Sequence[str]:
-    """Return the `LICENCES` files that a licence expression requires; of alternatives all available ones.
+    """Return the names of the `LICENCES` files that a licence expression requires.
+
+    For alternatives (OR), all available texts are returned.
 
     Raises:
         InventoryError: A required text is missing.
@@ -88,9 +95,16 @@ def standard_texts(part: Part) -> Sequence[str]:
 
 
 def bill(parts: Iterable[Part], system: str, epoch: int, version: str) -> str:
-    """Return the bill of materials as CycloneDX 1.6 JSON; reproducible for the same parts.
+    """Return the bill of materials as CycloneDX 1.6 JSON; the same parts always give the same text.
 
-    Parts compiled into another part are its dependencies, all others are those of Studio.
+    A part compiled into another part is a dependency of that part; all others are dependencies of
+    Studio.
+
+    Args:
+        parts: Parts of the package.
+        system: System of the package.
+        epoch: Timestamp of the package, in seconds since 1970.
+        version: Version of Studio.
     """
     made = Bom(serial_number=uuid.uuid5(uuid.NAMESPACE_URL, f"{PROJECT}/{version}/{system}/{epoch}"))
     made.metadata.timestamp = datetime.fromtimestamp(epoch, timezone.utc)

@@ -1,7 +1,7 @@
 """Shared libraries of a frozen program; the build fails for a library without a known licence.
 
-PyInstaller collects all libraries that a program is linked with from the build machine. An unknown one would
-be distributed without its licence.
+PyInstaller collects all libraries that a program is linked with from the build machine. An unknown
+library would be distributed without its licence.
 """
 
 from __future__ import annotations
@@ -31,8 +31,11 @@ class Library(NamedTuple):
 
     Attributes:
         files: Pattern of the file names without the suffix.
-        of: Part that contains them; if empty, the system package that installed them is a part of its own.
-        rights, texts: Copyright and licence names for parts without a licence text.
+        licence: SPDX expression or name of the licence.
+        of: Part that contains the files; if empty, the system package that installed them is a separate
+            part.
+        rights: Copyright lines for a part without a licence text.
+        texts: Names of the standard licence texts for a part without a licence text.
     """
 
     files: str
@@ -43,7 +46,7 @@ class Library(NamedTuple):
     version: str = ""
     """Pattern that extracts the version from the file name."""
     is_of_system: bool = False
-    """True if a system package, where one exists, takes precedence."""
+    """True if an installed system package takes precedence over `rights` and `texts`."""
 
 
 _X = "X11"
@@ -174,7 +177,7 @@ LIBRARIES = (
     Library(r"libtirpc|libnsl|libedit|libbsd|libmd", "BSD-3-Clause"),
     Library(r"libcrypt", "LGPL-2.1-or-later"),
 )  # fmt: skip
-"""File name patterns without the suffix and version numbers."""
+"""Known libraries, identified by patterns of their file names without the suffix and version numbers."""
 _PATTERNS = [(re.compile(f"(?:{each.files}){_EXTENSION}", re.IGNORECASE), each) for each in LIBRARIES]
 _PYTHON_KNOWS = {
     "expat": pyexpat.EXPAT_VERSION.rpartition("_")[2],
@@ -182,7 +185,7 @@ _PYTHON_KNOWS = {
     "sqlite": sqlite3.sqlite_version,
     "zlib": zlib.ZLIB_RUNTIME_VERSION,
 }
-"""Versions reported by the interpreter that is frozen."""
+"""Versions of libraries as reported by the interpreter that is frozen."""
 _FILMS = re.compile(r"lib(?:av(?:codec|device|filter|format|util)|sw(?:scale|resample)|postproc)[.-]")
 """Names of FFmpeg's libraries, for which the package contains empty replacements (film_libraries.py)."""
 _EMPTY = 96 * 1024
@@ -209,10 +212,14 @@ def library_of(name: str) -> Library | None:
 
 
 def parts_in_folder(folder: Path, told: Sequence[Part]) -> Iterator[Part]:
-    """Yield the parts of a frozen program's libraries that aren't in ``told``.
+    """Yield the parts of the libraries in a frozen program's folder.
+
+    Args:
+        folder: Folder of the frozen program.
+        told: Parts that are known already; they are not yielded again.
 
     Raises:
-        InventoryError: Libraries are unknown or have no licence text; one sentence for each.
+        InventoryError: Libraries are unknown or have no licence text; the message has a line for each.
     """
     known = _names_of_wheels({each.name for each in told if each.kind == "pypi"})
     names, wrong, libraries = {each.name for each in told}, list[str](), dict[str, Library]()

@@ -31,24 +31,31 @@ PROJECT, EXTRA = "nep-studio", "studio"
 LICENCES = Path(__file__).resolve().parent / "licences"
 LICENCE_FILE = re.compile(r"(?:^|[/._-])(?:licen[cs]es?|copying|notice|authors|legal)\b", re.IGNORECASE)
 TEXT_SUFFIX = re.compile(r"(?:\.(?:txt|md|rst|bsd|apache2?|html|\d))?$", re.IGNORECASE)
-"""".0" is that of LICENSE-MPL-2.0."""
+"""Pattern for the file suffix of a licence text. LICENSE-MPL-2.0 has the suffix ".0" in this sense."""
 QT_WHEELS = ("pyside6", "pyside6-addons", "pyside6-essentials", "shiboken6")
 LGPL = "LGPL-3.0-only"
 EDITOR_PART = re.compile(r"^(@?[\w./-]+) (\d[\w.-]*) \(([^)\n]+)\)$", re.MULTILINE)
 
 Texts = Sequence[tuple[str, "Path | str"]]
-"""Licence texts as pairs of a name and a file or the text itself."""
+"""Licence texts: pairs of a file name and either the path of the file or the text itself."""
 
 
 class InventoryError(Exception):
-    """Error for parts without a known licence, with one line for each."""
+    """Parts without a known licence were found; the message has a line for each."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a package: name, version, licence (SPDX or plain text) and licence texts.
+    """Part of a package with its licence.
 
-    ``kind`` is the type of its package URL; ``within`` is the part that it is compiled into.
+    Attributes:
+        name: Name of the part.
+        version: Version, or "" if unknown.
+        licence: SPDX expression, or name of the licence.
+        texts: Licence texts.
+        kind: Type of the part's package URL, such as "pypi" or "npm".
+        within: Name of the part into which this part is compiled, or "".
+        authors: Authors, or "".
     """
 
     name: str
@@ -61,7 +68,7 @@ class Part:
 
 
 RIGHTS = {"mcap": ("Copyright (c) Foxglove Technologies Inc.", "MIT")}
-"""Distributions whose wheels lack a licence text: copyright line and licence."""
+"""Copyright line and licence of distributions whose wheels lack a licence text."""
 
 
 def own_text(copyright_lines: str, *licences: str) -> Texts:
@@ -75,7 +82,12 @@ def own_text(copyright_lines: str, *licences: str) -> Texts:
 
 
 def parts_of(project: str = PROJECT, extra: str = EXTRA) -> Iterator[Part]:
-    """Yield the project and all its dependencies on this system, each once."""
+    """Yield a project and all its dependencies on this system, each once.
+
+    Args:
+        project: Name of the distribution.
+        extra: Extra whose dependencies are included.
+    """
     waiting, seen = [Requirement(f"{project}[{extra}]")], set[tuple[str, frozenset[str]]]()
     told = set[str]()
     while waiting:
@@ -132,7 +144,7 @@ def _texts(found: metadata.Distribution) -> Iterator[tuple[str, Path]]:
 
 
 def others(resources: Path) -> Iterator[Part]:
-    """Yield the parts that aren't Python distributions."""
+    """Yield the parts that aren't Python dependencies: CPython, Qt, npm packages, fonts and icons."""
     yield Part("cpython", platform.python_version(), "PSF-2.0", _texts_of_python(), "generic")
     qt = metadata.version("PySide6-Essentials")
     own = [(each.name, each) for each in sorted(LICENCES.glob("*GPL-3*"))]
@@ -161,6 +173,10 @@ def _texts_of_python(base: Path = Path(sys.base_prefix)) -> Texts:
 
 
 def editor_parts(legal: Path) -> Iterator[Part]:
-    """Yield the npm packages of the block editor's page, as listed by the bundler."""
+    """Yield the npm packages in the block editor's page.
+
+    Args:
+        legal: File in which the bundler lists the packages with their licences.
+    """
     for found in EDITOR_PART.finditer(legal.read_text("utf-8")):
         yield Part(found[1], found[2], found[3], [(legal.name, legal)], "npm")

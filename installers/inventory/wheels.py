@@ -1,7 +1,7 @@
 """Parts compiled into wheels: C and C++ libraries, and Rust crates.
 
-Wheels with a bill of materials (PEP 770) are read. Others have a function in this module that reads the
-versions from the installed files.
+If a wheel has a bill of materials (PEP 770), its parts are read from there. For each other wheel with
+compiled parts, a function in this module reads the versions from the installed files.
 """
 
 from __future__ import annotations
@@ -47,13 +47,21 @@ CRATES = {
     "toml_writer": "MIT OR Apache-2.0",
     "winnow": "MIT",
 }
-"""Licences of the crates in iceoryx2, whose wheel has no bill of materials; its library has the versions."""
+"""Licences of the crates in iceoryx2, whose wheel has no bill of materials.
+
+The versions are in its library.
+"""
 
 
 class Bundled(NamedTuple):
-    """Entry for a library in OpenCV's list: usual name, licence, version pattern, copyright.
+    """Library that is compiled into OpenCV.
 
-    Without a copyright its text is in OpenCV's list of third parties or the standard one.
+    Attributes:
+        name: Usual name.
+        licence: SPDX expression, or name of the licence.
+        version: Pattern that extracts the version from OpenCV's build information, or "".
+        rights: Copyright lines, for use with `texts`.
+        texts: Names of standard licence texts; empty if OpenCV's third-party licences contain the text.
     """
 
     name: str
@@ -155,11 +163,14 @@ IN_OPENCV: Mapping[str, Bundled | None] = {
     ),
     "zlib": Bundled("zlib", "Zlib", r"ZLib:\s+build \(ver ([\d.]+)\)"),
 }
-"""Libraries by their names under "3rdparty dependencies" in OpenCV's build information; None if internal."""
+"""Libraries in OpenCV by their names in its build information.
+
+None for parts of OpenCV itself or of another entry.
+"""
 
 
 def version_in(path: Path, pattern: bytes) -> str:
-    """Return the first group of a pattern in a possibly large file, or ""."""
+    """Return the first group of a pattern in a file of any size, or "" if the pattern isn't found."""
     if path.stat().st_size == 0:
         return ""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
@@ -183,7 +194,12 @@ def parts_in_wheels(parts: Iterable[Part]) -> Iterator[Part]:
 
 
 def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
-    """Yield the crates of a bill of materials from Cargo, without build dependencies."""
+    """Yield the crates of a bill of materials from Cargo, without build dependencies.
+
+    Args:
+        bill: Content of the bill of materials.
+        within: Name of the distribution that contains the crates.
+    """
     for each in bill.get("components", ()):
         if str(each.get("purl", "")).startswith("pkg:cargo/") and each.get("scope") != "excluded":
             said: Mapping[str, Any] = next(iter(each.get("licenses", ())), {})
@@ -197,7 +213,12 @@ def parts_of_crates(bill: Mapping[str, Any], within: str) -> Iterator[Part]:
 def parts_of_build(told: str, theirs: Texts) -> Iterator[Part]:
     """Yield the libraries listed in OpenCV's build information.
 
-    ``theirs`` is its third-party licence text.
+    Args:
+        told: Build information.
+        theirs: OpenCV's third-party licence text.
+
+    Raises:
+        InventoryError: A library is not in `IN_OPENCV`.
     """
     names = _words(told, "3rdparty dependencies")
     names += [each for each in _words(told, "Extra dependencies") if each == "avif"]

@@ -37,7 +37,11 @@ WITH_DEBUG_INFO = ("lz4", "msgpack", "zstandard")
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """Build and return the packages.
+    """Build the packages and the bill of materials, and return their paths.
+
+    Args:
+        context: Version and folders.
+        keep_frozen: True to reuse the frozen program of an earlier build.
 
     Raises:
         PackageError: A tool is missing or a step has failed.
@@ -57,10 +61,10 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 
 
 def strip(context: Context) -> None:
-    """Remove debug information from Python's own libraries and those of `WITH_DEBUG_INFO`.
+    """Remove debug information from Python's own libraries and from the packages in `WITH_DEBUG_INFO`.
 
-    It is up to two thirds of their size. Other libraries are stripped already, and stripping again damages
-    some of them.
+    Debug information is up to two thirds of their size. Other libraries are stripped already, and
+    stripping again damages some of them.
     """
     tool = shutil.which("strip")
     inside = context.frozen / "_internal"
@@ -98,7 +102,7 @@ def add_share(context: Context, folder: Path) -> None:
 
 
 def archive(context: Context) -> Path:
-    """Build the .tar.xz, reproducible by sorted names and a single time and owner."""
+    """Build the .tar.xz. Sorted names and a common time and owner make the archive reproducible."""
     made = context.dist / f"NEP-Studio-{context.version}-linux-{context.machine}.tar.xz"
     top = f"NEP-Studio-{context.version}"
     made.unlink(missing_ok=True)
@@ -139,7 +143,13 @@ def debian_package(context: Context) -> Path:
 
 
 def control_file(context: Context, root: Path, control: Path) -> str:
-    """Return the control file for dpkg."""
+    """Return the content of the Debian control file.
+
+    Args:
+        context: Version and folders.
+        root: Folder with the files to be installed.
+        control: Folder of the control files.
+    """
     files = [path for path in root.rglob("*") if path.is_file() and control not in path.parents]
     size = sum(path.lstat().st_size for path in files)
     packages, optional = system_packages(root / PREFIX)
@@ -192,7 +202,7 @@ def _architecture(context: Context) -> str:
 
 
 def app_image(context: Context, tool: str) -> Path:
-    """Build the AppImage with its tool."""
+    """Build the AppImage. `tool` is the path of `appimagetool`."""
     folder = context.work / "NEP-Studio.AppDir"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(context.frozen, folder, symlinks=True)

@@ -1,7 +1,8 @@
 """System libraries that a frozen program requires, and the Debian packages that contain them.
 
-The build fails for an unlisted library, because it would be missing on a user's computer. Names are those of
-Debian and Ubuntu; "a|b" are the names of one package in different releases.
+The build fails for an unlisted library, because it would be missing on a user's computer. The package
+names are valid for Debian and Ubuntu; "a|b" means one package that has different names in different
+releases.
 """
 
 from __future__ import annotations
@@ -49,16 +50,16 @@ PACKAGES = {
     "libxcb.so.1": "libxcb1",
 }
 ALWAYS = ("xkb-data",)
-"""Packages that no library depends on: keyboard layouts for libxkbcommon."""
+"""Required packages that no library is linked with: keyboard layouts for libxkbcommon."""
 _OF_LIBC = re.compile(r"(?:ld-linux-|lib(?:c|dl|m|pthread|resolv|rt|util)\.so\.)")
 _NEEDED = re.compile(r"\(NEEDED\)\s+Shared library: \[([^\]]+)\]")
 _GLIBC = re.compile(rb"GLIBC_(\d+)\.(\d+)\b")
 
 
 def system_packages(folder: Path) -> tuple[Sequence[str], Sequence[str]]:
-    """Return the packages that a frozen program requires, and those that only Qt plug-ins require.
+    """Return the packages that a frozen program requires, and the packages that only Qt plug-ins require.
 
-    Without the latter Studio runs, but can't print or speak.
+    Without the packages for plug-ins Studio runs, but can't print or speak.
 
     Raises:
         PackageError: A library isn't in `PACKAGES`.

@@ -58,8 +58,8 @@ def dmg(target: Path, app: Path, background: Path, icon: Path) -> Path:
 def hfs_image(context: Context, target: Path, app: Path, background: Path, icon: Path) -> Path:
     """Create a similar HFS+ image with xorrisofs on any system, for inspection only.
 
-    It isn't compressed, and the Finder doesn't show the background, because only a Mac can store its
-    location.
+    The image isn't compressed, and the Finder doesn't show the background, because only a Mac can store
+    its location.
 
     Raises:
         PackageError: The image couldn't be created.

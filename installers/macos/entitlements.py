@@ -18,7 +18,7 @@ __all__ = [
 ]
 
 SOURCE = "https://developer.apple.com/documentation/security/hardened-runtime"
-"""List of all entitlements. Keys that aren't true must be omitted."""
+"""URL of Apple's list of entitlements. An entitlement is either true or absent."""
 _PAGES = "https://developer.apple.com/documentation/bundleresources/entitlements/"
 DOCUMENTED: Mapping[str, str] = {
     "com.apple.security.cs.allow-jit": "Allow execution of JIT-compiled code",
@@ -35,7 +35,7 @@ DOCUMENTED: Mapping[str, str] = {
     "com.apple.security.personal-information.photos-library": "Photos library",
     "com.apple.security.automation.apple-events": "Apple events",
 }
-"""Names of the hardened runtime's keys: all that `SOURCE` lists, as of November 2026.
+"""Names of the hardened runtime's entitlements by key: all that `SOURCE` lists, as of November 2026.
 
 The first six are runtime exceptions, the others resource access; `source_of` returns the page of each.
 """
@@ -48,16 +48,20 @@ QT_WEB_PROCESS = frozenset(
         "com.apple.security.cs.disable-library-validation",
     }
 )
-"""Entitlements in Qt 6.11.3: QtWebEngineProcess.app/Contents/Resources/QtWebEngineProcess.entitlements."""
+"""Entitlements of Qt 6.11.3.
+
+Source: QtWebEngineProcess.app/Contents/Resources/QtWebEngineProcess.entitlements.
+"""
 
 WEB_PROCESS: Mapping[str, str] = {
     "com.apple.security.cs.allow-jit": "V8 compiles the block editor's JavaScript",
     "com.apple.security.cs.allow-unsigned-executable-memory": "Qt's own list has it",
     "com.apple.security.cs.disable-executable-page-protection": "without it pages stay empty on Intel",
 }
-"""Entitlements of QtWebEngineProcess with reasons: Qt's list without library validation.
+"""Entitlements of QtWebEngineProcess with the reason for each: Qt's list without one entry.
 
-All libraries in the package are signed by the same identity, so they pass library validation.
+The exception from library validation is omitted, because all libraries in the package are signed by the
+same identity.
 """
 
 STUDIO: Mapping[str, str] = {
@@ -66,15 +70,16 @@ STUDIO: Mapping[str, str] = {
 }
 """Entitlements of Studio and the command `nep`.
 
-Callbacks of ctypes and cffi are machine code that libffi generates unless it has prepared trampolines. Not
-included: DYLD variables, as no child process is started with any; library validation, as all libraries have
-the same identity; camera and microphone, as Studio uses neither: without their keys macOS denies access
-without asking.
+Callbacks of ctypes and cffi are machine code that libffi generates unless it has prepared trampolines.
+
+Not included are: DYLD variables, because no child process is started with any; library validation,
+because all libraries have the same identity; camera and microphone, because Studio uses neither.
+Without the latter two keys macOS denies access without asking.
 """
 
 
 def source_of(key: str) -> str:
-    """Return Apple's page about a key.
+    """Return the URL of Apple's page about an entitlement.
 
     Raises:
         KeyError: The key isn't in `DOCUMENTED`.
@@ -92,10 +97,14 @@ def problems(entitlements: Mapping[str, object]) -> list[str]:
 
 
 def write(path: Path, allowed: Mapping[str, str]) -> Path:
-    """Write `STUDIO` or `WEB_PROCESS` as a file for codesign.
+    """Write entitlements to a property list for codesign, and return its path.
+
+    Args:
+        path: File to write.
+        allowed: `STUDIO` or `WEB_PROCESS`.
 
     Raises:
-        ValueError: Apple doesn't document a key.
+        ValueError: A key isn't in `DOCUMENTED`.
     """
     content: dict[str, object] = dict.fromkeys(sorted(allowed), True)
     if wrong := problems(content):

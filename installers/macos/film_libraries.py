@@ -28,8 +28,8 @@ def leave_out_films(context: Context, app: Path) -> int:
     """Replace FFmpeg's libraries by empty ones; return the bytes saved, 0 if there are none.
 
     Raises:
-        PackageError: A step has failed or the compiler is missing. With FFmpeg inside, the whole package
-            would have to be under its licence.
+        PackageError: A step has failed or the compiler is missing. If FFmpeg remained in the package,
+            the whole package would have to be under FFmpeg's licence.
     """
     films = [path for path in compiled(app) if FILMS.match(path.name)]
     if not films:

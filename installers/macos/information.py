@@ -81,9 +81,9 @@ _WORDS: Mapping[str, tuple[str, str, str, str]] = {
 }  # fmt: skip
 """Texts shown by macOS in the order of `LANGUAGES`. Document types are keyed by their English names.
 
-Studio uses neither camera nor microphone. Its libraries could, and macOS ends a program that requests access
-without such a text. With the text but without the entitlement, access is denied silently. Studio sends no
-Apple events, so there is no text for them.
+Studio uses neither camera nor microphone, but its libraries can. macOS terminates a program that
+requests access without such a text; with the text but without the entitlement, access is denied
+silently. There is no text for Apple events, because Studio sends none.
 """
 
 _OF_TYPES = frozenset(
@@ -104,7 +104,7 @@ DOCUMENTED = frozenset(
         "UTExportedTypeDeclarations", "UTImportedTypeDeclarations",
     }
 )  # fmt: skip
-"""Documented keys of Info.plist that are used (`source_of`, as of November 2026)."""
+"""Keys of Info.plist that the package uses and Apple documents (`source_of`, as of November 2026)."""
 _DOCUMENTED_WITHIN: Mapping[str, frozenset[str]] = {
     "CFBundleDocumentTypes": frozenset(
         {
@@ -127,10 +127,14 @@ def apple_version(version: str) -> str:
 
 
 def source_of(key: str, within: str = "") -> str:
-    """Return Apple's page about a key of Info.plist or of the dictionary `within` it.
+    """Return the URL of Apple's page about a key of Info.plist.
+
+    Args:
+        key: The key.
+        within: Key of the dictionary that contains `key`; "" for the top level.
 
     Raises:
-        KeyError: The key isn't in `DOCUMENTED`.
+        KeyError: The key isn't documented.
     """
     if key not in (_DOCUMENTED_WITHIN[within] if within else DOCUMENTED):
         raise KeyError(key)
@@ -146,11 +150,15 @@ def sentences(language: str) -> dict[str, str]:
 def information(version: str, machine: str) -> dict[str, Any]:
     """Return the content of Info.plist for a processor.
 
-    Studio's own type is exported, foreign types are imported; both conform to `public.data`:
+    Studio's own type is exported, types of other programs are imported. All conform to `public.data`:
     https://developer.apple.com/documentation/uniformtypeidentifiers/defining-file-and-data-types-for-your-app
     (`public.json` does: https://developer.apple.com/documentation/uniformtypeidentifiers/uttypejson).
-    Recordings (.mcap) are declared so that the Finder shows a name for them; the type has no official
-    identifier. They aren't among the documents that Studio opens.
+    Recordings (.mcap) are declared so that the Finder shows a name for the type, which has no official
+    identifier. Studio isn't registered as an application that opens recordings.
+
+    Args:
+        version: Version of Studio.
+        machine: Processor, "arm64" or "x86_64".
 
     Raises:
         KeyError: The processor isn't supported.
@@ -208,7 +216,7 @@ def information(version: str, machine: str) -> dict[str, Any]:
 
 
 def write_information(path: Path, version: str, machine: str) -> Path:
-    """Write Info.plist."""
+    """Write Info.plist to `path` and return the path."""
     path.write_bytes(plistlib.dumps(information(version, machine)))
     return path
 

@@ -23,7 +23,7 @@ _WEB_FILES = ("icudtl.dat", "qtwebengine_resources.pak", "qtwebengine_locales/en
 
 
 def is_bundle(path: Path) -> bool:
-    """Return whether a folder is a bundle, which is signed as a unit."""
+    """Return True if a folder is a bundle, which is signed as a unit."""
     return path.suffix in BUNDLES and path.is_dir() and not path.is_symlink()
 
 
@@ -33,7 +33,16 @@ def compiled(folder: Path) -> Iterator[Path]:
 
 
 def check(app: Path, version: str, machine: str) -> list[str]:
-    """Return a sentence for each problem of the bundle; raises OSError."""
+    """Check an application bundle and return a sentence for each problem.
+
+    Args:
+        app: The bundle.
+        version: Expected version.
+        machine: Processor that all binaries must support, "arm64" or "x86_64".
+
+    Raises:
+        OSError: A file can't be read.
+    """
     contents = app / "Contents"
     found = [f"{name} is beside Contents" for name in _names(app) if name != "Contents"]
     found += [f"{name} has no place in Contents" for name in _names(contents) if name not in _IN_CONTENTS]
@@ -53,10 +62,10 @@ def check(app: Path, version: str, machine: str) -> list[str]:
 
 
 def made_for_newer(app: Path, machine: str) -> dict[Path, str]:
-    """Return binaries built for a newer macOS than the application requires, with that version.
+    """Return the binaries built for a newer macOS than the application requires, with the version of each.
 
-    They are loaded nevertheless and fail only when they use a missing function, so they must be tested on the
-    oldest macOS.
+    The older macOS loads such a binary, which fails only when it calls a missing function. Therefore
+    these binaries must be tested on the oldest supported macOS.
     """
     oldest = tuple(int(each) for each in OLDEST_MACOS[machine].split("."))
     wanted = {

@@ -14,7 +14,10 @@ _THIN = {0xFEEDFACF: ">", 0xCFFAEDFE: "<", 0xFEEDFACE: ">", 0xCEFAEDFE: "<"}
 _WIDE = {0xFEEDFACF, 0xCFFAEDFE}
 _FAT, _FAT_64 = 0xCAFEBABE, 0xCAFEBABF
 _MAX_SLICES = 8
-"""Java classes have the same magic number as fat files, followed by their version: 45 or more."""
+"""Maximum number of slices in a fat file.
+
+Java class files have the same magic number, followed by their version, which is 45 or more.
+"""
 _MACHINES = {0x01000007: "x86_64", 0x0100000C: "arm64"}
 _PROGRAM = 2
 _VERSION_MIN_MACOS, _BUILD_VERSION = 0x24, 0x32
@@ -23,10 +26,10 @@ _LOAD, _REEXPORT = 0xC, 0x8000001F
 
 @dataclass(frozen=True)
 class Slice:
-    """Code for one processor."""
+    """Part of a Mach-O file with the code for one processor."""
 
     machine: str
-    """"arm64", "x86_64", or the number of another type."""
+    """Processor: "arm64", "x86_64", or the hexadecimal number of another type."""
     is_program: bool
     """True for an executable, False for a library or plug-in."""
     oldest_macos: tuple[int, int] | None

@@ -19,7 +19,7 @@ __all__ = ["application", "build", "finish", "pack", "prepare"]
 _BACKGROUND = "background.png"
 
 MakeImage = Callable[[Path, Path, Path, Path], Path]
-"""Creates the image (first argument) from an application, a background and an icon."""
+"""Function that creates a disk image, its first argument, from an application, a background and an icon."""
 
 
 def application(context: Context) -> Path:
@@ -44,7 +44,11 @@ def prepare(context: Context) -> Mapping[str, str]:
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """Build the disk image and the bill of materials, signed and notarised as configured.
+    """Build the disk image and the bill of materials; sign and notarise the image as configured.
+
+    Args:
+        context: Version and folders.
+        keep_frozen: True to reuse the application of an earlier build.
 
     Raises:
         PackageError: A step has failed, or this isn't a Mac.
@@ -60,7 +64,17 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 def pack(
     context: Context, identity: signing.Identity, make_image: MakeImage, *, keep_frozen: bool
 ) -> Sequence[Path]:
-    """Implement `build` with a given identity and function to create the image; raises `PackageError`."""
+    """Build the disk image and the bill of materials with the given identity.
+
+    Args:
+        context: Version and folders.
+        identity: Signing identity.
+        make_image: Creates the disk image.
+        keep_frozen: True to reuse the application of an earlier build.
+
+    Raises:
+        PackageError: A step has failed.
+    """
     os.environ.update(prepare(context))  # read by the specification
     app = application(context)
     if not (keep_frozen and app.is_dir()):
@@ -82,7 +96,7 @@ def pack(
 def finish(context: Context, app: Path, identity: signing.Identity) -> None:
     """Complete a frozen application, check it, sign it, and have it notarised.
 
-    Steps that need a missing identity are skipped with a printed line.
+    Steps for which no identity is configured are skipped with a printed message.
 
     Raises:
         PackageError: A step has failed.

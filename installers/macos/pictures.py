@@ -1,6 +1,8 @@
 """Images of the package made from Studio's logo: icons and the disk image's background.
 
-QT_QPA_PLATFORM=offscreen python -m installers.macos.pictures FOLDER
+    QT_QPA_PLATFORM=offscreen python -m installers.macos.pictures FOLDER
+
+No screen is needed.
 """
 
 from __future__ import annotations
@@ -30,20 +32,20 @@ SIDES: Mapping[bytes, int] = {
 }  # fmt: skip
 """Icon types with sizes in pixels: 16, 32, 128, 256 and 512 points, each also at Retina resolution."""
 _RAW = frozenset({b"ic04", b"ic05"})
-"""Types that contain four channels in sequence instead of PNG, as written by Apple's iconutil."""
+"""Icon types that contain four channels one after the other instead of a PNG, as Apple's iconutil does."""
 _MAX_RUN = 128
 
 Paint = Callable[[QPainter, float, Theme], None]
 
 
 def paint_app(painter: QPainter, side: float, theme: Theme) -> None:
-    """Paint the logo with the margin of Apple's icons, whose shape has 824 of 1024 pixels."""
+    """Paint the logo with the margin of Apple's icons, whose shape fills 824 of 1024 pixels."""
     margin = round(side * 100 / 1024)
     paint_logo(painter, QRectF(margin, margin, side - 2 * margin, side - 2 * margin), theme)
 
 
 def paint_document(painter: QPainter, side: float, theme: Theme) -> None:
-    """Paint the document icon used on all systems."""
+    """Paint the icon of documents, which is the same on all systems."""
     paint_behaviour(painter, QRectF(0, 0, side, side), theme)
 
 
@@ -97,7 +99,12 @@ def _png(image: QImage) -> bytes:
 
 
 def icns(paint: Paint, theme: Theme) -> bytes:
-    """Return an .icns file with all `SIDES`."""
+    """Return an .icns file with the icon in all `SIDES`.
+
+    Args:
+        paint: Function that paints the icon.
+        theme: Theme with the colours.
+    """
     pieces = []
     for kind, side in SIDES.items():
         image = _painted(side, side, paint, side, theme)

@@ -1,10 +1,10 @@
-"""Signing and notarising with the owner's identity; without one the package is for tests only.
+"""Signing and notarising with the owner's identity; without an identity the package is for tests only.
 
 NEP_MACOS_IDENTITY        the certificate: "Developer ID Application: Ana Pérez (ABCDE12345)"
 NEP_MACOS_NOTARY_PROFILE  a profile stored by `xcrun notarytool store-credentials`; or these three:
 NEP_MACOS_NOTARY_KEY      the file of an App Store Connect key (.p8)
-NEP_MACOS_NOTARY_KEY_ID   its id
-NEP_MACOS_NOTARY_ISSUER   the id of its issuer
+NEP_MACOS_NOTARY_KEY_ID   the id of the key
+NEP_MACOS_NOTARY_ISSUER   the id of the key's issuer
 """
 
 from __future__ import annotations
@@ -47,17 +47,17 @@ class Identity:
 
     name: str
     notary: tuple[str, ...] = ()
-    """Arguments of notarytool; () to skip notarisation."""
+    """Credential arguments for notarytool; empty to skip notarisation."""
 
     @property
     def is_known(self) -> bool:
-        """True for an identity known to Apple."""
+        """True for a Developer ID certificate, False for the ad hoc identity."""
         return self.name != AD_HOC
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A file or bundle with a signature of its own."""
+    """File or bundle that is signed separately."""
 
     path: Path
     allowed: str = ""
@@ -65,10 +65,10 @@ class Piece:
 
 
 def identity_of(environ: Mapping[str, str]) -> Identity:
-    """Return the identity from the variables above.
+    """Return the identity from environment variables; see the module's documentation.
 
     Raises:
-        PackageError: Only some of them are set.
+        PackageError: Only some of the required variables are set.
     """
     name, profile = environ.get("NEP_MACOS_IDENTITY", ""), environ.get("NEP_MACOS_NOTARY_PROFILE", "")
     given = [part for part in _KEY_PARTS if environ.get(part)]
@@ -88,7 +88,7 @@ def identity_of(environ: Mapping[str, str]) -> Identity:
 
 
 def pieces(app: Path) -> list[Piece]:
-    """Return everything to be signed, contents of bundles before the bundles."""
+    """Return all files and bundles to be signed; the contents of a bundle come before the bundle."""
     programs = {app / "Contents" / "MacOS"}
     bundles = [path for path in sorted(app.rglob("*")) if is_bundle(path)]
     mains = {_main(bundle) for bundle in (app, *bundles)}

@@ -1,4 +1,4 @@
-"""Windows icons of Studio's programs and documents: a file with all sizes."""
+"""Icon files for Studio's programs and documents on Windows, with all sizes in one file."""
 
 from __future__ import annotations
 

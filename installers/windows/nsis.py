@@ -23,19 +23,25 @@ CLASSES = "Software\\Classes\\"
 PROGRAMS = ("nep-studio.exe", "nep.exe")
 UNINSTALLER = "uninstall.exe"
 BEHAVIOUR_ICON = "nep-behaviour.ico"
-"""Icon of .nepb files, also named in the .reg file."""
+"""Name of the icon file of .nepb files; the .reg file refers to it."""
 ROOM_MB = 100
-"""Free space required in addition to the files, for settings and normal operation."""
+"""Free disk space in MB that is required in addition to the files, for settings and normal operation."""
 
 
 def quoted(text: str | PurePath, folder: str = "") -> str:
-    """Quote text for NSIS, optionally as a path in ``folder``, an NSIS variable."""
+    """Quote text for NSIS.
+
+    Args:
+        text: Text or relative path.
+        folder: NSIS variable of the folder that contains the path, such as "$INSTDIR"; "" for other
+            text.
+    """
     escaped = str(text).replace("$", "$$").replace('"', '$\\"')
     return f'"{folder}\\{escaped}"' if folder else f'"{escaped}"'
 
 
 def entries(frozen: Path) -> str:
-    """Return the macros with the files of the frozen program and the entries of its folder.
+    """Return the NSIS macros that unpack the frozen program and list the entries of its top folder.
 
     Files are sorted for reproducibility, and by type because similar files compress better.
     """
@@ -65,8 +71,8 @@ def _files(frozen: Path) -> Iterator[Path]:
 def association(reg_file: str) -> str:
     """Return the macros that register and unregister the .nepb file type, from the text of a .reg file.
 
-    Keys of a suffix may contain values of other programs, so only Studio's values are removed; its own keys
-    are removed completely.
+    The key of a file extension may contain values of other programs, so only Studio's values are
+    removed from it. Studio's own keys are removed completely.
     """
     values = list(_values(reg_file))
     put = [f"WriteRegStr HKCU {quoted(key)} {quoted(name)} {text}" for key, name, text in values]
@@ -111,7 +117,12 @@ def _values(reg_file: str) -> Iterator[tuple[str, str, str]]:
 
 
 def make_setup(context: Context, icon: Path, picture: Path) -> Path:
-    """Build the installer of the frozen Studio and return it.
+    """Build the installer of the frozen Studio and return its path.
+
+    Args:
+        context: Version and folders.
+        icon: Icon of the installer.
+        picture: Image of the last page.
 
     Raises:
         PackageError: NSIS is missing or has failed.

@@ -1,6 +1,7 @@
 """Packages for Windows: `NEP-Studio-VERSION-setup.exe` and a portable zip.
 
-On Windows they are built with its own Python, on Linux with a Windows Python in Wine.
+On Windows the packages are built with the Python that runs the packer, on Linux with a Windows Python
+in Wine.
 """
 
 from __future__ import annotations
@@ -24,11 +25,15 @@ __all__ = ["build", "make_zip", "refuse_files_of_wine"]
 
 OF_WINE = (b"Wine builtin DLL", b"Wine placeholder DLL")
 EARLIEST = 315_532_800
-"""1980, the earliest timestamp of zip entries."""
+"""Earliest timestamp of a zip entry, 1 January 1980, in seconds since 1970."""
 
 
 def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
-    """Build the installer, the zip and the bill of materials.
+    """Build the installer, the zip and the bill of materials, and return their paths.
+
+    Args:
+        context: Version and folders.
+        keep_frozen: True to reuse the frozen program of an earlier build.
 
     Raises:
         PackageError: A step has failed.
@@ -55,7 +60,10 @@ def build(context: Context, *, keep_frozen: bool) -> Sequence[Path]:
 
 
 def refuse_files_of_wine(frozen: Path) -> None:
-    """Raise `PackageError` if the package contains libraries of Wine, which Windows would load."""
+    """Raise `PackageError` if the package contains libraries of Wine.
+
+    Windows would load these libraries instead of its own.
+    """
     found = [
         path.name for path in _files(frozen) if path.suffix.lower() in {".dll", ".exe"} and _is_of_wine(path)
     ]
@@ -69,7 +77,7 @@ def _is_of_wine(path: Path) -> bool:
 
 
 def give_one_time(frozen: Path, epoch: int) -> None:
-    """Set the timestamps of all files, for reproducible packages."""
+    """Set the timestamp of all files to `epoch` (seconds since 1970), so that packages are reproducible."""
     for path in _files(frozen):
         os.utime(path, (epoch, epoch))
 

@@ -1,6 +1,6 @@
 """Paint the image of the installer's last page: the logo on white.
 
-Run with an interpreter that has Studio installed; needs no screen:
+Run this with an interpreter that has Studio installed; a screen isn't needed:
 
     python page_picture.py FILE.bmp
 """

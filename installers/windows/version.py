@@ -20,7 +20,7 @@ VSVersionInfo(
 
 
 def version_numbers(version: str) -> tuple[int, int, int, int]:
-    """Return a version as the four numbers of Windows, such as 1, 2, 3, 0 for "1.2.3rc1"."""
+    """Return a version as the four numbers that Windows requires, such as (1, 2, 3, 0) for "1.2.3rc1"."""
     found = re.match(r"(\d+)(?:\.(\d+))?(?:\.(\d+))?", version)
     if found is None:
         raise ValueError(f"no version: '{version}'")

@@ -25,7 +25,10 @@ HERE = Path(__file__).resolve().parent
 PYTHON = "3.11"
 PROGRAMS = {"wine": "wine wine64", "wineboot": "wine", "x86_64-w64-mingw32-gcc": "gcc-mingw-w64-x86-64-win32"}
 OVERRIDES = {"ucrtbase": "native,builtin", "mscoree": "", "mshtml": ""}
-"""Microsoft's C library, which numpy needs, and no prompts for .NET and Internet Explorer."""
+"""DLL overrides of the Wine prefix.
+
+Use Microsoft's C library, which numpy needs, and don't prompt to install .NET and Internet Explorer.
+"""
 MARKERS = {
     "implementation_name": "cpython",
     "os_name": "nt",
@@ -46,7 +49,7 @@ wine '{python}' "$@" 2>&1 | cat
 
 
 def for_windows(lines: Iterable[str]) -> list[str]:
-    """Return the lines of a pinned requirements file that apply to Windows, without markers.
+    """Return the pinned requirements that apply to Windows, without environment markers.
 
     pip evaluates markers for the computer that it runs on, even with ``--platform``.
     """
@@ -66,7 +69,7 @@ def for_windows(lines: Iterable[str]) -> list[str]:
 
 
 def windows_python(context: Context) -> tuple[str]:
-    """Return the command of a Windows Python with Studio and PyInstaller.
+    """Return the command of a Windows Python in Wine with Studio and PyInstaller; install them if needed.
 
     Raises:
         PackageError: Wine is missing or a step has failed.
@@ -96,7 +99,12 @@ def windows_python(context: Context) -> tuple[str]:
 
 
 def make_prefix(prefix: Path, ucrtbase: Path, environ: Mapping[str, str]) -> None:
-    """Create a Windows 10 prefix for one user, with the files that Wine lacks.
+    """Create a Windows 10 prefix with the DLLs that Wine lacks.
+
+    Args:
+        prefix: Folder of the prefix.
+        ucrtbase: Microsoft's C library, to be copied into the prefix.
+        environ: Environment variables for the commands.
 
     Raises:
         PackageError: A step has failed.

@@ -1,5 +1,5 @@
-"""Back ends: implementations of the transport between nodes. Each module defines one `BACKEND`.
+"""Back ends: implementations of the transport between nodes.
 
-`base` defines the interface, `memory` is the reference implementation to copy from, and `zeromq` is the
-default.
+Each module or package in this folder defines one `BACKEND`, except `base`, which defines the interface.
+`memory` is the reference implementation to copy from; `zeromq` is the default back end.
 """

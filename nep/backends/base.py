@@ -30,7 +30,7 @@ HANDSHAKE_TIMEOUT_S = 0.5
 """Maximum time in seconds that a new publisher or subscriber waits for the handshake with its peers."""
 
 Sink = Callable[[Sequence[Message]], None]
-"""Callback for batches of messages; called in the transport's sink thread. Must return soon and not raise."""
+"""Callback for batches of messages, called in the transport's sink thread. Must return soon and not raise."""
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,13 @@ class PublisherSpec:
         topic: Name of the topic.
         msg_type: Message type as registered at the master.
         codec: Encoder of the payloads.
-        is_latched: True to keep the newest message for late subscribers.
+        is_latched: True to deliver the newest message to late subscribers.
         configuration: Connection through a master or to a fixed address.
         wait_s: Seconds to wait for the master; None waits forever.
         number: Secret that proves ownership of the id, see `nep.protocol.requests.is_proven`.
         may_batch: True if messages published within microseconds of each other may be sent in one batch.
-        qos: Name of a QoS profile of the back end, or "".
-        history: Number of messages kept for late subscribers; 1 if only latched, otherwise 0.
+        qos: Name of a QoS profile of the back end; "" selects the default.
+        history: Number of messages stored for late subscribers: 1 if only latched, 0 for none.
     """
 
     id: int
@@ -74,12 +74,12 @@ class SubscriberSpec:
         msg_type: Expected message type.
         configuration: Connection through a master or to a fixed address.
         wait_s: Seconds to wait for the master; None waits forever.
-        keep: Queue policy: all messages or only the newest.
+        keep: Queue policy: "all" for all messages, "latest" for only the newest.
         max_messages: Queue bound in messages.
         max_bytes: Queue bound in bytes.
-        sink: Callback that receives the messages; nothing is queued for `SubscriberTransport.poll` then.
-        number: Secret that proves ownership of the id.
-        qos: Name of a QoS profile of the back end, or "".
+        sink: Callback that receives the messages; `SubscriberTransport.poll` then returns nothing.
+        number: Secret that proves ownership of the id, see `nep.protocol.requests.is_proven`.
+        qos: Name of a QoS profile of the back end; "" selects the default.
         is_pattern: True to subscribe to all topics that match `topic`, see `nep.protocol.topic_pattern`.
     """
 
@@ -101,18 +101,18 @@ class Wakeable(Protocol):
     """Object that can be woken, such as a `nep.system.wakeup.Waker`."""
 
     def wake(self) -> None:
-        """Wake the waiting thread. Callable from any thread, also with locks held; doesn't block."""
+        """Wake the waiting thread. Thread-safe and non-blocking, even while the caller holds locks."""
 
 
 class PublishHooks(NamedTuple):
-    """Arguments of `PublishesQuickly.quick_publish`.
+    """Arguments of `SupportsQuickPublish.quick_publish`.
 
     Attributes:
-        owner: Publisher; while it is closed, calls go to `slowly`.
-        kind: Payload type that is sent as is, without encoding; None if there is none.
-        ordinary: Encoder of other payloads. Payloads for which it raises go to `slowly`.
-        look: Called with each payload whose encoding contains ``null``; None to skip the check.
-        slowly: Full publish method. Also used with ``strict=True`` and while the topic has no subscribers.
+        owner: Publisher that is checked for closing; after it is closed, calls go to `fallback`.
+        raw_type: Payload type that is sent unchanged, without encoding; None if there is none.
+        encode: Encodes payloads of other types; if it raises, the payload is passed to `fallback`.
+        on_null: Called with each payload whose encoding contains ``null``; None to skip the check.
+        fallback: Full publish method. Also used with ``strict=True`` and while the topic has no subscribers.
     """
 
     owner: Closable
@@ -133,7 +133,11 @@ class SupportsQuickPublish(Protocol):
     """Optional interface of a `PublisherTransport`: a fast path for publishing."""
 
     def quick_publish(self, asked: PublishHooks) -> Callable[..., None]:
-        """Return a publish function with minimal call overhead. It never blocks."""
+        """Return a publish function with minimal call overhead, which never blocks.
+
+        Args:
+            asked: Encoder and fallbacks for the publish function.
+        """
 
 
 class PublisherTransport(Protocol):
@@ -162,10 +166,10 @@ class PublisherTransport(Protocol):
         """Report the reason why payloads can't be encoded, as an alert in the graph; "" clears the alert."""
 
     def borrow_memory(self, size_bytes: int) -> memoryview | None:
-        """Return writable shared memory for a payload, or None if no subscriber shares memory."""
+        """Return writable shared memory for a payload; None if no subscriber shares memory."""
 
     def send(self, encoded: Encoded) -> None:
-        """Send an encoded message to all subscribers. Never blocks: subscribers with a full queue lose it."""
+        """Send an encoded message to all subscribers. Never blocks: full queues drop the message."""
 
     def close(self, timeout_s: float) -> None:
         """Unregister and flush. Messages not delivered within `timeout_s` seconds are logged as a warning."""
@@ -182,15 +186,15 @@ class SupportsSubscriberIds(Protocol):
 
 @runtime_checkable
 class SupportsPayloads(Protocol):
-    """Optional interface of a `SubscriberTransport`: decoded payloads without `Message` objects.
+    """Optional interface of a `SubscriberTransport` for decoded payloads without `Message` objects.
 
-    While `payloads` is not empty, call `restore` before taking from `ready`.
+    While `payloads` is not empty, call `restore` before reading `ready`.
     """
 
     payloads: deque[Any]
-    """Decoded payloads that come before the messages in `ready`. Pop from the left, in any thread."""
+    """Decoded payloads, all older than the messages in `ready`. Pop from the left, in any thread."""
     wants_payloads: bool
-    """True to receive payloads here whenever that is faster; set by the reader."""
+    """True to prefer `payloads` over `ready` where that is faster. Set by the reader."""
 
     def restore(self) -> None:
         """Convert the remaining payloads back to messages and insert them at the front of `ready`."""
@@ -200,23 +204,24 @@ class SubscriberTransport(Protocol):
     """Receiving end of a subscriber."""
 
     ready: deque[Message]
-    """Messages that were already read. Pop from the left, in any thread.
+    """Messages that can be taken without calling `poll`. Pop from the left, in any thread.
 
-    May be empty while other messages are queued; `poll` returns those.
+    May be empty while more messages are queued; `poll` returns those.
     """
 
     @property
     def fd(self) -> int:
-        """File descriptor that becomes readable when messages arrive between `enter_wait` and `leave_wait`.
+        """File descriptor that becomes readable when a message arrives during a wait; -1 if there is none.
 
-        -1 if there is none: then only the waker signals messages.
+        A wait begins with `enter_wait` and ends with `leave_wait`. Without a descriptor, only the waker
+        reports new messages.
         """
 
     def enter_wait(self, waker: Wakeable) -> bool:
         """Prepare to wait; return False if input is available or the subscriber is closed.
 
-        Until `leave_wait`, `waker` is woken by events that `fd` doesn't show, including `close`. Call
-        `leave_wait` soon after waking: until then messages may not be read from the network.
+        Until `leave_wait`, events that `fd` doesn't signal wake `waker`; `close` is one of them. Call
+        `leave_wait` soon after waking, because messages may not be read from the network until then.
         """
 
     def leave_wait(self, waker: Wakeable) -> None:
@@ -242,7 +247,7 @@ class SubscriberTransport(Protocol):
         """Return the next message, or None if none is available. Never waits."""
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Wait up to `timeout_s` seconds for the next message and return it. May return None earlier."""
+        """Wait up to `timeout_s` seconds for the next message and return it; may return None earlier."""
 
     def report(self, problem: str) -> None:
         """Report the reason why messages can't be decoded, as an alert in the graph; "" clears the alert."""
@@ -261,7 +266,7 @@ class Transport(Protocol):
     """Connection of one node to the other nodes."""
 
     def create_publisher(self, spec: PublisherSpec) -> PublisherTransport:
-        """Create a publisher. Its first message reaches every subscriber that is already registered.
+        """Create a publisher, whose first message reaches every subscriber that is already registered.
 
         Raises:
             MasterUnreachable: No master replied within `PublisherSpec.wait_s`.
@@ -270,20 +275,26 @@ class Transport(Protocol):
         """
 
     def create_subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
-        """Create a subscriber. It receives all messages published from now on. Raises as `publisher` does."""
+        """Create a subscriber, which receives all messages published after this call returns.
+
+        Raises the same errors as `create_publisher`.
+        """
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait until one of `subscribers` may have a message or `wake` is called.
+        """Wait until one of `subscribers` may have a message, `wake` is called or the timeout expires.
 
-        Returns after `timeout_s` seconds at the latest. Transports with services (`nep.backends.services`)
-        accept a third argument: call queues to wait for.
+        Transports with services (`nep.backends.services`) accept a third argument: call queues to wait for.
+
+        Args:
+            subscribers: Subscribers to wait for.
+            timeout_s: Maximum time to wait in seconds.
         """
 
     def wake(self) -> None:
         """End all waits in progress."""
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Return the current graph. Raises `MasterUnreachable`."""
+        """Return the current graph. Raises `MasterUnreachable` after `timeout_s` seconds without a reply."""
 
     def begin_close(self) -> None:
         """Notify all peers that the node is closing, and stop sending. Doesn't wait; `close` must follow."""
@@ -300,13 +311,13 @@ class Backend:
         name: Name that `Node` accepts.
         open: Opens the transport of a node. Raises `BackendUnavailableError` if `needs` is not installed.
         needs: Package to install, or "".
-        aliases: Further accepted names.
+        aliases: Other names that `Node` accepts.
         master: Converts a node's `master` argument (None for the default) to `Hybrid.master`. Raises
             `NepError` for an invalid address.
-        codec_for: Returns the codec of a message type of publishers.
-        codec_of_calls: Returns the codec of a client's calls, for back ends with service types of their own.
+        codec_for: Returns the codec for a publisher's message type.
+        codec_of_calls: Returns the codec for a client's calls. Only for back ends with typed services.
         qos: Names of the QoS profiles.
-        has_history: True if publishers can keep more than the last message for late subscribers.
+        has_history: True if publishers can store more than the newest message for late subscribers.
         has_patterns: True if subscribers accept topics with wildcards.
         has_extensions: True if extensions of messages are transferred.
         is_in_process: True if only nodes of the same process can connect.

@@ -16,10 +16,13 @@ _MODES: dict[str, Mode] = {"one2many": "one2many", "many2one": "many2one", "many
 
 @dataclass(frozen=True)
 class Hybrid:
-    """Connection through the master at `master`. Created by `Node.hybrid`.
+    """Connection through a master. Created by `Node.hybrid`.
 
-    Any number of publishers and subscribers can connect. `mode` is ignored; it exists for compatibility with
-    the original NEP.
+    Any number of publishers and subscribers can connect.
+
+    Attributes:
+        master: Address of the master.
+        mode: Ignored; exists for compatibility with the original NEP.
     """
 
     master: str
@@ -48,18 +51,18 @@ class Direct:
 
 
 Configuration = Hybrid | Direct
-"""Connection of a publisher, subscriber, server or client. The default is the node's own master."""
+"""Connection settings of a publisher, subscriber, server or client. Default: the node's own master."""
 
 
 def require_topic_support(configuration: Configuration) -> Configuration:
-    """Return `configuration` if topics can use it. Raises `NepError` if it only supports calls."""
+    """Return `configuration` if it supports topics. Raises `NepError` if it supports only calls."""
     if isinstance(configuration, Direct) and configuration.wire == "tcp":
         raise NepError(_("plain TCP supports only service calls; omit wire='tcp' for a topic"))
     return configuration
 
 
 def validate_mode(mode: str) -> Mode:
-    """Validate a mode and return it. Raises `NepError` with the valid modes."""
+    """Validate a mode and return it. Raises `NepError`, whose message lists the valid modes."""
     try:
         return _MODES[mode]
     except KeyError:
@@ -71,7 +74,7 @@ def validate_mode(mode: str) -> Mode:
 
 
 def parse_port(port: str | int) -> int:
-    """Parse a port number from 1 to 65535. Raises `NepError`."""
+    """Parse a port number. Raises `NepError` if it is not from 1 to 65535."""
     text = str(port)
     if not text.isascii() or not text.isdigit() or len(text) > 5 or not 1 <= int(text) <= 65535:
         raise NepError(_("'{port}' is not a port; use a number from 1 to 65535").format(port=quotable(text)))

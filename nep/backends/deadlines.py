@@ -12,11 +12,14 @@ class ExpiringClient(Protocol):
     """Client whose pending calls have deadlines."""
 
     def expire(self, now: float) -> float:
-        """Fail expired calls and return the next deadline (`time.monotonic`)."""
+        """Fail calls whose deadline is before `now` and return the next deadline.
+
+        Both times are those of `time.monotonic`; infinity means that no call has a deadline.
+        """
 
 
 class Deadlines:
-    """Thread that expires the pending calls of all clients of a node. Started with the first client."""
+    """Thread that expires the pending calls of a node's clients. Started with the first client."""
 
     def __init__(self, node_name: str) -> None:
         self._name = f"nep-calls-{node_name}"
@@ -40,7 +43,7 @@ class Deadlines:
             self._clients = tuple(each for each in self._clients if each is not client)
 
     def add(self, deadline: float) -> None:
-        """Schedule an expiry check no later than `deadline` (`time.monotonic`)."""
+        """Schedule a check for expired calls at `deadline` (`time.monotonic`) or earlier."""
         with self._changed:
             if deadline < self._due:
                 self._due = deadline
@@ -59,7 +62,7 @@ class Deadlines:
                 self.add(client.expire(time.monotonic()))
 
     def close(self, timeout_s: float) -> None:
-        """Stop and join the thread."""
+        """Stop the thread and wait up to `timeout_s` seconds for it to end."""
         with self._changed:
             self._is_closing = True
             self._changed.notify()

@@ -1,4 +1,4 @@
-"""Interface for back ends with services: server, client and survey transports."""
+"""Interface of back ends with services: transports of servers, clients and surveyors."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, CallKind, Reply, error_
 
 _logger = logging.getLogger("nep")
 CALLS_MAX = 1000
-"""Maximum number of calls queued in a server or in flight in a client."""
+"""Maximum number of calls that a server queues, or that a client has in flight."""
 CALLS_MAX_BYTES = 256 * 2**20
-"""Maximum size in bytes of the calls queued in a server or in flight in a client."""
+"""Maximum total size in bytes of the calls that a server queues, or that a client has in flight."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class ClientSpec:
         codec: Codec of requests and replies.
         configuration: Connection through a master or to a fixed address.
         wait_s: Seconds to wait for the master; None waits forever.
-        number: Secret that proves ownership of the id.
+        number: Secret that proves ownership of the id, see `nep.protocol.requests.is_proven`.
         msg_type: Requested service type, for back ends with typed services.
     """
 
@@ -77,7 +77,7 @@ class Tally:
         self.calls = self.errors = self.refused = self.bytes = self.unreadable = 0
 
     def add(self, reply: Reply) -> None:
-        """Count a call by its reply."""
+        """Count a call by the kind of its reply: answered, failed or rejected."""
         with self._lock:
             if reply.kind == CallKind.REFUSED:
                 self.refused += 1
@@ -98,9 +98,9 @@ class IncomingCall:
 
     Attributes:
         data: Encoded request.
-        codec: Number of its codec.
-        deadline: Time (`time.monotonic`) after which the client stops waiting; None if it waits forever.
-        answer: Sends the reply; returns False if sending failed.
+        codec: Number of the codec of `data`.
+        deadline: Time (`time.monotonic`) at which the client stops waiting; None if it waits forever.
+        reply: Sends a reply; returns False if the reply can't be delivered.
     """
 
     data: bytes | memoryview
@@ -144,7 +144,10 @@ class CallQueue:
         return True
 
     def pop(self, timeout_s: float = 0.0) -> IncomingCall | None:
-        """Remove and return the oldest call, or None; wait up to `timeout_s` seconds unless closed."""
+        """Remove and return the oldest call; wait up to `timeout_s` seconds for one.
+
+        Returns None on timeout or if the queue is closed and empty.
+        """
         with self._changed:
             if timeout_s > 0.0:
                 self._changed.wait_for(lambda: self._calls or self._is_closed, timeout_s)
@@ -155,7 +158,7 @@ class CallQueue:
             return call
 
     def enter_wait(self, wake: Callable[[], None]) -> bool:
-        """Register `wake`, which is called for every new call; return False if a call is already queued."""
+        """Register a function that is called for each new call; return False if a call is already queued."""
         with self._changed:
             if self._calls:
                 return False
@@ -163,13 +166,13 @@ class CallQueue:
             return True
 
     def leave_wait(self, wake: Callable[[], None]) -> None:
-        """Unregister a function that `enter_wait` registered."""
+        """Unregister a function registered by `enter_wait`."""
         with self._changed:
             if wake in self._wakes:  # not registered if the process was forked in between
                 self._wakes.remove(wake)
 
     def close(self) -> tuple[IncomingCall, ...]:
-        """Reject new calls, wake all waiting threads and return the remaining calls."""
+        """Reject new calls, wake all waiting threads, and return the calls that are still queued."""
         with self._changed:
             self._is_closed = True
             left = tuple(self._calls)
@@ -192,7 +195,10 @@ Outcome = Reply | NepError
 
 @contextmanager
 def wake_on_call(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterator[bool]:
-    """Register `wake` with all `calls` within the context; yield False if a call is already queued."""
+    """Call `wake` for each new call in `calls` while in the context.
+
+    Yields False if a call is already queued.
+    """
     entered: list[CallQueue] = []
     try:
         for queue in calls:
@@ -206,19 +212,19 @@ def wake_on_call(calls: Sequence[CallQueue], wake: Callable[[], None]) -> Iterat
 
 
 class OpenCall(Protocol):
-    """Call in flight."""
+    """Interface of a call in flight."""
 
     @property
     def number(self) -> int:
-        """Number of the call in its client."""
+        """Number of the call, unique within its client."""
 
 
 class InFlightCall(OpenCall, Protocol):
-    """Call in flight, as stored in a client."""
+    """Interface of a call in flight for the client that stores it."""
 
     @property
     def callback(self) -> Callable[[Outcome], None]:
-        """Callback for the outcome."""
+        """Callback that receives the outcome."""
 
     @property
     def size(self) -> int:
@@ -229,7 +235,7 @@ C = TypeVar("C", bound=InFlightCall)
 
 
 class ClientCalls(Generic[C]):
-    """Calls in flight of a client, guarded by `_lock`. Base class of the clients of several back ends."""
+    """Base class for clients that stores the calls in flight, guarded by `_lock`."""
 
     def __init__(self, spec: ClientSpec) -> None:
         self.spec = spec
@@ -273,7 +279,7 @@ class ClientCalls(Generic[C]):
 
 
 class ServerTransport(Protocol):
-    """Interface of a back end's server."""
+    """Interface of the servers of a back end."""
 
     calls: CallQueue
     tally: Tally
@@ -290,14 +296,14 @@ class ServerTransport(Protocol):
         """Unregister; reject queued and new calls. Doesn't wait."""
 
     def close(self, timeout_s: float) -> None:
-        """Unregister and close; replies are flushed within `timeout_s` seconds. Idempotent."""
+        """Unregister and close; replies are flushed for up to `timeout_s` seconds. Idempotent."""
 
     def forked(self) -> None:
         """Mark the server as closed in a forked child process. Acquires no lock and touches no socket."""
 
 
 class ClientTransport(Protocol):
-    """Interface of a back end's client."""
+    """Interface of the clients of a back end."""
 
     @property
     def is_connected(self) -> bool:
@@ -314,12 +320,15 @@ class ClientTransport(Protocol):
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
     ) -> OpenCall:
-        """Send a call as soon as a server is connected.
+        """Send a call as soon as a server is connected, without waiting.
 
         Args:
             data: Encoded request.
             timeout_s: Seconds until the call fails; None waits forever.
             then: Called once with the outcome. May run in the I/O thread; must return soon.
+
+        Returns:
+            The call in flight, for `cancel`.
 
         Raises:
             ClosedError: The client is closed.
@@ -330,7 +339,7 @@ class ClientTransport(Protocol):
         """Cancel a call; `then` isn't called."""
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:
-        """Return the names of services that have a server; empty if the back end doesn't know them."""
+        """Return the names of services that have a server; empty if the back end can't list services."""
 
     def close(self) -> None:
         """Unregister the client; calls in flight fail with `ClosedError`."""
@@ -340,7 +349,7 @@ class ClientTransport(Protocol):
 
 
 class SurveyTransport(Protocol):
-    """Interface of a back end's surveyor."""
+    """Interface of the surveyors of a back end."""
 
     @property
     def respondents(self) -> int:
@@ -357,9 +366,10 @@ class SurveyTransport(Protocol):
     def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, then: Callable[[Outcome], None]
     ) -> Sequence[OpenCall]:
-        """Send a request to all connected respondents; `then` is called with the outcome of each.
+        """Send a request to all connected respondents, without waiting; return one call per respondent.
 
-        Arguments and errors as in `ClientTransport.begin`.
+        `then` is called with the outcome of each call. For the arguments and errors see
+        `ClientTransport.start_call`.
         """
 
     def cancel_all(self, calls: Sequence[OpenCall]) -> None:
@@ -373,26 +383,29 @@ class SurveyTransport(Protocol):
 
 
 class ServiceTransport(Protocol):
-    """Transport of a node that supports services."""
+    """Interface of the transports of back ends with services."""
 
     def create_server(self, spec: ServerSpec) -> ServerTransport:
-        """Create a server. Raises as `Transport.publisher` does."""
+        """Create a server. Raises the same errors as `Transport.create_publisher`."""
 
     def create_client(self, spec: ClientSpec) -> ClientTransport:
-        """Create a client. Raises as `Transport.subscriber` does."""
+        """Create a client. Raises the same errors as `Transport.create_subscriber`."""
 
     def create_surveyor(self, spec: ClientSpec) -> SurveyTransport:
-        """Create a surveyor; all servers of `spec.service` are its respondents. Raises as `client` does."""
+        """Create a surveyor, whose respondents are all servers of `spec.service`.
+
+        Raises the same errors as `create_client`.
+        """
 
 
 def check_calls(service: str, count: int, used: int, size: int) -> None:
-    """Raise `NepError` if a client has too many calls or bytes in flight to send another call.
+    """Raise `NepError` if a client has too many calls or bytes in flight for another call.
 
     Args:
         service: Name of the service.
         count: Number of calls in flight.
-        used: Bytes of the calls in flight.
-        size: Bytes of the new call.
+        used: Total size of the calls in flight in bytes.
+        size: Size of the new call in bytes.
     """
     if size > PAYLOAD_MAX_BYTES:
         raise NepError(_("the call cannot be sent: {reason}").format(reason=size_error_text(size)))
@@ -405,14 +418,19 @@ def check_calls(service: str, count: int, used: int, size: int) -> None:
 
 
 def limit_reply_size(reply: Reply) -> Reply:
-    """Return `reply`, or an error reply if it exceeds the size limit."""
+    """Return `reply`, or an error reply if `reply` exceeds the size limit."""
     if len(reply.data) <= PAYLOAD_MAX_BYTES:
         return reply
     return error_reply(CallKind.ERROR, "EncodeError", size_error_text(len(reply.data)))
 
 
 def rejection_reply(service: str, *, is_closed: bool) -> Reply:
-    """Return the reply that rejects a call: the server is closed, or its queue is full."""
+    """Return the reply that rejects a call.
+
+    Args:
+        service: Name of the service.
+        is_closed: True if the server is closed, False if its queue is full.
+    """
     reason = (
         _("'{service}' is closing")
         if is_closed
@@ -422,7 +440,7 @@ def rejection_reply(service: str, *, is_closed: bool) -> Reply:
 
 
 def size_error_text(size: int) -> str:
-    """Return the error message for a payload of `size` bytes."""
+    """Return the error message for a payload of `size` bytes, which exceeds the limit."""
     return _("it has {size} bytes, but calls allow at most {most}; publish large data on a topic").format(
         size=size, most=PAYLOAD_MAX_BYTES
     )

@@ -19,30 +19,30 @@ from nep.protocol.graph_view import GraphView
 
 
 class TcpTransport(ZeromqTransport):
-    """Transport for direct servers and clients on the "tcp" wire; everything else raises `NepError`."""
+    """Transport for direct servers and clients on the "tcp" wire. Everything else raises `NepError`."""
 
     def create_publisher(self, spec: PublisherSpec) -> NoReturn:
-        """Raise `NepError`: topics aren't supported."""
+        """Raise `NepError`, because topics aren't supported."""
         raise _unsupported_error(spec.topic)
 
     def create_subscriber(self, spec: SubscriberSpec) -> NoReturn:
-        """Raise `NepError`: topics aren't supported."""
+        """Raise `NepError`, because topics aren't supported."""
         raise _unsupported_error(spec.topic)
 
     def create_surveyor(self, spec: ClientSpec) -> NoReturn:
-        """Raise `NepError`: surveys aren't supported."""
+        """Raise `NepError`, because surveys aren't supported."""
         raise _unsupported_error(spec.service)
 
     def create_server(self, spec: ServerSpec) -> ServerTransport:
-        """Create a server. Raises `NepError` without a direct address."""
+        """Create a server. Raises `NepError` unless the configuration is a direct connection."""
         return super().create_server(replace(spec, configuration=_require_direct(spec.configuration)))
 
     def create_client(self, spec: ClientSpec) -> ClientTransport:
-        """Create a client. Raises `NepError` without a direct address."""
+        """Create a client. Raises `NepError` unless the configuration is a direct connection."""
         return super().create_client(replace(spec, configuration=_require_direct(spec.configuration)))
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002
-        """Raise `NepError`: plain TCP has no master."""
+        """Raise `NepError`, because plain TCP has no master."""
         raise NepError(_("plain TCP has no master, so there is no list of nodes"))
 
 

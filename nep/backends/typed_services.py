@@ -1,7 +1,7 @@
 """Typed services, as in ROS: conversion between codec data and typed request and response bodies.
 
-A service of a ROS type has maps as requests and responses. For calls between nep nodes the type is one that
-needs no installation:
+Requests and responses of ROS service types are maps. Calls between nep nodes use a type that needs no
+installation:
 
     uint16 codec
     uint32 timeout_ms
@@ -11,8 +11,12 @@ needs no installation:
     uint16 codec
     uint8[] data
 
-`codec` is 1 (JSON) or 4 (msgpack). `timeout_ms` 0 waits forever. `kind` is 2 (reply), 3 (error) or 4
-(rejected); the `data` of an error is JSON, see docs/services.md.
+The fields are:
+
+- `codec`: 1 (JSON) or 4 (msgpack)
+- `timeout_ms`: timeout of the call in milliseconds; 0 waits forever
+- `kind`: 2 (reply), 3 (error) or 4 (rejected)
+- `data`: payload; of an error, the JSON that docs/services.md describes
 """
 
 from __future__ import annotations
@@ -36,8 +40,8 @@ class DecodedCall(NamedTuple):
 
     Attributes:
         data: Encoded payload.
-        codec: Number of its codec.
-        timeout_s: Time limit of the client in seconds; None if it waits forever.
+        codec: Number of the codec of `data`.
+        timeout_s: Timeout of the client in seconds; None if the client waits forever.
     """
 
     data: bytes | memoryview
@@ -46,7 +50,7 @@ class DecodedCall(NamedTuple):
 
 
 class CallBody(Protocol):
-    """Codec for a request or response body: converts between maps and bytes."""
+    """Codec for a request or response body, which converts between maps and bytes."""
 
     def encode(self, payload: Any) -> bytes:  # noqa: ANN401 - any payload
         """Encode a map. Raises `EncodeError`."""
@@ -63,7 +67,8 @@ class TypedService:
         name: Name of the service type.
         request: Codec of request bodies.
         answer: Codec of response bodies.
-        is_nep: True for the type described in this module, whose fields carry a codec number and data.
+        is_nep: True for the type described in the module docstring, whose fields are a codec number and
+            data.
     """
 
     name: str
@@ -74,7 +79,13 @@ class TypedService:
     # ---- for clients
 
     def encode_call(self, codec: Codec, data: bytes | memoryview, timeout_s: float | None) -> bytes:
-        """Convert an encoded request to a request body. Raises `EncodeError`, `DecodeError`."""
+        """Convert an encoded request to a request body. Raises `EncodeError` or `DecodeError`.
+
+        Args:
+            codec: Codec of `data`.
+            data: Encoded request.
+            timeout_s: Timeout of the call in seconds; None waits forever.
+        """
         if not self.is_nep:
             return self.request.encode(codec.decode(data, {}))
         limit_ms = 0 if timeout_s is None else max(1, min(_TIMEOUT_MAX_MS, round(timeout_s * 1000)))
@@ -83,7 +94,13 @@ class TypedService:
     def decode_reply(self, body: bytes, codec: Codec) -> Reply:
         """Convert a response body to a reply.
 
-        Raises `DecodeError`, or `EncodeError` if `codec` can't encode the response.
+        Args:
+            body: Response body.
+            codec: Codec for the data of the reply, if the service type is a ROS type.
+
+        Raises:
+            DecodeError: The body is malformed.
+            EncodeError: The codec can't encode the response.
         """
         answer = self.response.decode(body)
         if not self.is_nep:
@@ -99,7 +116,7 @@ class TypedService:
     def decode_call(self, body: bytes) -> DecodedCall:
         """Parse a request body. Raises `DecodeError`.
 
-        Requests of ROS types are converted to msgpack, which supports bytes and NaN.
+        A request of a ROS type is converted to msgpack, which supports bytes and NaN.
         """
         request = self.request.decode(body)
         if not self.is_nep:

@@ -1,4 +1,4 @@
-"""Base class of subscribers without a file descriptor."""
+"""Base class of subscribers that have no file descriptor."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from nep.backends.base import Wakeable
 
 
 class WakingSubscriber(ABC):
-    """Subscriber that wakes its waiting threads itself. The condition `changed` guards its input."""
+    """Subscriber that wakes its waiting threads through wakers. The condition `changed` guards its input."""
 
     fd = -1
 

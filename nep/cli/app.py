@@ -68,7 +68,7 @@ _COMMANDS: Mapping[str, Callable[[], object]] = {
     "recording": lambda: recordings.app,
     "wire": lambda: wire.app,
 }
-"""Functions that import a command or group, by its name, in the order of the help."""
+"""Loaders of commands and command groups by name, in the order of the help text."""
 
 
 def _show_version(is_wanted: bool) -> None:
@@ -147,7 +147,7 @@ def _build_command(name: str) -> typer.Typer:
 
 
 def docstrings() -> Iterator[tuple[CommandInfo, str]]:
-    """Yield each command with its help in English, which is the docstring of the command's function."""
+    """Yield each command with its English help text, which is the docstring of the command's function."""
     for name in _COMMANDS:
         yield from _docstrings(_build_command(name))
 

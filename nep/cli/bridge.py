@@ -240,7 +240,13 @@ def _publish_log(running: Bridge) -> Iterator[None]:
 
 
 class _Row(NamedTuple):
-    """Row of the report: name of a route, its counts in the order of `_HEADS`, and its problem."""
+    """Row of the report.
+
+    Attributes:
+        name: Name of the route.
+        figures: Formatted counts in the order of `_HEADINGS`.
+        problem: Problem of the route, or "".
+    """
 
     name: str
     cells: tuple[str, ...]

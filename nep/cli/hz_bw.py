@@ -29,7 +29,7 @@ _WAIT_SLICE_S = 0.1
 _MIN_TOPIC_WIDTH = 12
 _MEAN_COLUMN_WIDTH, _LATENCY_COLUMN_WIDTH = 22, 16
 _CLOCK_WARNING_REPORTS = 3
-"""Number of reports after which the master should have compared the clocks."""
+"""Number of reports without a clock comparison after which a warning is printed."""
 
 TopicsArgument = Annotated[
     list[str],
@@ -115,7 +115,7 @@ def delay(
 
 
 class _Report:
-    """Periodic report of sliding windows of topics."""
+    """Table of statistics of one or more topics over a sliding window, printed periodically."""
 
     def __init__(
         self,
@@ -212,7 +212,10 @@ class _Report:
 
 
 class _DelayReport(_Report):
-    """Periodic report of latencies. Uses callbacks instead of a sink, which would add up to 5 ms."""
+    """Periodic table of latencies.
+
+    Receives messages in callbacks, because a sink would add up to 5 ms to the measured latency.
+    """
 
     def __init__(self, topics: Sequence[str], window_s: float) -> None:
         heads = (

@@ -22,28 +22,31 @@ TERMINATED_EXIT_CODE = 143
 
 RETRY_DELAY_S = 0.02
 GRACE_PERIOD_S = 3.0
-"""Time in seconds that a command has to stop after Ctrl+C; nodes leave the master within 2 s."""
+"""Time limit in seconds for stopping a command after Ctrl+C; nodes leave the master within 2 s."""
 
 
 def exit_on_interrupt() -> None:
-    """Make Ctrl+C exit at once without a message. For phases in which nothing needs cleanup."""
+    """Make Ctrl+C exit immediately and without a message; for phases that need no cleanup."""
     _set_interrupt_handler(_exit_immediately)
 
 
 def raise_on_interrupt() -> None:
     """Make Ctrl+C raise `KeyboardInterrupt`, so that nodes leave the master.
 
-    After a second Ctrl+C, or `GRACE_S` after the first, the process exits at once, because the terminal may
-    be blocked.
+    After a second Ctrl+C, or `GRACE_PERIOD_S` after the first, the process exits at once, because the
+    terminal may be blocked.
     """
     _set_interrupt_handler(_raise_interrupt)
 
 
 def call_on_signal(action: Callable[[], object]) -> None:
-    """Make Ctrl+C, SIGTERM and SIGHUP call `action`, which requests the command to finish.
+    """Make Ctrl+C, SIGTERM and SIGHUP call `action`, which asks the command to finish.
 
-    For commands that must finish cleanly, such as a recording. A second signal exits at once. `action` runs
-    in a signal handler, so it should only set a flag.
+    Use this for commands that must finish cleanly, such as a recording. A second signal exits
+    immediately.
+
+    Args:
+        action: Function that is called in a signal handler, so it should only set a flag.
     """
 
     def handle(_signal: int, _frame: FrameType | None) -> None:

@@ -128,7 +128,7 @@ def _named_topics(recording: reader.Recording, words: Sequence[str], *, publish_
 
 
 class _MotionPermissions:
-    """Set of topics that must not be published because they would move robots without permission."""
+    """Topics that are blocked because their messages would move robots without permission."""
 
     def __init__(
         self,
@@ -226,7 +226,7 @@ def _select_part(
 
 
 class _Sender:
-    """Publisher of replayed messages, with one publisher per topic and type."""
+    """Sender of replayed messages that opens one publisher per topic and type."""
 
     def __init__(
         self, node: Node, recording: reader.Recording, chosen: Sequence[str], limits: _MotionPermissions

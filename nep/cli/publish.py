@@ -166,20 +166,29 @@ def _warn_about_type(topic: str, kind: str, known: TopicInfo | None) -> None:
 
 
 def encode_payload(text: str, msg_type: str, first_line: int = 1) -> Encoded:
-    """Encode the payload in `text`, so that an invalid value fails before publishing.
-
-    Arguments and exceptions are those of `value_of`.
-    """
-    return codec_for(msg_type).encode(parse_payload(text, msg_type, first_line))
-
-
-def parse_payload(text: str, msg_type: str, first_line: int = 1) -> object:
-    """Parse the payload in a text. Raises `NepError`.
+    """Parse and encode the payload in `text`, so that an invalid value fails before publishing.
 
     Args:
         text: JSON, text, or @FILE.
         msg_type: Message type of the topic.
         first_line: Line number of `text` in standard input, for error messages.
+
+    Raises:
+        NepError: The text can't be parsed or encoded.
+    """
+    return codec_for(msg_type).encode(parse_payload(text, msg_type, first_line))
+
+
+def parse_payload(text: str, msg_type: str, first_line: int = 1) -> object:
+    """Parse a payload from the command line, from standard input, or from a file.
+
+    Args:
+        text: JSON, text, or @FILE.
+        msg_type: Message type of the topic.
+        first_line: Line number of `text` in standard input, for error messages.
+
+    Raises:
+        NepError: The text can't be parsed, or the file can't be read.
     """
     file: str | None = None
     if text.startswith("@"):

@@ -41,7 +41,8 @@ class Bandwidth:
 class Delay:
     """Latency of messages: mean, minimum, maximum and standard deviation in seconds.
 
-    `uncertainty_s` is the error bound in either direction; None if the clocks were not compared.
+    Attributes:
+        uncertainty_s: Error bound in either direction; None if the clocks were not compared.
     """
 
     mean_s: float
@@ -53,7 +54,11 @@ class Delay:
 
 
 class RateWindow:
-    """Messages of one topic from the last `seconds`. Thread-safe."""
+    """Sliding window over the messages of one topic. Thread-safe.
+
+    Args:
+        seconds: Length of the window.
+    """
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
@@ -119,8 +124,8 @@ class LatchedFilter:
     def predates_subscription(self, message: Message, now: float) -> bool:
         """Return True if a message was published before the subscription started.
 
-        Until the publisher's clock is compared with this computer's clock, the first message of each latched
-        publisher counts as published before.
+        Until the publisher's clock has been compared with this computer's clock, the first message of
+        each latched publisher is treated as a replay.
 
         Args:
             message: Received message.
@@ -135,7 +140,11 @@ class LatchedFilter:
 
 
 class LatencyWindow(RateWindow):
-    """Latencies of one topic's messages in the last `seconds`. Thread-safe."""
+    """Sliding window over the latencies of one topic's messages. Thread-safe.
+
+    Args:
+        seconds: Length of the window.
+    """
 
     def __init__(self, seconds: float) -> None:
         super().__init__(seconds)

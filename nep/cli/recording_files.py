@@ -86,7 +86,11 @@ RecordedTopicsArgument = Annotated[
 
 
 def selected_topics(recording: reader.Recording, words: Sequence[str]) -> list[str]:
-    """Return the topics selected by names and patterns, in the order of these words.
+    """Return the topics of a recording that match names and patterns.
+
+    Args:
+        recording: Recording with the topics.
+        words: Topic names and patterns; they determine the order of the result.
 
     Raises:
         typer.BadParameter: A word matches no topic.
@@ -110,7 +114,7 @@ def selected_topics(recording: reader.Recording, words: Sequence[str]) -> list[s
 
 
 def exit_if_damaged(recording: reader.Recording) -> None:
-    """Print the damage of a recording and exit with code 1; do nothing if the recording is intact."""
+    """Print the damage of a recording and exit with code 1; return normally if the recording is intact."""
     words = damage.corruption_text(recording.corruption, recording.start_ns)
     if words:
         print_status(words)
@@ -120,7 +124,12 @@ def exit_if_damaged(recording: reader.Recording) -> None:
 def parse_span_ns(
     recording: reader.Recording, begin: str | float | None, end: str | float | None
 ) -> tuple[int | None, int | None]:
-    """Parse begin and end of a part of a recording; return them in ns since 1970. See `time_ns`.
+    """Parse the begin and end of a part of a recording; return them in ns since 1970.
+
+    Args:
+        recording: The recording.
+        begin: Begin of the part in the format of `parse_time_ns`; None for the begin of the recording.
+        end: End of the part in the format of `parse_time_ns`; None for the end of the recording.
 
     Raises:
         typer.BadParameter: A time is invalid, or the part is empty.
@@ -190,7 +199,11 @@ def clock_text(seconds: float) -> str:
 
 @contextmanager
 def progress_bar(said: str) -> Iterator[Callable[[int, int], object]]:
-    """Show a progress bar on stderr if stderr is a terminal; yield a callback (done, total)."""
+    """Show a progress bar on stderr if stderr is a terminal; yield a callback (done, total).
+
+    Args:
+        said: Description of the operation, shown before the bar.
+    """
     out = console(stderr=True)
     if not out.is_terminal:
         yield lambda _done, _total: None

@@ -39,7 +39,7 @@ _BUFFER_FOLDER = ".nep-ring"
 _STOP, _KEEP = "end", "keep"
 _DEFAULT_NAME = "flight_recorder"
 KEEP_SERVICE = f"{_DEFAULT_NAME}/keep"
-"""Name of the service that saves the buffer of a flight recorder with the default name."""
+"""Name of the service that saves the buffer of the flight recorder with the default name."""
 NameOption = Annotated[
     str,
     typer.Option("--name", metavar=_("NAME"), help=_("Name of the flight recorder, if several are running.")),
@@ -47,7 +47,7 @@ NameOption = Annotated[
 
 
 class _Saver:
-    """Saves the content of a flight recorder to files, one at a time. Thread-safe."""
+    """Writer that saves the buffer of a flight recorder to files, one at a time. Thread-safe."""
 
     def __init__(self, ring: rings.FlightRecorder, folder: Path, seconds: float, *, as_json: bool) -> None:
         self._ring, self._folder, self._seconds, self._as_json = ring, folder, seconds, as_json
@@ -191,9 +191,10 @@ def _run_commands(commands: queue.SimpleQueue[str], keeper: _Saver, kept: rings.
 
 
 def has_flight_recorder(graph: GraphView, service: str = KEEP_SERVICE) -> bool:
-    """Return True if a flight recorder is running.
+    """Return True if a flight recorder offers `service`.
 
-    Calling a missing service would wait for the time limit.
+    Check this before calling the service, because a call without a server waits for the whole time
+    limit.
     """
     known = graph.services.get(service)
     return known is not None and bool(known.servers)

@@ -40,11 +40,16 @@ class TextColumn:
     justify: Literal["left", "right"] = "left"
     style: str = ""
     is_folded_last: bool = False
-    """True if this column is folded last on a narrow terminal. Columns of numbers are never folded."""
+    """True if this column is wrapped last on a narrow terminal. Columns of numbers are never wrapped."""
 
 
 def console(*, stderr: bool = False, out: Terminal | None = None) -> Console:
-    """Return a console for coloured text, writing to `out` if given. Imports rich on the first call."""
+    """Return a console for coloured text. Imports rich, which is slow, on the first call.
+
+    Args:
+        stderr: True to write to stderr instead of stdout.
+        out: Stream to write to instead.
+    """
     console_type = _console_class()
     return console_type(stderr=stderr, file=cast("IO[str] | None", out), highlight=False, soft_wrap=True)
 
@@ -63,7 +68,7 @@ def _console_class() -> type[Console]:
 
 
 def json_highlighter() -> Callable[[str, str], Text]:
-    """Return a function (head, body) that formats a message with a dim head and a coloured JSON body."""
+    """Return a function (head, body) that formats a message with a dimmed head and a coloured JSON body."""
     from rich.highlighter import JSONHighlighter  # noqa: PLC0415 - see `console`
     from rich.text import Text  # noqa: PLC0415
 
@@ -78,7 +83,7 @@ def json_highlighter() -> Callable[[str, str], Text]:
 
 
 def show_table(columns: Sequence[TextColumn], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table to stdout, folded to the width of the terminal."""
+    """Print a table to stdout; long cells are wrapped to fit the width of the terminal."""
     columns = [replace(column, head=_(column.head)) for column in columns]
     is_terminal = sys.stdout.isatty()  # files and pipes have no width
     room = shutil.get_terminal_size().columns if is_terminal else _UNLIMITED_WIDTH
@@ -211,7 +216,7 @@ def show_json(value: object) -> None:
 
 
 def rate(value_hz: float | None) -> str:
-    """Format a message rate in messages per second."""
+    """Format a rate in messages per second; None is shown as `UNKNOWN`."""
     if value_hz is None:
         return UNKNOWN
     return f"{value_hz:.0f} /s" if value_hz >= 100 else f"{value_hz:.1f} /s"
@@ -230,7 +235,7 @@ def size(value: float | None, per: str = "") -> str:
 
 
 def bandwidth(topic: TopicInfo) -> str:
-    """Format a topic's bandwidth. Unknown for a topic without subscribers, whose messages are not encoded."""
+    """Format a topic's bandwidth; "not subscribed" if messages are not encoded for lack of subscribers."""
     if topic.rate_hz and not topic.bandwidth_Bps and not topic.subscribers:
         return _("not subscribed")
     return size(topic.bandwidth_Bps, "/s")

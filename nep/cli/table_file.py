@@ -30,7 +30,7 @@ class TextSink(Protocol):
 
 
 class FieldExtractor:
-    """Extractor of fields from messages. Counts messages in which a field is missing."""
+    """Extractor of fields from messages, which also counts messages in which a field is missing."""
 
     def __init__(self, names: Sequence[str]) -> None:
         # Raises `NepError` for an invalid field path.
@@ -41,7 +41,10 @@ class FieldExtractor:
         self.unreadable = 0
 
     def extract(self, message: Message) -> list[object] | None:
-        """Return the field values of a message (`MISSING` for missing ones); None if it can't be decoded."""
+        """Return the field values of a message, with `MISSING` for missing fields.
+
+        Returns None if the message can't be decoded.
+        """
         try:
             payload = dict(message.extension) if message.codec == "image" else message.payload
         except DecodeError:
@@ -53,7 +56,7 @@ class FieldExtractor:
         return values
 
     def as_dict(self, values: Sequence[object]) -> dict[str, object]:
-        """Convert the result of `of` to a dict by field name, without missing fields."""
+        """Return the result of `extract` as a dict by field name, without missing fields."""
         return {name: value for name, value in zip(self.names, values, strict=True) if value is not MISSING}
 
     def report_missing(self) -> None:

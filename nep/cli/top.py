@@ -49,7 +49,7 @@ _MAX_NAMES_LENGTH = 40
 _FRAME_LINES = 6
 """Number of terminal lines that are not rows: two headings with rules, the summary, and a spare line."""
 _NODE_ROWS_DIVISOR = 3
-"""Divisor of the rows for nodes: a third, plus rows that topics don't need."""
+"""Divisor for the rows reserved for nodes: a third of all rows, plus rows that topics don't need."""
 
 
 class TopicOrder(str, enum.Enum):
@@ -167,7 +167,7 @@ def _matches(name: str, pattern: str) -> bool:
 
 
 def topic_rows(graph: GraphView, pattern: str = "", order: TopicOrder = TopicOrder.RATE) -> list[TopicInfo]:
-    """Return the topics that match the pattern, sorted; topics with equal values are sorted by name."""
+    """Return the topics whose names match `pattern`, sorted by `order` and then by name."""
     found = sorted(
         (topic for topic in graph.topics.values() if _matches(topic.name, pattern)),
         key=lambda each: each.name,
@@ -195,7 +195,7 @@ def node_rows(graph: GraphView) -> list[tuple[NodeInfo, float | None]]:
 
 @dataclass
 class _GraphPrinter:
-    """Filtering and formatting of graph snapshots."""
+    """Printer of filtered graph snapshots as JSON or plain tables."""
 
     pattern: str
     order: TopicOrder

@@ -28,7 +28,7 @@ def is_pattern(word: str) -> bool:
 
 
 class TopicPatterns:
-    """Finds published topics that match patterns by querying the graph once a second."""
+    """Tracker of published topics that match patterns. Queries the graph once a second."""
 
     def __init__(self, node: Node, patterns: Sequence[str], known: Collection[str]) -> None:
         # `known`: topics that are already subscribed. Raises `BadTopicError` for an invalid pattern.
@@ -39,7 +39,10 @@ class TopicPatterns:
         self._poll_at = 0.0
 
     def new_topics(self, graph: GraphView) -> list[tuple[str, str]]:
-        """Return new matching topics with their types. Patterns without a match are reported once."""
+        """Return (name, type) of matching topics that are new in `graph`.
+
+        A pattern without a match is reported once to the user.
+        """
         self._poll_at = time.monotonic() + _GRAPH_POLL_S
         published = {name: each for name, each in graph.topics.items() if each.publishers}
         for pattern in self.patterns:
@@ -57,9 +60,9 @@ class TopicPatterns:
         return found
 
     def poll(self) -> list[tuple[str, str]]:
-        """Return new matching topics, querying the graph at most once a second.
+        """Return (name, type) of new matching topics; query the graph at most once a second.
 
-        Returns none while the master is down.
+        Returns an empty list while the master is down.
         """
         if self.patterns and time.monotonic() >= self._poll_at:
             self._poll_at = time.monotonic() + _GRAPH_POLL_S

@@ -20,7 +20,7 @@ _GRAPH_TIMEOUT_S = 0.3
 
 
 class TopicMonitor:
-    """Topics that a command receives. Each topic without publishers is reported once.
+    """Monitor for topics without publishers, each of which is reported once to the user.
 
     The graph is queried only while no messages arrive.
     """
@@ -43,7 +43,7 @@ class TopicMonitor:
         return frozenset(self._silent)
 
     def update(self, graph: GraphView) -> None:
-        """Report topics that have no publisher, or none any more, and suggest similar names."""
+        """Report topics that have no publisher, or have lost their last one, and suggest similar names."""
         for topic in self._types:
             known = graph.topics.get(topic)
             if known is not None and known.publishers:
@@ -81,6 +81,6 @@ class TopicMonitor:
 
 
 def suggestion(topic: str, names: Sequence[str]) -> str:
-    """Return a "did you mean" question followed by a space, or "" if no name is similar."""
+    """Return "did you mean ...?" with a trailing space, or "" if no name is similar to `topic`."""
     near = nearest(topic, names)
     return "" if near is None else _("did you mean '{near}'?").format(near=near) + " "

@@ -1,7 +1,9 @@
 """Translation of typer's own output: usage line, built-in options and usage errors.
 
-Half of typer's messages are translated with gettext, to which `nep.i18n.begin` adds our catalogue. The
-messages here are matched by their English text, so messages of later typer versions may stay English.
+Half of typer's messages are translated with gettext, to which `nep.i18n.set_initial_language` adds nep's
+catalogue.
+The messages in this module are matched by their English text, so messages of later typer versions may
+remain English.
 """
 
 from __future__ import annotations
@@ -104,7 +106,7 @@ class TranslatedCommand(TyperCommand):
             self.help = text
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
-        """Return the parameters, with the help of built-in ones translated."""
+        """Return the parameters of the command; the help of built-in options is translated."""
         return _translate_help_texts(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
@@ -116,7 +118,7 @@ class TranslatedGroup(TyperGroup):
     """Command group with translated help texts and usage errors."""
 
     def get_params(self, ctx: Any) -> Any:  # noqa: ANN401
-        """Return the parameters, with the help of built-in ones translated."""
+        """Return the parameters of the group; the help of built-in options is translated."""
         return _translate_help_texts(super().get_params(ctx))
 
     def format_usage(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401

@@ -76,7 +76,13 @@ def ids_as_text(value: object) -> object:
 
 
 def format_payload(value: object, *, whole: bool, indent: bool = False) -> str:
-    """Format a payload for people as JSON that may contain NaN. Long values are shortened unless `whole`."""
+    """Format a payload for people as JSON that may contain NaN.
+
+    Args:
+        value: Decoded payload.
+        whole: True to print long values in full; otherwise they are shortened.
+        indent: True for one line per item.
+    """
     limits = (
         (math.inf, math.inf, math.inf, _MAX_JSON_DEPTH)
         if whole
@@ -131,5 +137,5 @@ def service_type_text(service: ServiceInfo) -> str:
 
 
 def cleaned(text: str) -> str:
-    """Escape control characters in a text of several lines, and indent its continuation lines."""
+    """Escape the control characters of a text, except line breaks, and indent its continuation lines."""
     return escaped(text, lines=True).replace("\n", "\n    ")

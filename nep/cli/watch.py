@@ -153,7 +153,7 @@ class _JsonEventPrinter:
 
 
 class _AlarmRunner:
-    """Evaluates alarms with one node: subscribes, polls the graph and runs actions."""
+    """Runner of alarms that subscribes to topics, polls the graph and executes actions with one node."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""BadRequests: counts malformed requests per sender, logs them, and reports them as alerts."""
+"""Malformed requests to the master: counts per sender, log messages and alerts."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ _logger = logging.getLogger("nep.master")
 _LOG_BURST, _LOG_RATE_HZ = 10.0, 0.2
 """Burst and rate (per second) of log lines. Limited, because each connection may be another sender."""
 _MAX_SENDERS = 100
-"""Maximum number of senders; beyond it the sender that was inactive for longest is evicted."""
+"""Maximum number of senders.
+
+When it is exceeded, the sender that has been inactive for longest is evicted.
+"""
 _MAX_ALERTS = 5
-"""Maximum number of senders that get an alert each; the others share one."""
+"""Maximum number of senders with a separate alert; all other senders share one alert."""
 _ALERT_DURATION_S = 10.0
 """Duration of an alert in seconds after the newest malformed request."""
 _ALERT_INTERVAL_S = 1.0
@@ -39,7 +42,10 @@ class _Sender:
 
 
 class BadRequests:
-    """Malformed requests by sender. Only for the master's thread. `now` is a monotonic time in seconds."""
+    """Counter of malformed requests by sender. Not thread-safe; used only by the master's thread.
+
+    All times (`now`) are monotonic, in seconds.
+    """
 
     def __init__(self) -> None:
         self._senders: OrderedDict[str, _Sender] = OrderedDict()
@@ -48,12 +54,12 @@ class BadRequests:
         self._log_tokens, self._refilled_at = _LOG_BURST, 0.0
 
     def add(self, sender: str, name: str, reason: str, now: float) -> None:
-        """Count a malformed request, and log the first, tenth, … of each sender.
+        """Count a malformed request; log the first, tenth, hundredth, … of each sender.
 
         Args:
-            sender: Key of the sender.
+            sender: Key of the sender, as returned by `describe_sender`.
             name: Name of the sender in messages.
-            reason: What is wrong with the request.
+            reason: Reason why the request is malformed.
             now: Current time.
         """
         known = self._senders.pop(sender, None) or _Sender(name)
@@ -69,7 +75,10 @@ class BadRequests:
             self._senders.popitem(last=False)
 
     def alerts(self, now: float) -> tuple[Alert, ...]:
-        """Return an alert for each of the newest senders, and one for all others. Updated once per second."""
+        """Return one alert for each of the most recent senders, and one for all others.
+
+        The result is updated once per second.
+        """
         if (self._senders or self._alerts) and now >= self._alerts_at + _ALERT_INTERVAL_S:
             self._alerts_at = now
             self._alerts = self._current_alerts(now)
@@ -97,8 +106,13 @@ class BadRequests:
 def describe_sender(node_id: str, node_name: str, peer: str) -> tuple[str, str]:
     """Return the key by which a sender's requests are counted, and the sender's name in messages.
 
-    Connections that speak for a node (`node_id`) are counted by node. Others are counted by computer
-    (`peer`), because each connection would be another sender.
+    Requests of a registered node are counted by node. Other requests are counted by computer, because
+    every new connection would otherwise be a new sender.
+
+    Args:
+        node_id: Id of the node that sent the request, or "" if unknown.
+        node_name: Name of the node.
+        peer: Host of the sender, or "" if unknown.
     """
     if node_id:
         return node_id, f"“{node_name}”"

@@ -9,14 +9,21 @@ from nep.masters.registry import NodeClock, RegisteredNode, Registry
 from nep.messages.clocks import drift_ns, is_clock
 
 ClockDifferences = dict[str, tuple[int, int]]
-"""Clock differences by node id: offset to add to its times for the receiver's clock, and uncertainty (ns)."""
+"""Clock differences by node id: (offset, uncertainty) in nanoseconds.
+
+The offset is added to a time of that node to get a time of the receiver's clock.
+"""
 _MASTER_CLOCK = NodeClock(0, 0, None)
 
 
 class Clocks:
-    """Clocks of the nodes in `registry`.
+    """Clock offsets of the nodes in a registry.
 
-    `computer` is the id of the master's computer, or "" if unknown. `now` is a monotonic time in seconds.
+    All times (`now`) are monotonic, in seconds.
+
+    Args:
+        registry: Registry of the nodes.
+        computer: Id of the master's computer, or "" if unknown.
     """
 
     def __init__(self, registry: Registry, computer: str) -> None:
@@ -24,7 +31,7 @@ class Clocks:
         self._computer = computer
 
     def is_local(self, member: RegisteredNode) -> bool:
-        """Return True if the node shares the master's clock."""
+        """Return True if the node runs on the master's computer and so shares its clock."""
         return bool(self._computer) and member.node.computer == self._computer
 
     def store(self, member: RegisteredNode, clock: tuple[int, ...] | None, now: float) -> None:
@@ -32,8 +39,8 @@ class Clocks:
 
         Args:
             member: The node.
-            clock: Offset and uncertainty; empty if unknown yet, None if the node doesn't compare clocks.
-                Implausible values count as unknown.
+            clock: Offset and uncertainty in nanoseconds; empty if not measured yet, None if the node
+                doesn't compare clocks. Implausible values are treated as unknown.
             now: Current time.
         """
         if clock is not None and self.is_local(member):
@@ -58,7 +65,16 @@ class Clocks:
     def renewal_timestamps(
         self, member: RegisteredNode, received_ns: int, wall: Callable[[], int] | None = None
     ) -> tuple[int, ...]:
-        """Return the receipt and reply time of a renewal; empty for nodes that share the master's clock."""
+        """Return the times to include in the reply to a renewal, with which the node compares its clock.
+
+        Args:
+            member: The node.
+            received_ns: Time at which the renewal was received, in nanoseconds since 1970.
+            wall: Returns the current time in nanoseconds since 1970. Default: `time.time_ns`.
+
+        Returns:
+            Times of receipt and reply; empty if the node shares the master's clock.
+        """
         return () if self.is_local(member) else (received_ns, (wall or time.time_ns)())
 
 

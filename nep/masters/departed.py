@@ -1,4 +1,4 @@
-"""Departed: recently unregistered publishers, for subscribers that were disconnected at that time.
+"""Recently unregistered publishers, for subscribers that were disconnected when they unregistered.
 
 Such a subscriber counts lost messages from the last sequence numbers of these publishers.
 """
@@ -11,15 +11,16 @@ from typing import Generic, TypeVar
 _RETENTION_S = 60.0
 _MAX_PUBLISHERS = 1000
 _MAX_PER_TOPIC = 64
-"""Maximum number per topic; a program that restarts repeatedly leaves a publisher behind each time."""
+"""Maximum number of publishers per topic. A program that restarts repeatedly adds one each time."""
 
 P = TypeVar("P")
 
 
 class DepartedPublishers(Generic[P]):
-    """Publishers that were unregistered within the last minute, limited in number. Has no clock.
+    """Publishers that were unregistered within the last minute, limited in number.
 
-    They are stored under their topic and under the patterns that matched it.
+    Each publisher is stored under its topic and under the patterns that matched the topic. The time
+    is passed to `tick`.
     """
 
     def __init__(self) -> None:
@@ -35,11 +36,17 @@ class DepartedPublishers(Generic[P]):
         return publisher in self._names
 
     def for_topic(self, topic: str) -> dict[int, P]:
-        """Return the publishers of a topic or pattern by id. Read-only."""
+        """Return the stored publishers of a topic or pattern by id. The result must not be modified."""
         return self._by_name.get(topic, {})
 
     def add(self, names: Iterable[str], publisher: int, what: P) -> None:
-        """Add an unregistered publisher under its topic and the patterns that matched it (`names`)."""
+        """Add an unregistered publisher.
+
+        Args:
+            names: Topic of the publisher and the patterns that matched the topic.
+            publisher: Id of the publisher.
+            what: Value to store for the publisher.
+        """
         self._remove(publisher)
         self._names[publisher] = frozenset(names)
         for name in self._names[publisher]:
@@ -51,7 +58,7 @@ class DepartedPublishers(Generic[P]):
             self._remove(next(iter(self._names)))
 
     def tick(self, now: float) -> None:
-        """Remove expired publishers."""
+        """Remove expired publishers. `now` is a monotonic time in seconds."""
         for publisher in self._names:
             self._expires_at.setdefault(publisher, now + _RETENTION_S)
         for publisher in [each for each, end in self._expires_at.items() if end <= now]:

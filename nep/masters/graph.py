@@ -1,13 +1,13 @@
-"""Graph: state of the master, without sockets or clocks.
+"""State of the master as a graph of nodes. Performs no I/O and reads no clock.
 
     apply(request, call, now, sender) -> messages to send, in this order (pushes first, then the reply)
     tick(now)                         -> messages to send after expired leases and the end of learning
-    drop(node ids)                    -> messages to send because the connections of these nodes are lost
+    drop(node ids)                    -> messages to send because connections of nodes are lost
     view()                            -> GraphView
 
-A master that has just started is *learning*: for `learn_s` seconds, nodes of a previous master rejoin, and
-requests of new publishers and subscribers wait, so that their replies are complete. `now` is a monotonic time
-in seconds.
+A master that has just started is *learning*: for `learn_s` seconds, nodes of a previous master rejoin,
+and requests of new publishers and subscribers wait, so that their replies are complete. `now` is a
+monotonic time in seconds.
 """
 
 from __future__ import annotations
@@ -72,7 +72,13 @@ _MAX_WAITING = 10_000
 
 
 class Outgoing(NamedTuple):
-    """Message to send: a push to the node `to` (`call` is None), or the reply to `call` of a connection."""
+    """Message to send: a push to a node, or the reply to a request.
+
+    Attributes:
+        to: Id of the node for a push; connection of the request for a reply.
+        answer: Content of the message.
+        call: Number of the request, or None for a push.
+    """
 
     to: str
     body: Reply | Push
@@ -80,7 +86,7 @@ class Outgoing(NamedTuple):
 
 
 def without_nodes(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Push:
-    """Return an answer without these nodes, which turned out to be dead."""
+    """Return a copy of an answer that doesn't contain the given nodes, which have turned out to be dead."""
     if isinstance(answer, Found) and node_ids:
         return replace(
             answer, publishers=tuple(each for each in answer.publishers if each.node_id not in node_ids)
@@ -95,7 +101,7 @@ def without_nodes(answer: Reply | Push, node_ids: frozenset[str]) -> Reply | Pus
 
 
 def with_hosts(answer: Reply | Push, hosts: tuple[str, ...]) -> Reply | Push:
-    """Return an answer with the addresses at which the master serves other computers."""
+    """Return a copy of an answer that contains the addresses at which the master serves other computers."""
     if not hosts:
         return answer
     if isinstance(answer, Added | Found | Renewed):
@@ -147,8 +153,8 @@ class Graph:
             call: Number of the request.
             now: Current time.
             sender: Connection of the request.
-            is_foreign: True if another program sent the request; it may speak only for its own node. See
-                `nep.masters.registry`.
+            is_foreign: True if another program sent the request; such a program may only change its own
+                node. See `nep.masters.registry`.
         """
         out: list[Outgoing] = []
         try:
@@ -180,18 +186,18 @@ class Graph:
 
     @property
     def learning_end(self) -> float | None:
-        """Time at which `tick` must be called for the waiting requests, or None if none wait."""
+        """Time at which `tick` must be called to execute waiting requests, or None if no request waits."""
         return self._learning_until if self._waiting else None
 
     def probes_for_overdue(self, now: float) -> tuple[Outgoing, ...]:
-        """Return probes for nodes that have missed a renewal.
+        """Return probe messages for nodes that have missed a renewal.
 
-        If a probe can't be sent, its node is dead.
+        A node to which its probe can't be sent is dead.
         """
         return self.probes_for(self._leases.overdue(now))
 
     def probes_for(self, node_ids: Iterable[str]) -> tuple[Outgoing, ...]:
-        """Return probes for those of these nodes that are registered."""
+        """Return probe messages for the given nodes; unregistered ones are ignored."""
         probe = Probe(self.epoch, self.revision)
         return tuple(Outgoing(node_id, probe) for node_id in node_ids if node_id in self._registry.members)
 
@@ -209,9 +215,15 @@ class Graph:
         return self._viewer.view(self.epoch)
 
     def renew_fast(self, renewal: RawRenewal, now: float, sender: str) -> dict[int, int] | None:
-        """Handle a usual renewal of `sender`; return the newest sequence numbers by publisher id.
+        """Handle a renewal of the usual form; return the newest sequence numbers by publisher id.
 
-        Returns None if `apply` must handle the renewal; it may then have been handled in part.
+        Returns None if the renewal must be passed to `apply`; a part of its statistics may be stored by
+        then.
+
+        Args:
+            renewal: Parsed renewal.
+            now: Current time.
+            sender: Connection of the request.
         """
         if renewal.revision < self._registry.publishers_revision:
             return None
@@ -222,7 +234,7 @@ class Graph:
         return self._registry.last_seqs(member)
 
     def node_at(self, route: str) -> RegisteredNode | None:
-        """Return the node that a connection speaks for."""
+        """Return the node that registered over the connection `route`, or None."""
         return self._registry.speaking.get(route)
 
     # ---- authorization

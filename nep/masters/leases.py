@@ -1,7 +1,7 @@
 """Leases: renewal schedule, and nodes whose renewal is late or whose lease has expired.
 
-Usual renewals, which every node sends every second, are parsed and answered without creating request objects
-(`RawRenewal`). Others take the general path, which reports errors.
+Renewals of the usual form, which every node sends every second, are parsed and answered without
+creating request objects (`RawRenewal`). All others take the general path, which reports errors.
 """
 
 from __future__ import annotations
@@ -22,7 +22,11 @@ _MAX_RENEWALS_PER_S = 125
 _MAX_RENEW_S = 5.0
 """Maximum renewal interval in seconds."""
 _SLOT_S = 0.1
-"""Width of a slot in seconds. Renewals with longer intervals are grouped, because wake-ups cost most."""
+"""Width of a time slot in seconds.
+
+In large graphs, renewals are scheduled in slots, because waking up the master costs more than a
+renewal.
+"""
 
 _RENEWAL_PREFIX = b"\x83\xa2do\xa5renew"
 """First bytes of renewals sent by nep. Other implementations may order the fields differently."""
@@ -30,7 +34,12 @@ _SMALL_BYTES, _MAX_LISTS = 4096, 20_000
 
 
 class Leases:
-    """Leases of the nodes in `registry`, except managed nodes, whose manager reports their end."""
+    """Leases of registered nodes, except managed nodes, whose end is reported by the gateway.
+
+    Args:
+        registry: Registry of the nodes.
+        lease_s: Silence in seconds after which a node that renews every second is unregistered.
+    """
 
     def __init__(self, registry: Registry, lease_s: float) -> None:
         self._registry = registry
@@ -43,7 +52,7 @@ class Leases:
         """Number of nodes per future slot."""
 
     def set_renew_interval(self, now: float) -> None:
-        """Compute the renewal interval. Each node gets it in the reply to its next renewal."""
+        """Compute the renewal interval, which each node receives with the reply to its next renewal."""
         self._slots = {slot: count for slot, count in self._slots.items() if slot * _SLOT_S > now}
         if self._paced_revision == self._registry.revision:
             return
@@ -92,7 +101,10 @@ class Leases:
 
 
 class RawRenewal(NamedTuple):
-    """Received renewal; `publishers` and `subscribers` are validated only as being lists."""
+    """Parsed renewal of the usual form.
+
+    `publishers` and `subscribers` are lists, but their items are not validated.
+    """
 
     call: int
     node_id: str
@@ -105,12 +117,12 @@ class RawRenewal(NamedTuple):
 
 
 def is_renewal(body: bytes) -> bool:
-    """Return True if `read_renewal` can probably parse a body, because it begins like a renewal of nep."""
+    """Return True if a body begins like a renewal of nep, so that `read_renewal` can probably parse it."""
     return body.startswith(_RENEWAL_PREFIX)
 
 
 def read_renewal(body: bytes) -> RawRenewal | None:
-    """Parse a usual renewal; return None for anything else."""
+    """Parse a renewal of the usual form; return None for any other body."""
     if not body.startswith(_RENEWAL_PREFIX):
         return None
     try:
@@ -159,7 +171,18 @@ def encode_renewed(
     times: tuple[int, ...] = (),
     clocks: Mapping[str, tuple[int, int]] | None = None,
 ) -> bytes:
-    """Encode a `Renewed` reply without changed topics."""
+    """Encode a `Renewed` reply without changed topics.
+
+    Args:
+        call: Number of the request.
+        epoch: Epoch of the master.
+        revision: Revision of the graph.
+        last_seqs: Newest sequence numbers by publisher id.
+        hosts: Addresses at which the master serves other computers.
+        next_s: Seconds until the next renewal.
+        times: Times of receipt and reply, as returned by `Clocks.renewal_timestamps`.
+        clocks: Clock differences, as returned by `Clocks.differences`.
+    """
     what: dict[str, object] = {"epoch": epoch, "revision": revision}
     if last_seqs:
         what["last_seqs"] = last_seqs

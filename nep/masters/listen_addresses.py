@@ -1,4 +1,4 @@
-"""ListenAddresses: addresses besides loopback at which a master serves other computers."""
+"""Addresses besides loopback at which a master serves other computers."""
 
 from __future__ import annotations
 
@@ -73,10 +73,10 @@ class ListenAddresses:
         return tuple(endpoint_of(f"{host}:{self._port}") for host in self._bound)
 
     def serve(self, hosts: Iterable[str]) -> None:
-        """Bind to these addresses and no others.
+        """Bind to exactly these addresses; release all others.
 
-        Raises `NepError` for an address that doesn't belong to this computer, and `AddressInUseError` for a
-        port in use; nothing is changed then.
+        Raises `NepError` for an address that doesn't belong to this computer, and `AddressInUseError`
+        for a port in use. If it raises, the bindings are unchanged.
         """
         addresses = self._list_addresses()
         chosen = check_hosts(hosts, addresses)
@@ -94,7 +94,7 @@ class ListenAddresses:
             self._unbind(host)
 
     def refresh(self) -> tuple[Alert, ...]:
-        """Bind to this computer's current addresses; return alerts for addresses that disappeared."""
+        """Update the bindings to the computer's current addresses; return alerts for missing addresses."""
         if not self.hosts:
             return ()
         addresses = self._list_addresses()

@@ -33,7 +33,10 @@ class Attachment(Protocol):
     """Component that runs with a master, such as the gateway. Its methods must return quickly."""
 
     def start(self, master: Master) -> None:
-        """Start the component. The master replies only to `submit` yet; an exception aborts its start."""
+        """Start the component. An exception aborts the start of the master.
+
+        The master already executes `Master.submit`, but doesn't reply to other programs yet.
+        """
 
     def changed(self, view: GraphView) -> None:
         """Handle a change of the graph. Called in the master's thread; must return immediately."""

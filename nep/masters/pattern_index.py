@@ -1,7 +1,8 @@
-"""PatternIndex: subscribers with patterns, and the published topics that match each pattern.
+"""Index of subscribers with patterns, and of the published topics that match each pattern.
 
-A topic is matched against every pattern when its first publisher is added; a pattern is matched against every
-topic when its first subscriber is added. The numbers of both are limited, and the results are cached.
+A topic is matched against every pattern when its first publisher is added; a pattern is matched against
+every topic when its first subscriber is added. The numbers of both are limited, and the results are
+cached.
 """
 
 from __future__ import annotations

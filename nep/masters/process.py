@@ -32,11 +32,11 @@ _RETRY_S = 0.5
 _MAX_REQUEST_S = 4.0
 
 NO_CONSOLE: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-"""`creationflags` for subprocesses. Without it Windows opens a console window for each of them."""
+"""`creationflags` with which Windows doesn't open a console window for a subprocess; 0 on other systems."""
 
 
 class Owner:
-    """Process that started a master. Identified by pid and start time, because the system reuses pids."""
+    """Process that started a master, identified by pid and start time because the system reuses pids."""
 
     def __init__(self, pid: int) -> None:
         self.pid = pid

@@ -1,4 +1,4 @@
-"""Meter: rate of a counter that is sampled at irregular intervals."""
+"""Message and byte rates from counters that are sampled at irregular intervals."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _MIN_SPAN_S = 0.5
 
 
 class Meter:
-    """Messages and bytes per second, computed from increasing counters.
+    """Calculator of messages and bytes per second from increasing counters.
 
-    The window covers ten messages, but at most ten seconds, so that fast topics show changes immediately and
-    the rates of slow topics don't flicker.
+    The window covers ten messages, but at most ten seconds, so that fast topics show changes
+    immediately and the rates of slow topics don't flicker.
     """
 
     def __init__(self) -> None:

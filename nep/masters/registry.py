@@ -37,7 +37,7 @@ RECORDS_MAX = 5_000
 ALL_RECORDS_MAX = 20_000
 """Maximum number of publishers and subscribers of all nodes."""
 GUARANTEED_RECORDS = 100
-"""Number of publishers and subscribers that every node may have even if the limit of all nodes is reached."""
+"""Number of publishers and subscribers allowed per node even if the limit for all nodes is reached."""
 _ENDPOINTS_MAX = 32
 _PID_MAX = 2**32 - 1
 _NODE_ID = re.compile("[0-9a-f]{16}")
@@ -47,12 +47,12 @@ _ENDPOINT = re.compile(
 _NANOMSG_ENDPOINT = re.compile(r"nanomsg://[A-Za-z0-9._-]{1,253}:(\d{1,5})/(\d{1,5})", re.ASCII)
 
 _MAX_HUNG = 100
-"""Maximum number of nodes recorded per node whose publishers it did not answer."""
+"""Maximum number of ids in `RegisteredNode.hung_for`."""
 _MAX_CORES = 100_000.0
 _MAX_PROBLEM_LENGTH = 500
 """Maximum length in characters of a problem that a node reports."""
 RATE_DECAY_S = 12.0
-"""Time in seconds after a publisher's last message in which its rate may still fall."""
+"""Time in seconds after a publisher's last message during which its rate is still updated."""
 Counts = Sequence[Mapping[str, Any]]
 """Received statistics, with the fields of `PublisherCount` or `SubscriberCount`."""
 
@@ -83,9 +83,13 @@ class RegisteredSubscriber:
 
 
 class NodeClock(NamedTuple):
-    """Clock of a node: offset to the master's clock and its uncertainty (ns), and the time of the report.
+    """Clock of a node.
 
-    The time is None for nodes that share the master's clock, which can't drift.
+    Attributes:
+        offset_ns: Nanoseconds to add to a time of the node's clock to get a time of the master's clock.
+        uncertainty_ns: Uncertainty (±) of the offset when it was reported.
+        reported_at: Time of the report (s, monotonic); None for nodes that share the master's clock,
+            which can't drift.
     """
 
     offset_ns: int
@@ -100,16 +104,16 @@ class RegisteredNode:
     Attributes:
         node: Record of the node.
         renewed_at: Time of the last renewal.
-        renew_s: Requested seconds from the last to the next renewal.
-        is_managed: True for nodes without a lease, which an attachment manages.
-        route: Connection that speaks for the node; "" for nodes of attachments.
+        renew_s: Requested interval in seconds between the last and the next renewal.
+        is_managed: True for a node without a lease, whose end an attachment reports.
+        route: Connection over which the node sends requests; "" for nodes of attachments.
         publishers: Publishers by id.
         subscribers: Subscribers by id.
-        hung: Ids of the nodes whose publishers this node did not answer.
-        cpu_ratio: CPU usage of its process (1.0 is one core), or None if unknown.
-        heard: Publishers that its subscribers receive, cached by `Registry.sources_of`.
-        sources_version: Version of `heard` and `far`.
-        far: Nodes of these publishers, except those known to be on the same computer.
+        hung_for: Ids of nodes to whose publishers this node's subscribers did not connect.
+        cpu_ratio: CPU usage of the node's process (1.0 is one core), or None if unknown.
+        heard: Publishers that the node's subscribers receive, cached by `Registry.sources_of`.
+        sources_version: Version of `heard` and `remote_nodes`.
+        remote_nodes: Nodes of the publishers in `heard`, except those known to be on the same computer.
         clock: Clock of the node, or None if unknown.
     """
 
@@ -202,11 +206,14 @@ class Registry:
         return RemotePublisher(record, member.node.id, member.node.name, member.node.computer)
 
     def topic_revision(self, topic: str) -> int:
-        """Return the revision of the last change of a topic's publishers."""
+        """Return the revision of the graph at which a topic's publishers last changed."""
         return self._topic_revisions.get(topic, 0)
 
     def sources_of(self, member: RegisteredNode) -> dict[int, RegisteredPublisher]:
-        """Return the publishers to which the node's subscribers can connect, also recently closed ones."""
+        """Return the publishers that a node's subscribers can connect to, by id.
+
+        Recently unregistered publishers are included.
+        """
         version = self.revision + self.departed.changes
         if member.sources_version != version:
             member.sources_version = version
@@ -231,12 +238,15 @@ class Registry:
         return member.sources
 
     def remote_nodes_of(self, member: RegisteredNode) -> tuple[RegisteredNode, ...]:
-        """Return the nodes of `sources_of` that are not known to be on the same computer."""
+        """Return the nodes of the publishers in `sources_of`.
+
+        Nodes that are known to be on the same computer are omitted.
+        """
         self.sources_of(member)
         return member.remote_nodes
 
     def last_seqs(self, member: RegisteredNode) -> dict[int, int]:
-        """Return the newest sequence number of each publisher of `sources_of`, by publisher id.
+        """Return the newest sequence number of each publisher in `sources_of`, by publisher id.
 
         Includes recently unregistered publishers, because the node may have been disconnected when they
         closed.
@@ -246,7 +256,13 @@ class Registry:
     # ---- changing
 
     def add_node(self, node: NodeRecord, now: float, *, is_managed: bool | None = None) -> RegisteredNode:
-        """Register a node if needed, renew its lease, and return it."""
+        """Register a node or update its record, renew its lease, and return the registered node.
+
+        Args:
+            node: Record of the node.
+            now: Current time (s, monotonic).
+            is_managed: True for a node without a lease; None leaves the value unchanged.
+        """
         member = self.members.get(node.id)
         if member is None:
             member = self.members[node.id] = RegisteredNode(node, now)
@@ -260,7 +276,7 @@ class Registry:
         return member
 
     def bind(self, member: RegisteredNode, route: str) -> None:
-        """Set the connection that speaks for a node."""
+        """Set the connection over which a node sends requests; "" for none."""
         if member.route != route:
             self._unbind(member)
             member.route = route
@@ -357,8 +373,16 @@ class Registry:
     ) -> bool:
         """Store a node's statistics and renew its lease. Numbers out of range are clamped.
 
-        The maps have the fields of `PublisherCount` and `SubscriberCount` and are not validated. Returns
-        False if they don't match the registrations or types; some of them may have been stored then.
+        Args:
+            member: The node.
+            publisher_counts: Received maps with the fields of `PublisherCount`; need not be valid.
+            subscriber_counts: Received maps with the fields of `SubscriberCount`; need not be valid.
+            now: Current time (s, monotonic).
+            cpu_ratio: CPU usage of the node's process (1.0 is one core), or None if unknown.
+
+        Returns:
+            False if the maps are invalid or don't match the registrations; some may have been stored by
+                then.
         """
         try:
             publishers, subscribers = member.publishers, member.subscribers
@@ -409,7 +433,7 @@ class Registry:
         publisher.last_stamp_ns = None if last_stamp_ns is None else as_count(last_stamp_ns)
 
     def update_problem(self, publisher: RegisteredPublisher, problem: str) -> None:
-        """Store the problem that a publisher reports; "" when it is solved."""
+        """Store the problem that a publisher reports, or "" if the problem is solved."""
         publisher.problem = escaped(shortened(problem, _MAX_PROBLEM_LENGTH)) if problem else ""
         self.touched.add(publisher.record.topic)
 
@@ -426,7 +450,15 @@ class Registry:
             subscriber.received, subscriber.lost, subscriber.problem = received, lost, problem
 
     def report_missing(self, node_id: str, publisher: int, subscribers: Iterable[int]) -> None:
-        """Record that subscribers did not connect to a publisher; cleared by their next renewal."""
+        """Record that subscribers did not connect to a publisher.
+
+        Each subscriber's next renewal clears the record.
+
+        Args:
+            node_id: Node of the publisher.
+            publisher: Id of the publisher.
+            subscribers: Ids of the subscribers.
+        """
         reporter = self.members.get(node_id)
         known = reporter.publishers.get(publisher) if reporter else None
         if reporter is None or known is None:
@@ -437,7 +469,7 @@ class Registry:
                 member.hung_for.add(reporter.node.id)
 
     def report_alerts(self, source: str, alerts: tuple[Alert, ...]) -> None:
-        """Replace the alerts of `source`."""
+        """Replace the alerts that the attachment `source` reports."""
         if self._reported.get(source, ()) != alerts:
             self._reported[source] = alerts
             self.revision += 1
@@ -507,7 +539,7 @@ def records_of(
 
 
 def check_record(record: PublisherRecord | SubscriberRecord) -> None:
-    """Raise `WireError` for an invalid topic."""
+    """Raise `WireError` if the topic of a publisher or subscriber is invalid."""
     try:
         check_topic(record.topic)
     except NepError as error:

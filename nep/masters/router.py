@@ -1,4 +1,4 @@
-"""MasterRouter: ROUTER socket of the master. Only for the master's thread."""
+"""ROUTER socket of the master. Not thread-safe; used only by the master's thread."""
 
 from __future__ import annotations
 
@@ -26,13 +26,15 @@ _RECONNECT_S = 0.5
 """Time in seconds in which a disconnected node may reconnect before it is probed."""
 _SRCFD = int(zmq.SRCFD)
 _EVENT = struct.Struct("=HI")
-"""Monitor event of libzmq: kind of event and number of the connection."""
+"""Layout of a monitor event of libzmq: kind of event, and number of the connection."""
 
 
 class MasterRouter:
-    """ROUTER socket that receives requests, sends bodies and detects closed connections.
+    """ROUTER socket that receives requests, sends replies and pushes, and detects closed connections.
 
-    Raises `AddressInUseError` if `address` can't be bound, and `TooManyFilesError`.
+    Raises:
+        AddressInUseError: The address can't be bound.
+        TooManyFilesError: The process has too many open files.
     """
 
     def __init__(self, address: str) -> None:
@@ -71,7 +73,10 @@ class MasterRouter:
         """Large bodies in flight by sender."""
 
     def receive(self) -> list[bytes]:
-        """Return the parts of a request, the sender first. Raises `zmq.Again` if there is none."""
+        """Return the frames of the next request, the sender's id first.
+
+        Raises `zmq.Again` if there is none.
+        """
         recv = self.socket.recv
         frames = [recv(_DONTWAIT, False)]
         while frames[-1].more:
@@ -100,7 +105,10 @@ class MasterRouter:
             self._senders[connection] = sender
 
     def take_ended_senders(self, now: float) -> list[bytes]:
-        """Return the senders whose connection has just ended, each once. They may have reconnected."""
+        """Return the ids of senders whose connection has closed, each once.
+
+        A sender may have reconnected since.
+        """
         sent = [each for each, unread in self._unread.items() if all(one.done for one, _size in unread)]
         for route in sent:
             del self._unread[route]
@@ -120,7 +128,8 @@ class MasterRouter:
     def send(self, to: bytes, body: bytes) -> bool:
         """Send a body; return False if the receiver has no connection.
 
-        Large bodies are dropped while more than `UNREAD_MAX_BYTES` of them are unread.
+        A large body is dropped while the receiver has more than `UNREAD_MAX_BYTES` of unread large
+        bodies.
         """
         try:
             if len(body) < _LARGE_BODY_BYTES:

@@ -1,4 +1,4 @@
-"""MasterServer: the master's thread, which reads requests and sends replies and pushes."""
+"""The master's thread, which reads requests and sends replies and pushes."""
 
 from __future__ import annotations
 
@@ -45,15 +45,18 @@ _MIN_SUSPENSION_S = 1.0
 """Pause in seconds (suspended computer, large request) after which the next tick expires no node."""
 _MAX_COLLECT_MS = 10
 _NODES_PER_MS = 50
-"""Number of nodes per millisecond for which renewals are collected, up to `_MAX_COLLECT_MS`."""
+"""Number of nodes for each millisecond in which renewals are collected, up to `_MAX_COLLECT_MS`."""
 _ADDRESS_CHECK_S = 2.0
 """Interval in seconds for checking this computer's addresses while other computers are served."""
 
 
 class Submission:
-    """Request of the master's own process.
+    """Request that the master's own process submits.
 
-    `done` is set when the reply was stored, or without a reply when the master stops.
+    Attributes:
+        request: The request.
+        done: Set when the reply is available, or when the master stops without a reply.
+        reply: The reply, or None.
     """
 
     def __init__(self, request: Request) -> None:
@@ -63,9 +66,16 @@ class Submission:
 
 
 class MasterServer:
-    """Server thread of a master. `listeners` are called with every new revision of the graph.
+    """Server thread of a master.
 
-    Raises `AddressInUseError` if `address` can't be bound.
+    Args:
+        address: Address to bind.
+        graph: State of the master.
+        listeners: Functions called with every new snapshot of the graph, in the server thread.
+        owner: Process with which the master stops, or None.
+
+    Raises:
+        AddressInUseError: The address can't be bound.
     """
 
     def __init__(

@@ -27,7 +27,7 @@ _MAX_NAMES = 5
 
 
 class GraphViewer:
-    """Creates snapshots of `registry`. Unchanged parts are the same objects as in the previous snapshot."""
+    """Factory of graph snapshots. Unchanged parts are the same objects as in the previous snapshot."""
 
     def __init__(self, registry: Registry) -> None:
         self._registry = registry
@@ -37,7 +37,7 @@ class GraphViewer:
         self._alerts: dict[str, tuple[Alert, ...]] = {}
 
     def view(self, epoch: int) -> GraphView:
-        """Return a snapshot of the registry."""
+        """Return a snapshot of the registry for the master's `epoch`."""
         registry, touched = self._registry, self._registry.touched
         names: list[str] = []
         served: list[str] = []

@@ -28,9 +28,10 @@ class ClockDifference:
     """Difference between the clock of another computer and this one.
 
     Attributes:
-        add_ns: Added to a time of the other computer, it gives a time of this computer.
-        uncertainty_ns: Uncertainty at the time `known_at_ns`.
-        known_at_ns: Time of the comparison (`time.monotonic_ns`), or None for one and the same clock.
+        offset_ns: Nanoseconds to add to a time of the other computer to get a time of this computer.
+        uncertainty_ns: Uncertainty at the time `measured_at_ns`.
+        measured_at_ns: Time of the comparison (`time.monotonic_ns`), or None if both computers are the
+            same.
     """
 
     offset_ns: int
@@ -59,7 +60,8 @@ class PublisherClock:
     def seconds(self) -> tuple[float, float] | None:
         """Return (offset, uncertainty) in seconds, or None if unknown.
 
-        The offset is added to a time of the publisher; the uncertainty is ±.
+        The offset is to be added to a time of the publisher; the error is at most the uncertainty in
+        either direction.
         """
         known = self.difference
         if known is None:

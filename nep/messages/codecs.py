@@ -63,7 +63,10 @@ NAN_WARNING_INTERVAL_S = 10.0
 _logger = logging.getLogger("nep")
 _MAX_DEPTH = 100
 NULL = b"null"
-"""JSON text of None. `rfind` finds it in half the time of `in`, which is slow with many commas and digits."""
+"""JSON text of None.
+
+Search for it with `rfind`, which takes half the time of `in` on data with many commas and digits.
+"""
 _PACKED_NAN = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
 """Pattern of NaN or infinity in msgpack. May also match other data."""
 
@@ -282,7 +285,7 @@ _ALIASES = {"images": IMAGE, "dictionary": JSON, "dict": JSON}
 
 
 def codec(name: str) -> Codec:
-    """Return the codec with a name. Raises `DecodeError` if there is none."""
+    """Return the codec called `name`. Raises `DecodeError` if there is none."""
     try:
         return CODECS[name]
     except KeyError:
@@ -292,14 +295,15 @@ def codec(name: str) -> Codec:
 
 
 def codec_by_number(number: int) -> Codec | None:
-    """Return the codec with a number, or None if this version has none."""
+    """Return the codec with the number `number` on the wire, or None if this version of nep has none."""
     return _CODECS_BY_NUMBER.get(number)
 
 
 def fast_encoder(codec: Codec) -> Callable[[Any], bytes] | None:
     """Return a faster encoder for common payloads of a codec, or None if there is none.
 
-    It returns the same bytes as `codec.encode`; for other payloads it raises any exception.
+    For common payloads the encoder returns the same bytes as `codec.encode`. For all others it
+    raises an exception of any type; call `codec.encode` then.
     """
     return _FAST_ENCODERS.get(codec.encode)
 
@@ -315,7 +319,8 @@ def codec_for(msg_type: str) -> Codec:
 class JsonEncoder:
     """JSON encoder of one publisher.
 
-    `count` is the number of messages in which NaN or infinity was replaced by `null`.
+    Attributes:
+        count: Number of messages in which NaN or infinity was replaced by `null`.
     """
 
     def __init__(
@@ -343,7 +348,10 @@ class JsonEncoder:
         return encoded_payload
 
     def check_for_nan(self, payload: object) -> None:
-        """Check a payload whose encoding contains `NULL` for NaN and infinity; count and log the message."""
+        """Count and log a message in which NaN or infinity was encoded as `null`.
+
+        Call this for payloads whose encoding contains `NULL`, which may also be the encoding of None.
+        """
         if _may_have_nan(payload) and (where := find_nan(payload)) is not None:
             self.count += 1
             now = self._clock()
@@ -368,7 +376,13 @@ def _may_have_nan(payload: object) -> bool:
 
 
 def find_nan(value: object, path: str = "", depth: int = _MAX_DEPTH) -> str | None:
-    """Return the path of the first NaN or infinity, such as "pose.x" or "joints[3]", or None."""
+    """Return the path of the first NaN or infinity in a payload, or None if there is none.
+
+    Args:
+        value: Payload, or a part of it.
+        path: Path of `value` in the payload, such as "pose.x" or "joints[3]".
+        depth: Maximum number of levels to search.
+    """
     if isinstance(value, float):
         return None if math.isfinite(value) else path
     if value is None or isinstance(value, str | bytes | int) or depth <= 0:

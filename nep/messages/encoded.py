@@ -25,4 +25,4 @@ class Encoded(NamedTuple):
 new_encoded: Callable[[tuple[bytes | memoryview, Mapping[str, object] | None]], Encoded] = partial(
     tuple.__new__, Encoded
 )
-"""Fast constructor of `Encoded`; takes a third of the time. Called for every message."""
+"""Fast constructor of `Encoded`, which takes a third of the time. Called for every message."""

@@ -11,7 +11,7 @@ from nep.text import quotable
 
 Path = tuple[str | int, ...]
 MISSING = object()
-"""Value that `pick` returns for a missing field."""
+"""Value that `value_at` returns for a missing field."""
 
 _STEP = re.compile(r"""\.?(?:\[(-?\d{1,19})\]|\["((?:[^"\\]|\\.)*)"\]|([^.\[\]"]+))""")
 _MAX_DEPTH = 40
@@ -75,7 +75,10 @@ def _format_step(step: str | int) -> str:
 
 
 def leaf_paths(payload: object, most: int = 200) -> Iterator[str]:
-    """Yield the paths of at most `most` scalar values. A value below the depth limit counts as a scalar."""
+    """Yield the paths of at most `most` scalar values.
+
+    A value below the depth limit is treated as a scalar.
+    """
     remaining = [most]
     yield from _leaf_paths(payload, "", remaining, _MAX_DEPTH)
 

@@ -1,4 +1,4 @@
-"""History: newest messages of a publisher for later subscribers, limited in number and bytes."""
+"""Newest messages of a publisher for later subscribers, limited in number and bytes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ T = TypeVar("T")
 
 
 class History(Generic[T]):
-    """Newest messages, oldest first, limited in number and total bytes. The newest is always kept.
+    """Newest messages, oldest first, limited in number and total bytes.
 
-    With a maximum of 0 messages it stays empty. Not thread-safe: guarded by the publisher's lock.
+    The newest is stored whatever its size.
+
+    A history of length 0 stays empty. Not thread-safe: guarded by the publisher's lock.
     """
 
     def __init__(self, max_messages: int, max_bytes: int = MAX_HISTORY_BYTES) -> None:

@@ -182,8 +182,8 @@ def raw_image(payload: object) -> Encoded:
         pub.publish(nep.raw_image(depth))
 
     Args:
-        payload: numpy array (height, width) or (height, width, 1 to 4 channels), colours in BGR order as in
-            OpenCV. It is not copied: publish it before the array changes.
+        payload: numpy array (height, width) or (height, width, 1 to 4 channels), colours in BGR order
+            as in OpenCV. The array is not copied: publish it before you change its values.
 
     Raises:
         EncodeError: The value is not an image, or numpy is not installed.
@@ -220,7 +220,7 @@ def _encode_raw(frame: NDArray[Any]) -> Encoded:
 
 
 def _dtype_name(dtype: np.dtype[Any]) -> str:
-    # Name as in `_NUMBERS`: little-endian, as everything on the wire.
+    # Name as in `_DTYPES`: little-endian, as everything on the wire.
     return dtype.newbyteorder("<").str.removeprefix("|")
 
 
@@ -229,7 +229,7 @@ def _shape(frame: NDArray[Any]) -> list[int]:
 
 
 def check_image(payload: object) -> None:
-    """Raise `EncodeError` if the type, shape or number type of a value is not that of an image."""
+    """Raise `EncodeError` if a value's type, shape or number type is not supported for images."""
     if isinstance(payload, (bytes, bytearray, memoryview)):
         return
     try:
@@ -293,9 +293,14 @@ def decode(data: memoryview, extension: Mapping[str, object]) -> object:
 
 
 def read_file(file: ImageFile, reduced: int = 1) -> NDArray[Any]:
-    """Decode the pixels of a file, rotated upright. A JPEG is scaled down by `reduced` (1, 2, 4 or 8).
+    """Decode the pixels of a file, rotated upright.
 
-    Raises `DecodeError`.
+    Args:
+        file: Examined file.
+        reduced: Factor by which a JPEG is scaled down: 1, 2, 4 or 8.
+
+    Raises:
+        DecodeError: The pixels can't be decoded.
     """
     opencv, np = _opencv(), _numpy()
     if file.kind == "png":
@@ -325,7 +330,7 @@ def _apply_orientation(picture: NDArray[Any], orientation: int) -> NDArray[Any]:
 
 
 def raw_layout(encoding: object) -> RawLayout | None:
-    """Return the layout of an encoding, or None if the encoding is not one of raw pixels."""
+    """Return the pixel layout of an encoding such as "bgr8", or None if `encoding` is not a raw format."""
     if not isinstance(encoding, str):
         return None
     named = _NAMED_LAYOUTS.get(encoding)
@@ -336,7 +341,7 @@ def raw_layout(encoding: object) -> RawLayout | None:
 
 
 def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any]:
-    """Return raw bytes as an array in their original channel order, without a copy. Raises `DecodeError`."""
+    """View raw bytes as an array in their original channel order, without a copy. Raises `DecodeError`."""
     np = _numpy()
     numbers = np.dtype(layout.dtype)
     sides = shape[:2] if isinstance(shape, list | tuple) else ()
@@ -357,7 +362,7 @@ def raw_array(data: memoryview, layout: RawLayout, shape: object) -> NDArray[Any
 
 
 def picture_info(data: bytes | memoryview) -> dict[str, object] | None:
-    """Return the extension of a JPEG or PNG file, from its header; None if `decode` would reject the file."""
+    """Return the message extension for a JPEG or PNG file; None if `decode` would reject the file."""
     try:
         return parse_header(data).extension
     except DecodeError:

@@ -1,7 +1,7 @@
 """Headers and size limits of JPEG and PNG files, checked without decoding.
 
-Call `examine` before decoding a file: a file of a few bytes may declare pixels of several gigabytes, or a
-thousand scans. The format is detected from the bytes, never taken from metadata. Only JPEG and PNG are
+Call `parse_header` before decoding a file: a file of a few bytes may declare pixels of several gigabytes,
+or a thousand scans. The format is detected from the bytes, never taken from metadata. Only JPEG and PNG are
 supported: each decoder of another format would add to the attack surface.
 """
 
@@ -25,7 +25,7 @@ MAX_SCANS = 100
 MAX_SCANNED_PIXELS = 1_200_000_000
 """Maximum number of pixels times number of scans, which limits decoding to a few seconds."""
 MAX_SEGMENTS = 100_000
-"""Maximum number of JPEG segments or PNG chunks. Encoders write them with 8 kB and more."""
+"""Maximum number of JPEG segments or PNG chunks. Encoders write segments of 8 kB and more."""
 
 _JPEG_SIGNATURE = b"\xff\xd8\xff"
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -39,7 +39,7 @@ _FILL_BYTES = re.compile(rb"\xff*")
 _MARKERS_WITHOUT_LENGTH = frozenset({0x01, *range(0xD0, 0xD8)})
 """JPEG markers that have no length field: TEM and RST."""
 _FRAME_MARKERS = {0xC0: False, 0xC1: False, 0xC2: True}
-"""Supported JPEG frame headers; True if progressive. Cameras and browsers use no others."""
+"""Supported JPEG frame markers, and True for progressive ones. Cameras and browsers use no others."""
 _TABLE_MARKERS = frozenset({0xC4, 0xDB, 0xDD, 0xFE, *range(0xE0, 0xF0)})
 _SCAN, _APP1 = 0xDA, 0xE1
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 4, 6: 4}
@@ -79,7 +79,11 @@ class ImageFile:
 
 
 def parse_header(data: bytes | memoryview) -> ImageFile:
-    """Parse the header of a file. Raises `DecodeError` if it is not a valid JPEG or PNG, or is too large."""
+    """Parse the header of a file.
+
+    Raises:
+        DecodeError: The file is not a valid JPEG or PNG, or exceeds a limit.
+    """
     file = data if isinstance(data, bytes) else memoryview(data).cast("B")
     head = bytes(file[:8])
     if head == _PNG_SIGNATURE:
@@ -126,7 +130,7 @@ def check_size(width: int, height: int, pixel_bytes: float, size_bytes: int) -> 
 
 
 class _Reader:
-    """Base class of both file readers."""
+    """Base class of the JPEG and PNG header readers."""
 
     kind: Literal["jpeg", "png"]
 
@@ -145,8 +149,8 @@ class _Reader:
 class _Jpeg(_Reader):
     """Reader of JPEG segments up to the first scan.
 
-    Unusual structures are rejected instead of interpreted: a decoder might interpret them differently, and
-    the decoded size would then differ from the checked one.
+    Unusual structures are rejected, because a decoder might interpret them differently and the decoded
+    size would then differ from the checked size.
     """
 
     kind = "jpeg"

@@ -22,7 +22,13 @@ _JSON_START = re.compile(r'\s*(?:[{["]|-?\d|-?(?:Infinity|NaN)\b|(?:true|false|n
 
 @dataclass(frozen=True, slots=True)
 class JsonFix:
-    """Edit that fixes a syntax error: replace the characters from ``start`` to ``end`` with ``text``."""
+    """Edit that fixes a syntax error.
+
+    Attributes:
+        start: Index of the first character to replace.
+        end: Index after the last character to replace.
+        text: Replacement.
+    """
 
     start: int
     end: int

@@ -15,11 +15,11 @@ from nep.messages.codecs import codec as codec_named
 NO_EXTENSION: Mapping[str, object] = MappingProxyType({})
 UNDECODED = object()
 new_message = object.__new__
-"""Fast constructor that skips `__init__`, for creating messages at high rates. See `arrived`."""
+"""Fast constructor that skips `__init__`, for creating messages at high rates. See `received_message`."""
 
 
 class MessageKind(NamedTuple):
-    """Properties shared by all messages of one publisher. Created by `kind_of`."""
+    """Properties shared by all messages of one publisher. Created by `message_kind`."""
 
     topic: str
     codec: str
@@ -39,7 +39,7 @@ def message_kind(
 ) -> MessageKind:
     """Return the properties shared by all messages of a publisher.
 
-    An unknown codec raises only when a payload is decoded.
+    An unknown codec is accepted; an exception is raised only when a payload is decoded.
     """
     known = CODECS.get(codec)
     decode = partial(_raise_unknown_codec, codec) if known is None else known.decode
@@ -181,9 +181,16 @@ def received_message(
     publisher: int,
     extension: Mapping[str, object] = NO_EXTENSION,
 ) -> Message:
-    """Create a received message. For back ends.
+    """Create a received message; called by back ends.
 
-    `data` must never change. Reuse `kind` for the messages of a publisher.
+    Args:
+        kind: Properties of the publisher's messages; use the same object for all messages of a
+            publisher.
+        data: Encoded payload. The bytes must never change.
+        stamp_ns: Time of publication by the publisher's clock, in nanoseconds since 1970, or None.
+        seq: Sequence number.
+        publisher: Id of the publisher.
+        extension: Additional header fields.
     """
     message = new_message(Message)
     message.kind = kind

@@ -84,7 +84,8 @@ def _hashable(key: object) -> object:
 def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
     """Decode untrusted msgpack as `unpack` does, with limits. Raises `ValueError`.
 
-    The limits are needed because a million empty lists take a megabyte to send, but seconds to create.
+    Without limits, a message of a megabyte could contain a million empty lists, which take seconds to
+    create.
 
     Args:
         data: Encoded value.
@@ -116,7 +117,7 @@ def unpack_bounded(data: bytes, most_lists: int, longest: int) -> object:
 
 
 def unpack_first(data: bytes) -> object:
-    """Decode the first of several values. Raises `ValueError` if it is incomplete."""
+    """Decode the first of several msgpack values. Raises `ValueError` if the first value is incomplete."""
     unpacker = msgpack.Unpacker(raw=False, strict_map_key=False)
     unpacker.feed(data)
     try:

@@ -1,4 +1,4 @@
-"""Inbox: bounded queue of received messages, and the adaptive batch size of its reader."""
+"""Bounded queue of received messages, and the adaptive batch size of its reader."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Inbox:
     def put(self, message: Message) -> int:
         """Append a message; return the number of dropped messages.
 
-        With the policy "latest" a replaced message does not count.
+        With the policy "latest", a replaced message is not counted as dropped.
         """
         self.messages.append(message)
         self._bytes += message.size_bytes
@@ -47,7 +47,7 @@ class Inbox:
         return dropped
 
     def pop(self) -> Message | None:
-        """Remove and return the oldest message, or None."""
+        """Remove and return the oldest message, or None if the queue is empty."""
         if not self.messages:
             return None
         message = self.messages.popleft()
@@ -55,7 +55,13 @@ class Inbox:
         return message
 
     def move(self, into: deque[Message], most: int, most_bytes: int) -> None:
-        """Move the oldest messages to `into`: at most `most`, until `most_bytes` are reached."""
+        """Move the oldest messages to another queue.
+
+        Args:
+            into: Queue to append to.
+            most: Maximum number of messages.
+            most_bytes: Stop after the message with which this total size is reached.
+        """
         messages = self.messages
         while messages and most > 0 and most_bytes > 0:
             message = messages.popleft()
@@ -66,7 +72,11 @@ class Inbox:
             most -= 1
 
     def pop_all(self, most_bytes: int | None = None) -> list[Message]:
-        """Remove and return all messages, oldest first, until `most_bytes` are reached."""
+        """Remove and return all messages, oldest first.
+
+        Args:
+            most_bytes: Stop after the message with which this total size is reached; None for no limit.
+        """
         if most_bytes is None or self._bytes <= most_bytes:
             messages = list(self.messages)
             self.messages.clear()
@@ -86,7 +96,7 @@ class Inbox:
 class ReadAhead:
     """Adaptive number of messages that a reader reads at once.
 
-    Looking for a message in vain costs time, so only fast readers read ahead.
+    Polling an empty queue costs time, so only fast readers read ahead.
     """
 
     def __init__(self, max_messages: int) -> None:

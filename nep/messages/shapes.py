@@ -1,6 +1,6 @@
 """Value shapes of typed messages: conversion between Python and JSON values, with error paths.
 
-`nep.messages.typed` creates them from annotations.
+`nep.messages.typed` creates shapes from annotations.
 """
 
 from __future__ import annotations
@@ -21,7 +21,12 @@ _MAX_TEXT_LENGTH = 100
 
 
 class ShapeMismatch(Exception):  # noqa: N818 - internal
-    """A value doesn't match its shape. `steps` is the path to the value, innermost first."""
+    """A value doesn't match its shape.
+
+    Attributes:
+        reason: Reason for the mismatch.
+        steps: Steps of the path to the value, innermost first.
+    """
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
@@ -48,8 +53,11 @@ class ShapeMismatch(Exception):  # noqa: N818 - internal
 class ValueShape:
     """Converter for the values of one type.
 
-    `read` converts a JSON value to a Python value, `write` does the reverse; both raise `ShapeMismatch`. Both
-    are set after creation, because a dataclass may have fields of its own type.
+    Attributes:
+        name: Name of the type in error messages.
+        read: Converts a JSON value to a Python value. Raises `ShapeMismatch`. Assigned after creation,
+            because a dataclass may have fields of its own type.
+        write: Converts a Python value to a JSON value. Raises `ShapeMismatch`. Assigned after creation.
     """
 
     __slots__ = ("_describe", "json_types", "name", "read", "unchanged_type", "write")
@@ -78,7 +86,7 @@ class ValueShape:
 
 
 def wrong_type_error(value: object, expected: str) -> ShapeMismatch:
-    """Return the error for a value of a wrong type."""
+    """Return the error for a value of a wrong type; `expected` describes the right one."""
     return ShapeMismatch(
         _("is a '{kind}'; expected {wanted}").format(kind=type(value).__name__, wanted=expected)
     )
@@ -326,7 +334,8 @@ def enum_shape(kind: type[Enum]) -> ValueShape | None:
 def union_shape(shapes: Sequence[ValueShape]) -> ValueShape | None:
     """Return the shape of a Union, or None if two members have the same form in JSON.
 
-    The first matching member is used for reading. None is tried first, because null would otherwise be NaN.
+    Values are read as the first matching member. None is tried first, because float would read null as
+    NaN.
     """
     json_types = [form for each in shapes for form in each.json_types]
     if len(json_types) > len(set(json_types)):

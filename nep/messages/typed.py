@@ -75,10 +75,11 @@ class MessageType:
 def message_type(declared: type) -> MessageType:
     """Return the message type that a dataclass or TypedDict declares.
 
-    Its name is the attribute `MSG_TYPE`, else the name of the class.
+    The name of the message type is the class attribute `MSG_TYPE`, or else the name of the class.
 
     Raises:
-        ValueError: The class is neither, or JSON can't represent the type of a field.
+        ValueError: The class is neither a dataclass nor a TypedDict, or JSON can't represent the type
+            of a field.
     """
     is_map = _is_typed_dict(declared)
     if not is_map and not is_dataclass(declared):
@@ -149,14 +150,17 @@ def typed_codec(declared: MessageType, base: Codec) -> Codec:
 
 
 class TypedReader:
-    """Converts received messages to messages with payloads of a declared type."""
+    """Converter of received messages to messages whose payloads are instances of a declared type."""
 
     def __init__(self, declared: MessageType) -> None:
         self._declared = declared
         self._kinds: tuple[MessageKind, MessageKind] | None = None
 
     def typed(self, message: Message) -> Message:
-        """Return a copy whose payload is decoded to the type at the first access. `message` may be shared."""
+        """Return a copy of `message` whose payload is decoded to the type at the first access.
+
+        `message` is not changed and may be shared.
+        """
         source, kinds = message.kind, self._kinds
         if kinds is None or kinds[0] is not source:
             kinds = self._kinds = (source, source._replace(decode=self._decoder(source.decode)))
@@ -309,7 +313,7 @@ def _hints(declared: type) -> dict[str, Any]:
 
 
 class _FieldEntry(NamedTuple):
-    """Field of a received map."""
+    """Description of one field of a received map."""
 
     name: str
     other_name: str

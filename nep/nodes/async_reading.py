@@ -26,7 +26,8 @@ _MAX_READS_PER_TURN = 64
 class AsyncReader:
     """Reader of one subscriber's messages in an asyncio event loop.
 
-    `poll` returns the next message without waiting, or None.
+    Args:
+        poll: Returns the next message without waiting, or None.
     """
 
     def __init__(self, transport: SubscriberTransport, poll: Callable[[], Message | None]) -> None:

@@ -71,7 +71,7 @@ async def _await_result(returned: object) -> None:
 
 
 class _LoopWaiter:
-    """Waiter of a node that spins in an event loop. Woken by messages, calls and `wake`."""
+    """Waiter of a node that spins in an event loop. Messages, calls and `wake` end the wait."""
 
     def __init__(self, work: Work, loop: asyncio.AbstractEventLoop, waits: LoopWait) -> None:
         self._work = work
@@ -80,7 +80,7 @@ class _LoopWaiter:
         self._ready = asyncio.Event()
         self._watched: dict[SubscriberTransport, Callable[[], None]] = {}
         self._queues: list[CallQueue] = []
-        """Queues of servers that wake this waiter until `end`."""
+        """Queues of servers that wake this waiter until `close`."""
 
     def wake(self) -> None:
         # Thread-safe.

@@ -29,7 +29,10 @@ def is_pattern_for(backend: Backend, topic: str, configuration: Configuration | 
 
 
 def codec_with_image_format(codec: Codec, image: ImageFormat | None) -> Codec:
-    """Return `codec` with the image format `image`. Raises `ValueError` for other codecs than "image"."""
+    """Return `codec` with an image format.
+
+    Raises `ValueError` if `image` is given for another codec than "image".
+    """
     if image is None:
         return codec
     if not isinstance(image, ImageFormat):

@@ -1,8 +1,8 @@
-"""Executor: runs callbacks and timers of several nodes, also of different back ends, in one thread.
+"""Round-robin scheduler for callbacks and timers of several nodes and back ends in one thread.
 
-Scheduling is round-robin: in each round every due timer is called, and every callback that has a message gets
-one message. Messages of one topic are delivered in order. Their order across topics is unknown, so no
-callback is served twice before the others, and none waits longer than one round.
+In each round every due timer is called, and every callback that has a message gets one message.
+Messages of one topic are delivered in order. The order across topics is unknown, so no callback is
+served twice before the others, and none waits longer than one round.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
     node.log.warning("the battery is at %d %%", 9)
     logging.getLogger().addHandler(node.log_handler)      # everything that this program logs
 
-A node that logs errors also publishes the last of them, latched, on `/nep/log/errors`. A node that never logs
-has no thread and no publisher for it. The rate is limited to `RATE_HZ` records per second; dropped records
-are counted, and the count is published as a record.
+A node that logs errors also publishes its last errors, latched, on `/nep/log/errors`. The thread and
+the publishers are created when the node logs for the first time. The rate is limited to `MAX_RATE_HZ`
+records per second; dropped records are counted, and the count is published as a record.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ LEVELS = ("debug", "info", "warning", "error", "critical")
 """Log levels in ascending order of severity."""
 MAX_RATE_HZ = 100.0
 MAX_BURST = 200
-"""Number of records that a node may publish at once before the limit of `RATE_HZ` applies."""
+"""Number of records that a node may publish at once before the limit of `MAX_RATE_HZ` applies."""
 MAX_TEXT_LENGTH = 8_000
 """Maximum length of a record's text in characters; longer texts are truncated."""
 
@@ -54,7 +54,7 @@ _ALIASES = {"warn": "warning", "fatal": "critical", "err": "error", "trace": "de
 
 @dataclass(frozen=True, slots=True)
 class LogRecord:
-    """One log record.
+    """Log record that is published as a message.
 
     Attributes:
         level: One of `LEVELS`.
@@ -77,7 +77,7 @@ class LogRecord:
     pid: int | None = None
 
     def to_plain(self) -> dict[str, object]:
-        """Return the payload of a message, without unknown fields."""
+        """Return the record as the payload of a message. Fields that are None are omitted."""
         plain: dict[str, object] = {
             "level": self.level,
             "text": self.text,
@@ -111,7 +111,7 @@ class LogRecord:
 
 
 def level_of(given: object) -> str:
-    """Return the level with a name; common aliases such as "WARN" are known. Unknown names are "info"."""
+    """Return the level for a name or an alias such as "WARN"; "info" for an unknown name."""
     word = given.strip().lower() if isinstance(given, str) else ""
     word = _ALIASES.get(word, word)
     return word if word in LEVELS else "info"
@@ -127,7 +127,7 @@ class ShownErrors:
         self._shown: dict[tuple[str, int, str], None] = {}
 
     def is_new(self, record: LogRecord) -> bool:
-        """Return True for a record that is not an error, and the first time for each error."""
+        """Return True if a record has not been shown yet, or if it is not an error."""
         if record.level not in _ERROR_LEVELS:
             return True
         key = (record.node, record.stamp_ns, record.text[:100])
@@ -146,14 +146,14 @@ class ShownErrors:
 
 
 class LogPublisher(Protocol):
-    """Publisher as the log handler uses it."""
+    """Interface of the publisher that the log handler uses."""
 
     def publish(self, payload: object) -> None:
         """Publish one payload."""
 
 
 class LogNode(Protocol):
-    """Node as the log handler uses it."""
+    """Interface of the node that the log handler uses."""
 
     name: str
 
@@ -207,7 +207,7 @@ class LogHandler(logging.Handler):
 
     @property
     def unreported_drops(self) -> int:
-        """Number of dropped records that are not reported yet."""
+        """Number of dropped records that have not been reported yet."""
         return self._dropped
 
     def emit(self, record: logging.LogRecord) -> None:

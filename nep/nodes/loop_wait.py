@@ -1,9 +1,9 @@
-"""Wait for messages in asyncio event loops, with one thread per loop.
+"""Waiting for messages in asyncio event loops, with one thread per loop.
 
-The thread waits for all subscribers that coroutines wait for, and notifies the loop when one of them may have
-a message; the message itself is read in the loop. A message therefore costs no thread switch of its own, and
-cancelling a coroutine loses no message. No descriptor is registered with the loop, so this also works with
-the proactor loop of Windows.
+The thread waits for all subscribers that coroutines wait for, and notifies the loop when one of them
+may have a message; the message itself is read in the loop. Reading a message therefore needs no thread
+switch, and cancelling a coroutine loses no message. No descriptor is registered with the loop, so this
+also works with the proactor loop of Windows.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ _JOIN_TIMEOUT_S = 5.0
 Call = Callable[[], None]
 
 _waits: dict[int, LoopWait] = {}
-"""Wait of each loop by the id of the loop; a reference to the loop would keep it alive."""
+"""`LoopWait` of each event loop by the loop's id; a reference to the loop would keep it alive."""
 _inherited: list[LoopWait] = []
-"""Waits of the parent process after a fork. Referenced forever, because they must not be finalized."""
+"""`LoopWait` objects of the parent process after a fork. Referenced forever, so that none is finalized."""
 _lock = threading.Lock()
 
 
@@ -52,7 +52,7 @@ forks.call_in_child(_forked)
 
 
 def loop_wait() -> LoopWait:
-    """Return the wait of the running loop; create one if needed. Raises `TooManyFilesError`."""
+    """Return the `LoopWait` of the running loop; create it if needed. Raises `TooManyFilesError`."""
     loop = asyncio.get_running_loop()
     with _lock:
         known = _waits.get(id(loop))
@@ -70,7 +70,7 @@ def yield_to_loop() -> Generator[None, None, None]:
 
 
 class LoopWait:
-    """Wait for the subscribers of all coroutines in a loop, in one thread.
+    """Thread that waits for the subscribers of all coroutines in an event loop.
 
     All methods except `close` must be called in the loop.
     """
@@ -86,7 +86,7 @@ class LoopWait:
         self._shutdown_hook = self._close_at_shutdown()
 
     def start(self) -> None:
-        """Start the thread. The loop closes it at shutdown (`asyncio.run`)."""
+        """Start the thread. `asyncio.run` stops the thread when the loop shuts down."""
         try:
             self._thread.start()
         except BaseException:
@@ -95,7 +95,7 @@ class LoopWait:
         _run_to_first_yield(self._shutdown_hook.asend(None))
 
     def serves(self, loop: asyncio.AbstractEventLoop) -> bool:
-        """Return True if this wait belongs to `loop` and is running."""
+        """Return True if this object belongs to `loop` and its thread is running."""
         return self._loop() is loop and not self._is_stopped
 
     def watch(self, subscriber: SubscriberTransport, call: Call) -> None:
@@ -106,7 +106,7 @@ class LoopWait:
             self._request(True, subscriber)
 
     def unwatch(self, subscriber: SubscriberTransport, call: Call) -> None:
-        """Cancel a `watch`. No effect after `call` was called."""
+        """Cancel a `watch`. Has no effect if `call` was already called."""
         calls = self._calls.get(subscriber)
         if calls is not None and call in calls:
             calls.remove(call)

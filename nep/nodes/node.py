@@ -86,9 +86,9 @@ messages.
 _open_nodes: set[Node] = set()
 """Open nodes, referenced until they are closed, because a publisher may outlive the variable of its node."""
 _inherited: list[Node] = []
-"""Nodes of the parent process after a fork. Referenced forever, because they must not be finalized."""
+"""Nodes of the parent process after a fork. Referenced forever, so that none is finalized."""
 _finalizer_pid = 0
-"""Id of the process in which closing is registered with `multiprocessing`."""
+"""Id of the process in which `multiprocessing` is set up to close the nodes at exit."""
 
 
 class Node(ServiceNode):
@@ -187,7 +187,7 @@ class Node(ServiceNode):
         return Hybrid(self._master if is_own else self._backend.master(master_ip), validate_mode(mode))
 
     def broker(self, mode: str = "many2many") -> Hybrid:
-        """Return `hybrid(mode=mode)`. Name used by the original module up to 0.5.2."""
+        """Return `hybrid(mode=mode)`. The original module used this name up to version 0.5.2."""
         return self.hybrid(mode=mode)
 
     def direct(
@@ -209,10 +209,10 @@ class Node(ServiceNode):
             port: Port, 1 to 65535.
             mode: End that binds the port. See `Direct`.
             transport: Ignored; the node's transport is used.
-            generation: Frame format to send: that of the original NEP up to 0.5.4.5 ("A"), or from 0.5.4.8 on
-                ("B"). Both are received.
-            wire: "original" or "native" frames; "tcp" for service calls over plain TCP, also from programs
-                without ZeroMQ.
+            generation: Format of sent frames: "A" for the original NEP up to 0.5.4.5, "B" for 0.5.4.8
+                and later. Both formats are received.
+            wire: "original" or "native" frames; "tcp" for service calls over plain TCP, also from
+                programs without ZeroMQ.
 
         Raises:
             NepError: Invalid address, mode or port.
@@ -307,22 +307,25 @@ class Node(ServiceNode):
     ) -> Subscriber:
         """Create a subscriber.
 
-        It receives every message published after this call returned, from every registered publisher.
+        The subscriber receives every message that any registered publisher publishes after this call
+        returned.
 
             with node.new_sub("/robot/*/camera", "image", keep="latest") as sub:
                 for message in sub:
                     show(message.payload)
 
         Args:
-            topic: Name of the topic, or a pattern: `*` matches one level, `**` any number of levels, also of
-                topics that are created later. Each message has its own topic.
-            msg_type: As for `new_pub`; with a dataclass or TypedDict the payloads are instances of it.
+            topic: Name of the topic, or a pattern: `*` matches one level, `**` any number of levels. A
+                pattern also matches topics that are created later. `Message.topic` is the name of the
+                message's topic.
+            msg_type: As for `new_pub`; with a dataclass or TypedDict the payloads are instances of the
+                class.
             configuration: Result of `hybrid` or `direct`. Default: the node's master.
-            keep: "all": queue up to `max_messages` (256 MB at most), then drop the oldest; "latest": keep
-                only the newest.
+            keep: "all": queue up to `max_messages` (256 MB at most), then drop the oldest; "latest":
+                queue only the newest.
             max_messages: Length of the queue, 1 or more.
-            sink: Function called with lists of messages, at most 200 times per second, in a thread of the
-                node; replaces `listen`.
+            sink: Function called with lists of messages, at most 200 times per second, in a thread of
+                the node; replaces `listen`.
             qos: As for `new_pub`.
             wildcards: False to treat `*` as part of the name, as direct connections do.
 
@@ -438,7 +441,14 @@ class Node(ServiceNode):
         return RemoteParameters(self.new_client(parameters_topic(found), timeout_s=timeout_s))
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> Publisher:
-        """Open the publisher and server for this node's parameters. Internal; used by `Parameters`."""
+        """Open the latched topic `place` for this node's parameters, and the service `place` if supported.
+
+        Internal; used by `Parameters`.
+
+        Args:
+            place: Name of the topic and the service.
+            answer: Callback of the service.
+        """
         publisher = self.new_pub(place, MSG_TYPE, latched=True)
         if hasattr(self._open_transport(), "server"):
             try:
@@ -523,7 +533,10 @@ class Node(ServiceNode):
         await spin_in_loop(self._work, check_optional_time_limit("timeout_s", timeout_s))
 
     def stop_spin(self) -> None:
-        """End the current `spin` or `spin_async`, or the next one. Thread-safe; also for callbacks."""
+        """Stop the running `spin` or `spin_async`; if none is running, the next one returns immediately.
+
+        Thread-safe; may also be called in callbacks.
+        """
         if not self._is_forked:
             self._work.stop()
 
@@ -559,9 +572,9 @@ class Node(ServiceNode):
     def close(self, timeout_s: float = FLUSH_TIMEOUT_S) -> None:
         """Unregister and close everything created on this node. Idempotent.
 
-        Published messages are delivered first; those that can't be delivered in time are logged as a warning.
-        Called automatically at interpreter exit. A concurrent `new_pub`, `new_sub` or similar call raises
-        `ClosedError`.
+        Published messages are delivered first; messages that can't be delivered in time are logged as a
+        warning. Called automatically at interpreter exit. A concurrent `new_pub`, `new_sub` or similar
+        call raises `ClosedError`.
 
         Args:
             timeout_s: Time limit for the delivery in seconds.
@@ -642,9 +655,9 @@ def _check_user_topic(topic: str) -> str:
 def spin(*nodes: Node, timeout_s: float | None = None) -> None:
     """Run the callbacks, timers and servers of several nodes in this thread.
 
-    The nodes may use different back ends. Scheduling is round-robin: in each round every due timer is called,
-    and every callback with a message gets one. `Node.stop_spin` ends the part of its node; the others
-    continue.
+    The nodes may use different back ends. Scheduling is round-robin: in each round every due timer is
+    called, and every callback with a message gets one. When `Node.stop_spin` is called on one node, the
+    others continue.
 
         nep.spin(camera, arm, timeout_s=10.0)
 
@@ -653,7 +666,7 @@ def spin(*nodes: Node, timeout_s: float | None = None) -> None:
         timeout_s: Time limit in seconds; None runs until all nodes are stopped or closed.
 
     Raises:
-        ValueError: No nodes, or arguments that are not nodes.
+        ValueError: No nodes are given, or an argument is not a node.
         ClosedError: This is a forked child process.
     """
     if not nodes or not all(isinstance(each, Node) for each in nodes):

@@ -1,6 +1,6 @@
-"""Names of the original module that only exist for compatibility.
+"""Names of the original module that exist only for compatibility.
 
-docs/original-nep.md lists them all with their replacements.
+docs/original-nep.md lists all of them with their replacements.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _REPLACEMENTS: Mapping[str, str] = {
 
 
 def original_hint(name: str) -> str:
-    """Return the replacement for a name of the original module that nep lacks; "" for any other name."""
+    """Return the replacement of a name that only the original module has; "" for any other name."""
     replacement = _REPLACEMENTS.get(name)
     if replacement is None:
         return ""
@@ -71,8 +71,8 @@ class FixedServer:
         Args:
             IP: Address of this computer; "*" or "0.0.0.0" for all.
             port: Port, 1 to 65535.
-            transport: "ZMQ"; or "TCP", "POSIX" or "socket" for plain TCP (docs/services.md). Clients need the
-                same.
+            transport: "ZMQ"; or "TCP", "POSIX" or "socket" for plain TCP (docs/services.md). Clients
+                must use the same transport.
             debug: Ignored.
 
         Raises:

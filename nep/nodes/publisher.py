@@ -138,18 +138,19 @@ class Publisher:
     def publish(self, payload: object, *, strict: bool = False) -> None:
         """Encode and send a payload. Never blocks.
 
-        While the topic has no subscriber and is not latched, payloads are encoded only once per second to
-        detect errors.
+        While the topic has no subscriber and is not latched, payloads are encoded only once per second
+        to detect errors.
 
         Args:
-            payload: Value of the publisher's message type; an `Encoded` is sent as it is.
-            strict: Always encode, also without subscribers, and raise `EncodeError` for any payload that
-                can't be encoded. Otherwise only a wrong type is raised; errors inside the payload are counted
-                in `refused`, logged, and reported as an alert in the graph until a payload can be encoded.
+            payload: Value of the publisher's message type; an `Encoded` is sent unchanged.
+            strict: Always encode, also without subscribers, and raise `EncodeError` for any payload
+                that can't be encoded. Otherwise only a wrong type is raised; errors inside the payload
+                are counted in `refused`, logged, and reported as an alert in the graph until a payload
+                can be encoded.
 
         Raises:
-            EncodeError: The message type does not accept the type of the payload, or `strict` is set and it
-                can't be encoded.
+            EncodeError: The message type does not accept the type of the payload; or `strict` is set
+                and the payload can't be encoded.
             ClosedError: The publisher is closed.
         """
         if strict or self._is_strict:
@@ -213,7 +214,12 @@ class Publisher:
             self._send(new_encoded((data, extension)))
 
     def refuse(self, payload: object, error: Exception) -> None:
-        """Count and report a payload that the caller failed to encode with `error`, as `publish` does."""
+        """Count and report a payload that could not be encoded outside of `publish`.
+
+        Args:
+            payload: The rejected payload.
+            error: Exception of the encoder.
+        """
         self._rejected.add(payload, error)
 
     def _send(self, encoded_payload: Encoded) -> None:
@@ -331,7 +337,7 @@ class Publisher:
 
 
 class RejectedPayloads:
-    """Payloads of one publisher that can't be encoded. Counts, logs and reports them.
+    """Counter of payloads of one publisher that can't be encoded, which also logs and reports them.
 
     Args:
         topic: Name of the topic.
@@ -360,7 +366,10 @@ class RejectedPayloads:
         self._located = ("", "")
 
     def is_valid(self, payload: object) -> bool:
-        """Return True if an unsubscribed payload can be encoded; checked at most once per interval."""
+        """Encode a payload of an unsubscribed topic to detect errors; return False if the encoding fails.
+
+        At most one payload per interval is encoded; the others are assumed to be valid.
+        """
         started = self._clock()
         if started < self._validate_at:
             return True
@@ -402,7 +411,7 @@ class RejectedPayloads:
         return EncodeError(error.codec, error.kind, f"{error.reason}; it is at '{place}'", place)
 
     def resolve(self) -> None:
-        """Clear the reported problem, because a payload could be encoded."""
+        """Clear the reported problem after a payload was encoded successfully."""
         if self.problem:
             self.problem = ""
             self._report("")
@@ -419,7 +428,7 @@ def _error_text(error: Exception) -> str:
 
 
 def check_sendable(payload: Encoded) -> None:
-    """Raise `WireError` for an extension that can't be encoded."""
+    """Raise `WireError` if the extension of an `Encoded` can't be encoded."""
     if payload.extension:
         extension_part(payload.extension)
 
@@ -438,7 +447,12 @@ def _escaped_unencodable_path(payload: object, encode: Callable[[object], Encode
 def unencodable_path(payload: object, encode: Callable[[object], Encoded]) -> str:
     """Return the path of the first value that can't be encoded, such as "pose.x" or "joints[3]".
 
-    Returns "" for the payload itself, or if no such value is among the first ten thousand.
+    Returns "" if the payload itself can't be encoded, or if the value is not among the first ten
+    thousand.
+
+    Args:
+        payload: Payload that `encode` rejects.
+        encode: Encoder of the codec.
     """
     path, value, nodes_left = "", payload, _MAX_NODES_CHECKED
     for _level in range(_MAX_DEPTH):

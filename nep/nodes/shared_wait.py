@@ -1,4 +1,4 @@
-"""SharedWait: one thread waits for subscribers of any nodes and back ends."""
+"""Waiting for subscribers of any nodes and back ends in one thread."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _POLL_INTERVAL_S = 0.01
 
 
 class _ReadyCallback:
-    """Callback that a subscriber wakes. Implements `Wakes`."""
+    """Object that a transport wakes when its subscriber may have a message. Implements `Wakeable`."""
 
     def __init__(self, waits: SharedWait, subscriber: SubscriberTransport) -> None:
         self._waits = waits
@@ -29,10 +29,13 @@ class _ReadyCallback:
 
 
 class SharedWait:
-    """Wait for armed subscribers, by their descriptors or, without one, by notification.
+    """Wait of one thread for several subscribers, by their descriptors or, without one, by notification.
 
-    Only the waiting thread may arm, disarm and close; `wake` is thread-safe. A `wake` before the wait ends
-    the next wait. Raises `TooManyFilesError`.
+    Only the waiting thread may call `arm`, `disarm` and `close`; `wake` is thread-safe. If `wake` is
+    called while no thread waits, the next wait ends immediately.
+
+    Raises:
+        TooManyFilesError: The process has too many open files.
     """
 
     def __init__(self) -> None:
@@ -52,7 +55,10 @@ class SharedWait:
         self._ready: deque[SubscriberTransport] = deque()
 
     def arm(self, subscriber: SubscriberTransport) -> bool:
-        """Include a subscriber; return False if it may have a message or is closed. Idempotent."""
+        """Add a subscriber to the wait. Idempotent.
+
+        Returns False, without adding the subscriber, if it may have a message already or is closed.
+        """
         if subscriber in self._armed or subscriber in self._polled:
             return True
         if getattr(subscriber, "enter_wait", None) is None:  # an older plug-in
@@ -71,7 +77,7 @@ class SharedWait:
         return True
 
     def disarm(self, subscriber: SubscriberTransport) -> None:
-        """Exclude a subscriber from the wait."""
+        """Remove a subscriber from the wait."""
         self._polled.discard(subscriber)
         callback = self._armed.pop(subscriber, None)
         if callback is not None:
@@ -83,13 +89,19 @@ class SharedWait:
             subscriber.leave_wait(callback)
 
     def disarm_all(self) -> None:
-        """Exclude all subscribers from the wait."""
+        """Remove all subscribers from the wait."""
         for subscriber in list(self._armed):
             self.disarm(subscriber)
         self._polled.clear()
 
     def wait(self, timeout_s: float) -> list[SubscriberTransport]:
-        """Wait up to `timeout_s` seconds for a subscriber or `wake`; disarm and return ready subscribers."""
+        """Wait until a subscriber is ready or `wake` is called; return the ready subscribers.
+
+        The returned subscribers are removed from the wait; call `arm` to wait for them again.
+
+        Args:
+            timeout_s: Time limit in seconds.
+        """
         ready = self._selector.select(min(timeout_s, _POLL_INTERVAL_S) if self._polled else timeout_s)
         self._waker.clear()
         self._ready.extend(key.data for key, _events in ready if key.data is not None)
@@ -108,7 +120,7 @@ class SharedWait:
         self._waker.wake()
 
     def wake(self) -> None:
-        """End the current wait, or the next one. Thread-safe."""
+        """End the current wait; if no thread waits, the next wait ends immediately. Thread-safe."""
         self._waker.wake()
 
     def close(self) -> None:

@@ -200,12 +200,15 @@ class Subscriber:
         return self._receive(timeout_s)
 
     def want_payloads(self) -> None:
-        """Read only payloads from now on, except while a problem is reported or if the payloads are typed."""
+        """Make the transport deliver bare payloads, which is faster than `Message` objects.
+
+        Has no effect while a problem is reported, or if the payloads are typed.
+        """
         if self._payload_source is not None:
             self._payload_source.wants_payloads = not (self._problem or self.is_typed)
 
     def want_messages(self) -> None:
-        """Read whole messages from now on, including data that was already read."""
+        """Make the transport deliver `Message` objects again, also for data that was already read."""
         if self._payload_source is not None:
             self._payload_source.wants_payloads = False
             if self.payloads:
@@ -274,11 +277,13 @@ class Subscriber:
         return ClosedError(f"subscriber '{self.topic}'", is_forked=self._is_forked)
 
     def typed(self, message: Message) -> Message:
-        """Return a message of the transport in the form that this subscriber returns."""
+        """Convert a message of the transport to the message that this subscriber returns."""
         return message
 
     def decoded(self, message: Message) -> object:
-        """Return the decoded payload of a message. Errors are logged (rarely) and reported in the graph.
+        """Return the decoded payload of a message.
+
+        Errors are logged at increasing intervals, and reported as an alert in the graph.
 
         Raises:
             DecodeError: The payload can't be decoded.
@@ -294,7 +299,7 @@ class Subscriber:
         return payload
 
     def decoded_unshared(self, message: Message) -> object:
-        """Return the decoded payload of a message that no other reader shares, without caching it."""
+        """Decode and return the payload of an unshared message without caching it in the message."""
         if self._problem or message.decoded is not UNDECODED:
             return self.decoded(message)
         try:

@@ -1,4 +1,4 @@
-"""Timer: calls a function periodically in the thread that spins. Created by `Node.new_timer`."""
+"""Periodic timers in the thread that spins a node. Created by `Node.new_timer`."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ class Timer:
     def take_turn(self) -> bool:
         """Return True if the timer is due; the caller must then call the function.
 
-        Of several threads only one gets True. The next due time is set before the call, so that it is correct
-        even if the function raises or spins itself.
+        If several threads call this at the same time, only one gets True. The next due time is set
+        before the call, so that it is correct even if the function raises or spins itself.
         """
         now = self._clock()
         if self._is_cancelled or now < self._due:

@@ -16,11 +16,18 @@ from nep.patterns.services.owned import ServiceRegistry
 from nep.system.arguments import is_coroutine_function
 
 NO_MESSAGE = object()
-"""Returned instead of a message when there is none."""
+"""Sentinel that `Work.next_item` returns if there is no message."""
 
 
 class Callback(NamedTuple):
-    """Callback and its subscriber. With `with_message` it is called with messages, not payloads."""
+    """Callback of a subscriber.
+
+    Attributes:
+        subscriber: The subscriber.
+        transport: Transport of the subscriber.
+        call: Function to call.
+        with_message: True to call the function with messages, False with payloads.
+    """
 
     subscriber: Subscriber
     transport: SubscriberTransport
@@ -31,7 +38,11 @@ class Callback(NamedTuple):
 class Work:
     """Callbacks, timers and servers of one node, and their scheduling. Thread-safe.
 
-    `clock` is a monotonic clock in seconds.
+    Args:
+        node_name: Name of the node.
+        transport: Transport of the node.
+        clock: Monotonic clock in seconds.
+        services: Servers and clients of the node.
     """
 
     def __init__(
@@ -96,11 +107,11 @@ class Work:
 
     @property
     def is_running(self) -> bool:
-        """True unless stopped or closed."""
+        """True until the node is stopped or closed."""
         return not self._is_stopped.is_set() and not self.is_closed
 
     def stop(self) -> None:
-        """End the current spin, or the next one."""
+        """Stop the running spin; if none is running, the next one returns immediately."""
         self._is_stopped.set()
         self.wake()
 
@@ -153,7 +164,9 @@ class Work:
     # ---- running
 
     def run(self) -> bool:
-        """Run due timers, one call per server and one message per callback; return True if there may be more.
+        """Run one round: due timers, one call per server, and one message per callback.
+
+        Returns True if there may be more work.
 
         Exceptions of callbacks propagate.
 

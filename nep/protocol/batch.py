@@ -1,8 +1,8 @@
 """Batches: several small messages of one publisher in one part. Pure functions; see `docs/wire.md`.
 
-After topic and header follow the number of messages (u32), their sizes (u32 each), their time stamps (u64
-each) and their payloads. The header has the flag `BATCH`, the sequence number of the first message (the
-others follow consecutively), and the size of everything after the header.
+The topic and the header are followed by the number of messages (u32), their sizes (u32 each), their
+time stamps (u64 each) and their payloads. The header has the flag `BATCH`, the sequence number of the
+first message (the others follow consecutively), and the size of everything after the header.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class BatchEntry(NamedTuple):
     Attributes:
         number: Index of the message.
         stamp_ns: Time stamp of the message.
-        begin: Offset of its payload in the body.
-        end: Offset of the end of its payload.
+        begin: Offset of the payload in the body.
+        end: Offset of the end of the payload.
     """
 
     number: int
@@ -55,7 +55,7 @@ class BatchEntry(NamedTuple):
 
 @cache
 def table_struct(count: int) -> struct.Struct:
-    """Return the format of a batch's table: number of messages, all sizes, all time stamps."""
+    """Return the binary layout of a batch's table: number of messages, their sizes, their time stamps."""
     return struct.Struct(f"<I{count}I{count}Q")
 
 

@@ -1,4 +1,4 @@
-"""Clock offset between this computer and the master, estimated from renewals. No sockets."""
+"""Clock offset between this computer and the master, estimated from renewals. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import NamedTuple
 from nep.messages.clocks import UNCERTAINTY_MAX_NS, drift_ns, is_clock
 
 _MAX_SAMPLES = 8
-"""Number of renewals that are kept; the one with the shortest round trip is used."""
+"""Maximum number of stored samples; the sample with the shortest round trip determines the offset."""
 _STEP_NS = 50_000
 _SLEW_DIVISOR = 2_000
-"""Reciprocal of the fastest clock slew. A larger change (plus `_STEP_NS`) counts as a step."""
+"""Reciprocal of the fastest clock slew. A larger change (plus `_STEP_NS`) is treated as a step."""
 
 
 class Moment(NamedTuple):
@@ -42,9 +42,9 @@ class _Sample(NamedTuple):
 class ClockSamples:
     """Estimator of the clock offset to the master, from four time stamps as in NTP.
 
-    The time stamps are those of sending a renewal (this clock), its receipt and its reply (the master's
-    clock), and the arrival of the reply (this clock). The delay may lie entirely in one direction, so half of
-    it is the uncertainty. When one of the clocks is set, all samples are discarded.
+    A renewal is sent (this clock), received and answered (the master's clock), and its reply arrives
+    (this clock). The delay may lie entirely in one direction, so half of it is the uncertainty. When
+    one of the clocks is set, all samples are discarded.
 
     Args:
         wall: Clock of message time stamps, in ns since 1970.
@@ -83,7 +83,7 @@ class ClockSamples:
         return moment
 
     def add(self, sent: Moment, received_ns: int, answered_ns: int, now: Moment | None = None) -> bool:
-        """Add the time stamps of a renewal; return True if they are usable.
+        """Add the time stamps of a renewal; return False if they are unusable.
 
         Args:
             sent: Readings at sending.

@@ -86,11 +86,16 @@ _SMALL_BODY_BYTES = 4096
 _MAX_LISTS, _MAX_LIST_LENGTH = 50_000, 20_000
 """Maximum number and length of lists and maps in a request. A joining node has at most 5,000 records."""
 _VIEW_PREFIX = b"\x83\xa2is\xa4seen\xa2re"
-"""First bytes of a graph reply that `AnswerEncoder` has encoded."""
+"""First bytes of a graph reply that `ReplyEncoder` has encoded."""
 
 
 class ReceivedRequest(NamedTuple):
-    """Decoded request with its call number, or the error of a malformed request."""
+    """Result of decoding a request.
+
+    Attributes:
+        call: Number of the request.
+        request: The request, or the error if it is malformed.
+    """
 
     call: int
     request: Request | WireError
@@ -252,7 +257,7 @@ def gc_disabled() -> Iterator[None]:
 
 
 def write(value: object) -> object:
-    """Convert a value to maps, lists and scalars. Fields that have their default value are left out."""
+    """Convert a value to maps, lists and scalars. Fields with their default value are omitted."""
     if type(value) in _PLAIN_TYPES:
         return value
     if is_dataclass(value) and not isinstance(value, type):
@@ -280,8 +285,10 @@ def _fields_of(kind: type) -> tuple[tuple[str, object], ...]:
 def read(kind: type[T], value: object) -> T:
     """Parse a value of type `kind` from the result of `write`.
 
-    Unknown fields are ignored, because newer peers may send more fields. Raises `WireError` with the name of
-    a missing or invalid field.
+    Unknown fields are ignored, because newer peers may send more fields.
+
+    Raises:
+        WireError: A field is missing or invalid; the message contains its name.
     """
     hint: Any = kind
     try:
@@ -293,9 +300,12 @@ def read(kind: type[T], value: object) -> T:
 
 
 class _MismatchError(Exception):
-    """Validation error. Its path is collected while the exception propagates, because errors are rare.
+    """Validation error, whose field path is completed while the exception propagates.
 
-    ``words`` is the message, with the placeholder ``field`` and those in ``values``.
+    Attributes:
+        words: Message with the placeholder ``field`` and those in ``values``.
+        values: Values of the other placeholders.
+        path: Field path, innermost first.
     """
 
     def __init__(self, words: str, **values: str) -> None:
@@ -407,7 +417,7 @@ def _fast_reader(kind: type, hints: Mapping[str, Any]) -> Callable[[dict[str, ob
     others = [(name, _reader(hints[name])) for name, types in plain.items() if not types]
     of_plain = itemgetter(*names) if len(names) > 1 else lambda value: tuple(value[name] for name in names)
     known: set[tuple[type, ...]] = set()
-    """Combinations of types that were found valid; there are two per optional field."""
+    """Combinations of field types that were found valid. An optional field has two possible types."""
 
     def read_fast(value: dict[str, object]) -> object | None:
         if len(value) != len(plain):

@@ -31,15 +31,15 @@ class NodeInfo:
     Attributes:
         id: 16 hexadecimal digits, new at each start.
         name: Name of the node; need not be unique.
-        host: Name of its computer.
+        host: Name of the node's computer.
         pid: Process id, or None if unknown.
         language: Programming language.
         generation: "native", "gateway", or the original NEP's "A" or "B".
-        since_ns: Start time by its own clock, in nanoseconds since 1970.
-        cpu_ratio: CPU usage of its process between the last two renewals (1.0 is one core), or None if
-            unknown. Nodes of one process have the same value.
-        clock_offset_ns: Nanoseconds to add to its clock for the master's; 0 on the master's computer, None if
-            unknown.
+        since_ns: Start time by the node's clock, in nanoseconds since 1970.
+        cpu_ratio: CPU usage of the node's process between the last two renewals (1.0 is one core), or
+            None if unknown. Nodes of one process have the same value.
+        clock_offset_ns: Nanoseconds to add to a time of the node's clock to get a time of the master's
+            clock; 0 on the master's computer, None if unknown.
         clock_uncertainty_ns: Uncertainty (±) of `clock_offset_ns`.
     """
 
@@ -61,13 +61,14 @@ class PublisherInfo:
 
     Attributes:
         id: Id of the publisher.
-        node_id: Id of its node.
+        node_id: Id of the publisher's node.
         endpoints: Addresses; empty for publishers of the original NEP.
-        latched: True if it keeps its newest message for later subscribers.
+        latched: True if the publisher sends its newest message to later subscribers.
         count: Number of messages.
         bytes: Total size of the payloads.
         last_seq: Sequence number of the newest message.
-        last_stamp_ns: Time stamp of the newest message, in nanoseconds since 1970 by the publisher's clock.
+        last_stamp_ns: Time stamp of the newest message, in nanoseconds since 1970 by the publisher's
+            clock.
         rate_hz: Messages per second, or None if unknown.
         bandwidth_Bps: Bytes per second, or None if unknown.
     """
@@ -103,18 +104,18 @@ class SubscriberInfo:
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """Topic with its publishers and subscribers. Values that are unknown are None.
+    """Topic with its publishers and subscribers. Unknown values are None.
 
     Attributes:
         name: Name of the topic.
         msg_type: Message type.
-        codec: Codec of the publishers, or "" without one.
+        codec: Codec of the publishers, or "" if there is no publisher.
         publishers: Publishers.
-        subscribers: Subscribers, without those with patterns.
+        subscribers: Subscribers to this topic, without subscribers to a pattern.
         rate_hz: Messages per second of all publishers.
         bandwidth_Bps: Bytes per second of all publishers.
         last_stamp_ns: Time stamp of the newest message, in nanoseconds since 1970.
-        lost: Lost messages of all subscribers.
+        lost: Number of messages lost by all subscribers.
         loss_ratio: Share of messages lost, 0 to 1.
     """
 
@@ -185,15 +186,15 @@ class ClientInfo:
 
 @dataclass(frozen=True)
 class ServiceInfo:
-    """Service with its servers (the first is called first) and clients.
+    """Service with its servers and clients.
 
     Attributes:
         name: Name of the service.
         msg_type: Service type.
-        servers: Servers.
+        servers: Servers; clients call the first one first.
         clients: Clients.
-        calls: Answered calls of all servers.
-        errors: Calls answered with an error.
+        calls: Number of calls answered by all servers.
+        errors: Number of calls answered with an error.
     """
 
     name: str
@@ -212,8 +213,9 @@ class GraphView:
             print(topic.name, topic.rate_hz)
 
     Attributes:
-        epoch: Changes when the master is restarted.
-        revision: Increases when nodes, publishers or subscribers are added or removed, not with statistics.
+        epoch: Number of the master's run, which changes when the master is restarted.
+        revision: Number that increases when nodes, publishers or subscribers are added or removed.
+            Statistics don't change it.
         nodes: Nodes by id.
         topics: Topics by name.
         alerts: Current problems.

@@ -3,9 +3,10 @@
 Every reply and push contains the master's `epoch`, which changes when the master is restarted, and the
 `revision` of the graph.
 
-A node has a secret *key*, shared only with its masters, from which its id is derived. No other program can
-register that id, whether the node is registered, unlisted or returns to a restarted master. Ids of publishers
-and subscribers are derived from the key and a number. See docs/adr/0014-who-speaks-for-a-node.md.
+A node has a secret *key*, shared only with its masters, from which the node's id is derived. No other
+program can register that id, even while the node is not registered or the master is restarting. Ids of
+publishers and subscribers are derived from the key and a number. See
+docs/adr/0014-who-speaks-for-a-node.md.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ class NodeRecord:
     Attributes:
         id: Id derived from the key.
         name: Name of the node.
-        host: Name of its computer.
+        host: Name of the node's computer.
         pid: Process id, or None if unknown.
         language: Programming language.
         generation: See `NodeInfo`.
-        since_ns: Start time by its own clock, in nanoseconds since 1970.
+        since_ns: Start time by the node's clock, in nanoseconds since 1970.
         key: Secret that proves the id (`is_proven`).
         computer: Id of the computer; nodes with the same value share a clock. "" if unknown.
     """
@@ -65,10 +66,11 @@ class PublisherRecord:
         msg_type: Message type.
         codec: Name of the codec.
         endpoints: Addresses; empty if subscribers can't connect directly.
-        latched: True if it keeps messages for later subscribers.
-        local: True if it is also bound to the Unix socket that belongs to its loopback endpoint.
-        number: Proves the id.
-        history: Number of messages kept for later subscribers, if more than one.
+        latched: True if the publisher sends its newest message to later subscribers.
+        local: True if the publisher is also bound to the Unix socket that belongs to its loopback
+            endpoint.
+        number: Number from which the id is derived, as a proof of the id.
+        history: Number of messages sent to later subscribers, if more than one.
     """
 
     id: int
@@ -90,7 +92,7 @@ class SubscriberRecord:
         id: Id derived from the node's key and `number` (`is_proven`).
         topic: Name of the topic, or a pattern.
         msg_type: Message type.
-        number: Proves the id.
+        number: Number from which the id is derived, as a proof of the id.
         pattern: True if `topic` is a pattern. See `nep.protocol.topic_pattern`.
     """
 
@@ -107,13 +109,24 @@ def node_id_from(key: str) -> str:
 
 
 def id_from(key: str, number: int) -> int:
-    """Return the id of a publisher or subscriber, derived from its node's key and a number (from 1)."""
+    """Return the id of a publisher or subscriber.
+
+    Args:
+        key: Key of the node.
+        number: Number of the publisher or subscriber in the node, from 1.
+    """
     digest = sha256(f"{key}/{number}".encode("utf-8", "replace")).digest()
     return int.from_bytes(digest[:8], "little") >> 1 or 1
 
 
 def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | None = None) -> bool:
-    """Return True if a node's id is derived from its key; with a record, the record's id must be, too."""
+    """Return True if a node's id is derived from the node's key.
+
+    Args:
+        node: Record of the node.
+        record: Record of a publisher or subscriber, whose id must also be derived from the key; or
+            None.
+    """
     if not node.key or node_id_from(node.key) != node.id:
         return False
     return record is None or (record.number > 0 and id_from(node.key, record.number) == record.id)
@@ -121,10 +134,16 @@ def is_proven(node: NodeRecord, record: PublisherRecord | SubscriberRecord | Non
 
 @dataclass(frozen=True)
 class PublisherCount:
-    """Statistics of a publisher: totals and the newest message.
+    """Statistics of a publisher or server: totals and the newest message.
 
-    `problem` is the reason why payloads can't be encoded, or "". For a server, the statistics are its calls,
-    the bytes of its replies, and the calls that ended with `errors`.
+    Attributes:
+        id: Id of the publisher.
+        count: Number of messages; for a server, the number of calls.
+        bytes: Total size of the payloads; for a server, of the replies.
+        last_seq: Sequence number of the newest message.
+        last_stamp_ns: Time stamp of the newest message, in nanoseconds since 1970, or None.
+        problem: Reason why payloads can't be encoded, or "".
+        errors: Number of calls of a server that were answered with an error.
     """
 
     id: int
@@ -138,7 +157,14 @@ class PublisherCount:
 
 @dataclass(frozen=True)
 class SubscriberCount:
-    """Statistics of a subscriber. `problem` is the reason why messages can't be decoded, or ""."""
+    """Statistics of a subscriber.
+
+    Attributes:
+        id: Id of the subscriber.
+        received: Number of received messages, or None if unknown.
+        lost: Number of lost messages, or None if unknown.
+        problem: Reason why messages can't be decoded, or "".
+    """
 
     id: int
     received: int | None
@@ -148,7 +174,14 @@ class SubscriberCount:
 
 @dataclass(frozen=True)
 class RemotePublisher:
-    """Publisher and its node: everything a subscriber needs to connect. `computer` as in `NodeRecord`."""
+    """Publisher and its node, with everything that a subscriber needs to connect.
+
+    Attributes:
+        publisher: Record of the publisher.
+        node_id: Id of the publisher's node.
+        node_name: Name of the publisher's node.
+        computer: Id of the node's computer, or "" if unknown. See `NodeRecord`.
+    """
 
     publisher: PublisherRecord
     node_id: str
@@ -174,11 +207,11 @@ class Join:
 
     Attributes:
         node: Record of the node.
-        epoch: Epoch of its previous master, or 0.
-        publishers: Records of its publishers.
-        subscribers: Records of its subscribers.
-        managed: True for programs of the original NEP. They have neither a connection nor a lease; their
-            manager reports their end.
+        epoch: Epoch of the node's previous master, or 0.
+        publishers: Records of the node's publishers.
+        subscribers: Records of the node's subscribers.
+        managed: True for a program of the original NEP. Such a node has neither a connection nor a
+            lease; the gateway reports its end.
     """
 
     node: NodeRecord
@@ -206,7 +239,13 @@ class AddSubscriber:
 
 @dataclass(frozen=True)
 class RemovePublisher:
-    """Request to unregister a publisher, whose last message is `last_seq`."""
+    """Request to unregister a publisher.
+
+    Attributes:
+        node_id: Id of the node.
+        id: Id of the publisher.
+        last_seq: Sequence number of the publisher's last message.
+    """
 
     node_id: str
     id: int
@@ -236,11 +275,12 @@ class Renew:
         node_id: Id of the node.
         epoch: Epoch of the master.
         revision: Revision of the last reply.
-        publishers: Statistics of its publishers.
-        subscribers: Statistics of its subscribers.
-        cpu_ratio: CPU usage of its process since the last renewal (1.0 is one core), or None if unknown.
-        clock: Offset to add to its clock for the master's, and the uncertainty, in ns. Empty if unknown yet;
-            None from nodes that don't compare clocks.
+        publishers: Statistics of the node's publishers.
+        subscribers: Statistics of the node's subscribers.
+        cpu_ratio: CPU usage of the node's process since the last renewal (1.0 is one core), or None if
+            unknown.
+        clock: Nanoseconds to add to a time of the node's clock to get a time of the master's clock, and
+            the uncertainty. Empty if not measured yet; None if the node doesn't compare clocks.
     """
 
     node_id: str
@@ -254,7 +294,13 @@ class Renew:
 
 @dataclass(frozen=True)
 class ReportMissing:
-    """Report of subscribers that did not connect to a new publisher in time."""
+    """Report of subscribers that did not connect to a new publisher in time.
+
+    Attributes:
+        node_id: Id of the publisher's node.
+        publisher_id: Id of the publisher.
+        subscriber_ids: Ids of the subscribers.
+    """
 
     node_id: str
     publisher_id: int
@@ -263,9 +309,13 @@ class ReportMissing:
 
 @dataclass(frozen=True)
 class ReportAlerts:
-    """Report of all current alerts of an attachment (`source`), replacing its previous alerts.
+    """Report of all current alerts of an attachment, replacing its previous alerts.
 
     Only for `Master.submit`; has no wire encoding.
+
+    Attributes:
+        source: Name of the attachment.
+        alerts: Current alerts.
     """
 
     source: str
@@ -274,9 +324,10 @@ class ReportAlerts:
 
 @dataclass(frozen=True)
 class Listen:
-    """Request to serve other computers at these addresses of the master's computer; none serves only its own.
+    """Request to serve other computers. Reply: `Done`. Rejected if sent from another computer.
 
-    Reply: `Done`. Rejected from other computers.
+    Attributes:
+        hosts: Addresses of the master's computer; empty to serve only this computer.
     """
 
     hosts: tuple[str, ...]
@@ -284,7 +335,7 @@ class Listen:
 
 @dataclass(frozen=True)
 class QueryGraph:
-    """Request for the whole graph. Reply: `Seen`."""
+    """Request for the whole graph. Reply: `GraphReply`."""
 
 
 @dataclass(frozen=True)
@@ -316,7 +367,7 @@ class _MasterMessage:
     """Base class of replies and pushes.
 
     Attributes:
-        epoch: Changes when the master is restarted.
+        epoch: Number of the master's run, which changes when the master is restarted.
         revision: Revision of the graph.
     """
 
@@ -326,18 +377,18 @@ class _MasterMessage:
 
 @dataclass(frozen=True)
 class Done(_MasterMessage):
-    """Request executed; also the reply to a ping."""
+    """Reply to an executed request that has no result, such as a ping."""
 
 
 @dataclass(frozen=True)
 class Added(_MasterMessage):
-    """Publisher registered.
+    """Reply to a registered publisher.
 
     Attributes:
         expected: Subscribers that the publisher waits for.
-        hung: Subscribers of nodes that are known not to respond at present.
-        hosts: Addresses at which the master serves other computers. Publishers on the master's computer bind
-            to them, too.
+        hung: Subscribers whose nodes don't respond at present.
+        hosts: Addresses at which the master serves other computers. Publishers on the master's computer
+            bind to these addresses, too.
     """
 
     expected: tuple[ExpectedSubscriber, ...] = ()
@@ -347,7 +398,7 @@ class Added(_MasterMessage):
 
 @dataclass(frozen=True)
 class Found(_MasterMessage):
-    """Subscriber registered, or node joined.
+    """Reply to a registered subscriber or a joined node.
 
     Attributes:
         publishers: Publishers to connect to.
@@ -370,19 +421,21 @@ class TopicPublishers:
 
 @dataclass(frozen=True)
 class Renewed(_MasterMessage):
-    """Lease renewed.
+    """Reply to a renewal.
 
     Attributes:
         again: True if the node must join again, because its registration at the master is missing or
             different.
         topics: Publishers of topics that changed since the node's revision.
-        last_seqs: Newest messages of the publishers that the node subscribes to, by publisher id.
+        last_seqs: Newest sequence numbers of the publishers that the node subscribes to, by publisher
+            id.
         hosts: Addresses at which the master serves other computers.
         next_s: Time until the next renewal in seconds; longer in large graphs.
-        times: Receipt and reply of the renewal by the master's clock (ns since 1970); empty for nodes with
-            the same clock.
-        clocks: Offset to add to times of a node on another computer for the receiver's clock, and its
-            uncertainty (ns), by node id. Only for nodes whose publishers it receives.
+        times: Receipt and reply of the renewal by the master's clock (ns since 1970); empty for nodes
+            with the same clock.
+        clocks: Clock differences by id of a node on another computer whose publishers the receiver
+            subscribes to: nanoseconds to add to a time of that node to get a time of the receiver, and
+            the uncertainty.
     """
 
     again: bool = False
@@ -403,9 +456,12 @@ class GraphReply(_MasterMessage):
 
 @dataclass(frozen=True)
 class Refused(_MasterMessage):
-    """Request rejected. `reason` is a sentence in the master's language.
+    """Reply to a rejected request.
 
-    `code` is independent of the language; docs/wire.md lists the codes. Older masters send none ("").
+    Attributes:
+        reason: Sentence in the master's language.
+        code: Error code, independent of the language; docs/wire.md lists the codes. "" from older
+            masters.
     """
 
     reason: str
@@ -422,8 +478,10 @@ Reply = Done | Added | Found | Renewed | GraphReply | Refused
 class PublisherAdded(_MasterMessage):
     """Notification of a new publisher on a subscribed topic, or of a publisher's new endpoints.
 
-    `is_new` is True if the publisher was just created and has not sent anything, False if it rejoined or
-    moved.
+    Attributes:
+        publisher: The publisher.
+        is_new: True if the publisher was just created and has not sent anything; False if it
+            rejoined or moved.
     """
 
     publisher: RemotePublisher
@@ -434,8 +492,12 @@ class PublisherAdded(_MasterMessage):
 class PublisherRemoved(_MasterMessage):
     """Notification that a publisher of a subscribed topic is no longer registered.
 
-    `is_closed` is True if the publisher unregistered; `last_seq` was then its last message. Otherwise its
-    node doesn't respond, and the connection stays, because the publisher may only be suspended.
+    Attributes:
+        id: Id of the publisher.
+        topic: Name of the topic.
+        is_closed: True if the publisher unregistered. False if its node doesn't respond; the
+            connection is then retained, because the publisher may only be suspended.
+        last_seq: Sequence number of the last message of a closed publisher.
     """
 
     id: int
@@ -453,7 +515,7 @@ Push = PublisherAdded | PublisherRemoved | Probe
 
 
 def node_of(request: Request) -> str | None:
-    """Return the id of the node in whose name a request is sent, or None."""
+    """Return the id of the node on whose behalf a request is sent, or None."""
     if isinstance(request, Join | AddPublisher | AddSubscriber):
         return request.node.id
     if isinstance(request, ReportAlerts | Listen | QueryGraph | Ping):

@@ -1,11 +1,11 @@
 """Wire format of service calls. Pure functions; specification: `docs/services.md`.
 
-A native call or reply is two parts: a header of 16 bytes and the payload. Programs of the original NEP send
-one part of JSON, which REQ and REP prefix with an empty part; their replies have no number and arrive in the
-order of the calls.
+A native call or reply consists of two parts: a header of 16 bytes and the payload. Programs of the
+original NEP send one part of JSON, which REQ and REP prefix with an empty part; their replies have no
+number and arrive in the order of the calls.
 
-The master lists servers and clients as publishers and subscribers of a topic that starts with `PREFIX`, so
-that older masters without services also connect them.
+The master lists servers and clients as publishers and subscribers of a topic that starts with
+`SERVICE_PREFIX`, so that older masters without services also connect them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ from nep.text import bounded_str, escaped, shortened
 
 SERVICE_PREFIX = "nep.service:"
 SURVEY_PREFIX = "survey:"
-"""Prefix of a survey's service name. The master lists its respondents as servers of that service."""
+"""Prefix of a survey's service name.
+
+The master lists the survey's respondents as servers of that service.
+"""
 SERVICE_TYPE = "service"
 """Message type and codec under which the master lists servers and clients."""
 ORIGINAL_CODEC = "original"
@@ -42,7 +45,7 @@ _ERROR_PREFIX = b'{"nep_error":'
 
 
 class CallKind(IntEnum):
-    """Kind of a frame. `REFUSED` is the reply to a call that the server did not execute."""
+    """Kind of a service frame. `REFUSED` is the reply to a call that the server did not execute."""
 
     CALL = 1
     ANSWER = 2
@@ -51,7 +54,13 @@ class CallKind(IntEnum):
 
 
 class Reply(NamedTuple):
-    """Reply of a server: an encoded payload, or an error created by `failure`."""
+    """Reply of a server: an encoded payload, or an error created by `error_reply`.
+
+    Attributes:
+        kind: Kind of the frame.
+        data: Encoded payload or error.
+        codec: Number of the codec.
+    """
 
     kind: CallKind
     data: bytes | memoryview
@@ -59,7 +68,14 @@ class Reply(NamedTuple):
 
 
 class CallHeader(NamedTuple):
-    """Parsed call, as a server receives it. `timeout_s` is None if the client waits without limit."""
+    """Parsed call, as a server receives it.
+
+    Attributes:
+        number: Number of the call, which the reply repeats.
+        codec: Number of the codec.
+        timeout_s: Time limit of the client in seconds; None for no limit.
+        data: Encoded request.
+    """
 
     number: int
     codec: int
@@ -68,7 +84,12 @@ class CallHeader(NamedTuple):
 
 
 class ReceivedReply(NamedTuple):
-    """Parsed reply, as a client receives it. `number` is None if it replies to the oldest call."""
+    """Parsed reply, as a client receives it.
+
+    Attributes:
+        number: Number of the call; None for the reply to the oldest call.
+        reply: The reply.
+    """
 
     number: int | None
     reply: Reply
@@ -84,13 +105,20 @@ class Framing(Protocol):
     def call(
         self, number: int, codec: int, timeout_s: float | None, data: bytes | memoryview
     ) -> list[bytes | memoryview]:
-        """Encode a call."""
+        """Encode a call.
+
+        Args:
+            number: Number of the call, which the reply repeats.
+            codec: Number of the codec.
+            timeout_s: Time limit of the client in seconds; None for no limit.
+            data: Encoded request.
+        """
 
     def read_call(self, parts: Sequence[bytes | memoryview]) -> CallHeader:
         """Parse a call. Raises `WireError`."""
 
     def reply(self, number: int, reply: Reply) -> list[bytes | memoryview]:
-        """Encode a reply."""
+        """Encode a reply to the call with this number."""
 
     def read_reply(self, parts: Sequence[bytes | memoryview]) -> ReceivedReply:
         """Parse a reply. Raises `WireError`."""

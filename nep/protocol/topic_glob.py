@@ -1,8 +1,8 @@
-"""Glob patterns of topics, as people type them, such as `/*/odom` or `/cam?`. Pure functions.
+"""Glob patterns of topics on the command line, such as `/*/odom` or `/cam?`. Pure functions.
 
-`*` matches any characters within a level, `?` matches one character, `**` any number of levels. Subscribers
-support only wildcards for whole levels (`nep.protocol.topic_pattern`); `widened` converts a glob pattern to
-one of these, which may match more topics.
+`*` matches any characters within a level, `?` matches one character, `**` any number of levels.
+Subscribers support only wildcards for whole levels (`nep.protocol.topic_pattern`); `widened_pattern`
+converts a glob pattern to such a pattern, which may match more topics.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ def is_glob(word: str) -> bool:
 def widened_pattern(pattern: str) -> str:
     """Return a subscriber's pattern that matches all topics of a glob pattern, and possibly others.
 
-    Exception: topics with an empty level in the middle, which are not used.
+    Topics with an empty level in the middle are not matched; such names are not in use.
     """
     first, *others = ("*" if is_glob(each) and each != "**" else each for each in pattern.split("/"))
     if first == "*":  # also matches the empty level before the first slash

@@ -1,10 +1,11 @@
 r"""Native wire format of messages. Pure functions; specification: `docs/wire.md`.
 
-A message has three or four parts: topic and `\0`, a header of 32 bytes, the payload, and a msgpack map if the
-header has the flag EXTENSION. Small messages combine the first three in one part, for subscribers whose hello
-announces it. Three notices are sent under a subscriber's own hello topic `\xffhello/<subscriber id>/<topic>`:
-*echo* (topic and header: the subscriber's messages are counted from here), *bye* (echo with the flag BYE: the
-last message was sent) and messages for this subscriber only (all parts).
+A message has three or four parts: topic and `\0`, a header of 32 bytes, the payload, and a msgpack map
+if the header has the flag EXTENSION. Small messages combine the first three parts in one, for
+subscribers whose hello announces this ability. Three notices are sent under a subscriber's hello topic
+`\xffhello/<subscriber id>/<topic>`: *echo* (topic and header: the subscriber's messages are counted
+from here), *bye* (echo with the flag BYE: the last message was sent) and messages for this subscriber
+only (all parts).
 """
 
 from __future__ import annotations
@@ -27,19 +28,19 @@ NODE_NAME_MAX_BYTES = 200
 SUBSCRIPTION_MAX_BYTES = 4096
 """Maximum size of a subscription in bytes; a peer that sends more is disconnected.
 
-libzmq needs 40 bytes of memory for each of them.
+libzmq needs 40 bytes of memory for each byte of a subscription.
 """
 
 LATCHED = 1
-"""Flag: the publisher keeps this message for later subscribers."""
+"""Flag: the topic is latched, so the publisher sends its newest message to later subscribers."""
 EXTENSION = 2
 """Flag: a fourth part follows, a msgpack map."""
 BYE = 4
 """Flag of a notice: the publisher is closing and has sent everything."""
 BATCH = 8
-"""Flag: one part with several messages. Sent only to subscribers with hello level 3."""
+"""Flag: the part contains several messages. Sent only to subscribers with hello level 3."""
 SHARED = 16
-"""Flag: the payload is in shared memory; the message has its number (u64) instead."""
+"""Flag: the payload is in shared memory; the message contains its number (u64) instead."""
 OFFER = 32
 """Flag of a notice: an offer of shared memory. The size field of the header is the memory's generation."""
 
@@ -53,9 +54,15 @@ HELLO_BATCHES = b"\xffhello3/"
 """Prefix of a hello filter, level 3: the subscriber also reads batches (`nep.protocol.batch`)."""
 _HELLOS = (HELLO_BATCHES, HELLO_ACKNOWLEDGES, HELLO_ONE_PART, HELLO)
 ACKNOWLEDGEMENT = b"\xffread/"
-"""Prefix of the filter that acknowledges an echo. It is removed immediately after it was set."""
+"""Prefix of the filter that acknowledges an echo.
+
+The filter is removed immediately after it was set.
+"""
 ACCEPTANCE = b"\xffshares/"
-"""Prefix of the filter that accepts an offer of shared memory. It is removed immediately after it was set."""
+"""Prefix of the filter that accepts an offer of shared memory.
+
+The filter is removed immediately after it was set.
+"""
 
 _HEX = re.compile(rb"[0-9a-fA-F]{16}")
 """Pattern of an id; stricter than `int`, which accepts signs and underscores."""
@@ -91,7 +98,10 @@ class Header(NamedTuple):
 
 
 def form_of(codec: int, flags: int) -> int:
-    """Return the first four bytes of a header as a number; most messages of a publisher have the same."""
+    """Return the first four bytes of a header (version, codec, flags) as a number.
+
+    The number is the same for most messages of a publisher, so back ends compute it in advance.
+    """
     return VERSION | codec << 8 | flags << 16
 
 
@@ -103,7 +113,7 @@ unpack_header: Callable[[bytes], tuple[int, int, int, int, int]] = _FAST_HEADER.
 Raises `struct.error`.
 """
 unpack_header_at: Callable[[bytes, int], tuple[int, int, int, int, int]] = _FAST_HEADER.unpack_from
-"""Fast decoder for a header at an offset, like `unpack_quickly`."""
+"""Fast decoder for a header at an offset, like `unpack_header`."""
 
 
 def check_topic(topic: str) -> str:
@@ -160,9 +170,9 @@ class Hello(NamedTuple):
     Attributes:
         subscriber: Id of the subscriber.
         topic: Name of the topic.
-        one_part: True if it reads messages of one part.
-        tells: True if it acknowledges echoes.
-        batches: True if it reads batches.
+        one_part: True if the subscriber reads messages of one part.
+        tells: True if the subscriber acknowledges echoes.
+        batches: True if the subscriber reads batches.
     """
 
     subscriber: int
@@ -173,7 +183,14 @@ class Hello(NamedTuple):
 
 
 class Acknowledgement(NamedTuple):
-    """Parsed acknowledgement of all messages up to `seq`; the subscriber accepts `bound_bytes` in flight."""
+    """Parsed acknowledgement of a subscriber.
+
+    Attributes:
+        subscriber: Id of the subscriber.
+        publisher: Id of the publisher.
+        seq: Sequence number of the last message read.
+        bound_bytes: Maximum size of unacknowledged messages that the subscriber accepts.
+    """
 
     subscriber: int
     publisher: int
@@ -182,7 +199,13 @@ class Acknowledgement(NamedTuple):
 
 
 class OfferAcceptance(NamedTuple):
-    """Parsed acceptance of shared memory of a publisher."""
+    """Parsed acceptance of a publisher's shared memory.
+
+    Attributes:
+        subscriber: Id of the subscriber.
+        publisher: Id of the publisher.
+        generation: Generation of the memory, as in the offer.
+    """
 
     subscriber: int
     publisher: int
@@ -194,7 +217,12 @@ def hello_part(
 ) -> bytes:
     """Return the hello filter of a subscriber, which is also the first part of messages addressed to it.
 
-    Each ability includes the previous ones: `one_part`, `tells`, `batches`.
+    Args:
+        subscriber: Id of the subscriber.
+        topic: Name of the topic.
+        one_part: The subscriber reads messages of one part.
+        tells: The subscriber also acknowledges echoes.
+        batches: The subscriber also reads batches.
     """
     begin = (
         HELLO_BATCHES if batches else HELLO_ACKNOWLEDGES if tells else HELLO_ONE_PART if one_part else HELLO
@@ -218,7 +246,7 @@ def parse_hello(part: bytes) -> Hello | None:
 
 
 def acknowledgement_part(read: Acknowledgement) -> bytes:
-    """Return the filter that acknowledges all messages up to one."""
+    """Return the filter that acknowledges all messages up to `read.seq`."""
     return ACKNOWLEDGEMENT + b"/".join(b"%016x" % number for number in read)
 
 
@@ -297,7 +325,7 @@ def join(
     payload: bytes | memoryview,
     extension: Mapping[str, object] | None = None,
 ) -> tuple[bytes | memoryview, ...]:
-    """Return all parts of a message. The flag EXTENSION is set if there is an extension."""
+    """Return all parts of a message. The flag EXTENSION is set if `extension` is not None."""
     if not extension:
         return topic_part(topic), header.pack(), payload
     flagged = header._replace(flags=header.flags | EXTENSION)
@@ -305,7 +333,10 @@ def join(
 
 
 def split_single_part(part: bytes) -> tuple[bytes, bytes, bytes]:
-    """Split a message of one part into topic, header and payload. Raises `WireError` if it is too short."""
+    """Split a message of one part into topic, header and payload.
+
+    Raises `WireError` if the part is too short.
+    """
     cut = part.find(b"\0") + 1
     if not cut or len(part) < cut + HEADER_BYTES:
         raise WireError(
@@ -324,10 +355,11 @@ class Parts(NamedTuple):
 
 
 def split(parts: Sequence[bytes | memoryview]) -> Parts:
-    """Parse a message. For a batch the payload is its body: see `nep.protocol.batch.read_parts`.
+    """Parse a message. The payload of a batch is its body, which `nep.protocol.batch.read_parts` splits.
 
     Raises:
-        WireError: The parts violate the specification. The rules are checked in the order of docs/wire.md.
+        WireError: The parts violate the specification. The rules are checked in the order of
+            docs/wire.md.
     """
     if not parts:
         raise WireError(_("a message must have 3 or 4 parts, but this one has none"), code="part-count")
@@ -342,7 +374,9 @@ def split_rest(
 ) -> tuple[Header, bytes | memoryview, Mapping[str, object]]:
     """Parse the parts after the first: header, payload and extension. Raises `WireError`.
 
-    ``is_one_part`` is True if they were split from one part; a batch is only allowed then.
+    Args:
+        rest: The parts.
+        is_one_part: True if the parts were split from one part; only then a batch is allowed.
     """
     if not rest:
         raise WireError(_("a message must have 3 or 4 parts, but this one has 1"), code="part-count")

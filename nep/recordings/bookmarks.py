@@ -1,7 +1,7 @@
 """Bookmarks of a recording: named moments.
 
-Bookmarks set while recording are stored as notes in the file itself. Later ones are stored in a JSON file
-next to the recording, which is never changed.
+Bookmarks that are set while recording are stored in the recording, as notes. Bookmarks that are set later are
+stored in a JSON file next to the recording, because a recording is never modified.
 """
 
 from __future__ import annotations
@@ -27,9 +27,12 @@ _MAX_NAME_LENGTH = 200
 
 @dataclass(frozen=True)
 class Bookmark:
-    """Bookmark: time in ns since 1970, and name (may be "").
+    """Named moment of a recording.
 
-    `is_note` is True if the recording contains it.
+    Attributes:
+        at_ns: Time in ns since 1970.
+        name: Name; may be "".
+        is_note: True if the bookmark is stored in the recording and so can't be changed.
     """
 
     at_ns: int
@@ -38,10 +41,17 @@ class Bookmark:
 
 
 class Bookmarks:
-    """Bookmarks of one recording, sorted by time. Changes are saved immediately. Not thread-safe."""
+    """Bookmarks of one recording, sorted by time. Changes are saved immediately. Not thread-safe.
+
+    Args:
+        recording: Recording, which must stay open.
+    """
 
     def __init__(self, recording: Recording) -> None:
-        """Read the bookmarks. An unreadable file counts as empty and is renamed at the next change."""
+        """Read the bookmarks.
+
+        An unreadable bookmark file counts as empty and is renamed at the next change.
+        """
         self._recording = recording
         self.path = recording.path.with_name(f"{recording.path.name}.bookmarks.json")
         """File with the bookmarks that are not notes."""
@@ -64,21 +74,26 @@ class Bookmarks:
         return self._all
 
     def before(self, at_ns: int) -> Bookmark | None:
-        """Return the last bookmark before a time, or None."""
+        """Return the last bookmark before a time in ns since 1970, or None."""
         place = bisect_left(self._all, at_ns, key=_at_ns)
         return self._all[place - 1] if place else None
 
     def after(self, at_ns: int) -> Bookmark | None:
-        """Return the first bookmark after a time, or None."""
+        """Return the first bookmark after a time in ns since 1970, or None."""
         place = bisect_right(self._all, at_ns, key=_at_ns)
         return self._all[place] if place < len(self._all) else None
 
     # ---- changes
 
     def add(self, at_ns: int, name: str = "") -> Bookmark:
-        """Add a bookmark; the time is limited to that of the recording.
+        """Add a bookmark and return it.
 
-        Raises `RecordingError` if the bookmark can't be saved.
+        Args:
+            at_ns: Time in ns since 1970; clamped to the time span of the recording.
+            name: Name of the bookmark.
+
+        Raises:
+            RecordingError: The bookmark can't be saved.
         """
         if len(self._saved) >= MAX_BOOKMARKS:
             reason = _("it already has {most} bookmarks, the maximum; delete one first").format(
@@ -91,9 +106,11 @@ class Bookmarks:
         return bookmark
 
     def rename(self, bookmark: Bookmark, name: str) -> Bookmark:
-        """Rename a bookmark.
+        """Rename a bookmark and return the new one.
 
-        Raises `ValueError` for a note or an unknown bookmark, and `RecordingError` if it can't be saved.
+        Raises:
+            ValueError: The bookmark is a note or doesn't exist.
+            RecordingError: The change can't be saved.
         """
         new = replace(bookmark, name=name[:_MAX_NAME_LENGTH])
         saved = list(self._saved)

@@ -1,6 +1,6 @@
 """Recorder process: `python -m nep.recordings.child`.
 
-Commands are lines of JSON on standard input, events are lines on standard output:
+Commands are lines of JSON on standard input, events are lines of JSON on standard output:
 
     {"op": "record", "path": "a.mcap", "topics": ["/camera", "/arm/*"], "left_out": [], "note": "",
      "seconds": 1800, "size_bytes": 8000000000}              limits are optional
@@ -21,8 +21,8 @@ Commands are lines of JSON on standard input, events are lines on standard outpu
                                              once a second
     {"event": "problem", "op": ..., "sentence": ..., "path": ...}
 
-A recording that stops by itself, such as on a full disk, reports the same events; its status has the
-"problem". At the end of its input the process finishes the recording and exits.
+A recording that stops because of an error, such as a full disk, reports the same events, with the error as
+"problem" in its status. When standard input ends, the process finishes the recording and exits.
 """
 
 from __future__ import annotations
@@ -54,15 +54,23 @@ STATS_INTERVAL_S = 1.0
 _MAX_LINE_BYTES = 1_000_000
 _MAX_SECONDS = 1e9
 _RUN_ROLES = ("runs", "alarms")
-"""Roles that the command "say" accepts; the recorder itself writes the others."""
+"""Roles that the command "say" accepts. Entries of other roles are written by the recorder itself."""
 _MAX_COPIES = 4
-"""Maximum number of concurrent copies of the ring; each reads and writes at full disk speed."""
+"""Maximum number of concurrent copies of the ring, each of which reads and writes at full disk speed."""
 EventCallback = Callable[[Mapping[str, object]], object]
 
 
 @dataclass(frozen=True)
 class _ActiveRecording:
-    """Current recording. Stops at the time `until` (of the clock) or at `most_bytes`, if set."""
+    """Current recording.
+
+    Attributes:
+        writer: Writer of the recording.
+        recorder: Recorder that passes messages to the writer.
+        path: File of the recording.
+        until: Time at which the recording stops (clock of the service); None for no limit.
+        most_bytes: File size at which the recording stops; None for no limit.
+    """
 
     writer: RecordingWriter
     recorder: Recorder
@@ -79,12 +87,12 @@ class _ActiveRecording:
 
 
 class RecorderService:
-    """Executor of commands.
+    """Executor of the commands of another process.
 
     Args:
         node: Node that subscribes to the topics; stays open.
-        tell: Called with events, from any thread, one at a time.
-        stats_interval_s: Interval between "figures" events in seconds.
+        tell: Called with events, one at a time, in any thread.
+        figures_s: Interval between "figures" events in seconds.
         clock: Monotonic clock in seconds.
     """
 
@@ -96,7 +104,7 @@ class RecorderService:
         stats_interval_s: float = STATS_INTERVAL_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Initialize the service; the node is not closed with it."""
+        """Start the thread that reports the state of recordings. The node stays open after `close`."""
         self._clock = clock
         self._node, self._report = node, tell
         self._tell_lock = threading.Lock()
@@ -121,7 +129,7 @@ class RecorderService:
         self._thread.start()
 
     def execute(self, line: bytes) -> None:
-        """Execute the command in a line. Errors are reported as events, not raised."""
+        """Execute the command in a line of JSON. Errors are reported as events, not raised."""
         try:
             order = orjson.loads(line)
         except orjson.JSONDecodeError:
@@ -145,7 +153,7 @@ class RecorderService:
             self._report_problem(op, words, path)
 
     def close(self) -> None:
-        """Stop all recording and finish the file. Errors are reported as events, not raised."""
+        """Stop the recording and the ring, and finish the file. Errors are reported as events, not raised."""
         self._is_ending = True
         self._check_now.set()
         self._thread.join()
@@ -156,7 +164,12 @@ class RecorderService:
             self._report_errors("end_ring", "", lambda: self._stop_ring({}))
 
     def report(self, event: str, **content: object) -> None:
-        """Send an event to the parent process."""
+        """Send an event to the parent process. Thread-safe.
+
+        Args:
+            event: Name of the event.
+            content: Further fields of the event.
+        """
         with self._tell_lock:
             self._report({"event": event, **content})
 
@@ -360,7 +373,7 @@ def _stop_on_signals() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the recorder process: execute commands from standard input until it ends."""
+    """Run the recorder process: execute commands from standard input until the input ends."""
     parser = argparse.ArgumentParser(prog="nep.recordings.child")
     parser.add_argument("--master", default=None)
     parser.add_argument("--transport", default="zeromq")

@@ -1,7 +1,7 @@
-"""Copying of a part of a recording with the original channels, bytes, sequence numbers and times.
+"""Copying of a part of a recording, with unchanged channels, data, sequence numbers and times.
 
-Recordings of other programs keep their encodings and schemas and get no counts. In recordings of nep, lost
-and late messages are counted again within the part.
+Recordings of other programs keep their encodings and schemas, and get no message counts. For recordings of
+nep, lost and late messages within the part are counted.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ def copy_part(
     topics: Collection[str],
     copied: Callable[[], object],
 ) -> int:
-    """Write a part of a recording to a new, complete file; return its number of messages.
+    """Write a part of a recording to a new, complete file; return the number of messages written.
 
     Args:
         recording: Recording to copy from.
         path: File to write; an existing file is overwritten.
         span: Start (inclusive) and end (exclusive) in ns since 1970; None for no limit.
-        topics: Topics of the part; topics without messages are included.
-        copied: Called for each message.
+        topics: Names of the topics to copy; topics without messages are included.
+        copied: Called after each message, to report progress.
 
     Raises:
         RecordingError: There are too many channels.

@@ -1,7 +1,7 @@
 """Export of recordings: values as CSV or Parquet, images as files or video, parts as MCAP.
 
-Writes one file (or folder of images) per topic, or one MCAP file with all topics. Existing files are not
-overwritten, and incomplete files are removed. Messages that can't be decoded are skipped and counted.
+The result is one file (or folder of images) per topic, or one MCAP file with all topics. Existing files are
+not overwritten, and incomplete files are removed. Messages that can't be decoded are skipped and counted.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from nep.system.replace_file import replace_file
 FORMATS = ("csv", "parquet", "pictures", "mp4", "mcap")
 MAX_COLUMNS = 5_000
 MAX_FILES = 1_000
-"""Maximum number of exported files; there is one per topic."""
+"""Maximum number of exported files, of which there is one per topic."""
 _MAX_LIST_COLUMNS = 100
-"""Maximum length of a list for a separate column per item; a longer list is one column of JSON."""
+"""Maximum length of a list whose items have separate columns. A longer list is one column of JSON."""
 _MAX_DEPTH = 20
 _CELLS_PER_BATCH = 200_000
 _FIRST_COLUMNS = ("time_ns", "time_s", "stamp_ns", "stamp_s", "seq", "publisher")
@@ -44,8 +44,8 @@ class Part:
     """Part of a recording.
 
     Attributes:
-        start_ns: Start in ns since 1970; None for no limit.
-        end_ns: End in ns since 1970; None for no limit.
+        start_ns: Start in ns since 1970 (inclusive); None for no limit.
+        end_ns: End in ns since 1970 (exclusive); None for no limit.
         topics: Names of topics; None for all topics that the format supports.
     """
 
@@ -62,9 +62,9 @@ class ExportedFile:
     """Exported file or folder.
 
     Attributes:
-        topic: Name of the topic, or "" for a file with all topics.
-        path: File or folder.
-        count: Number of messages in it.
+        topic: Name of the topic; "" for a file with all topics.
+        path: Path of the file or folder.
+        count: Number of exported messages.
         unreadable: Number of messages that were skipped because they can't be decoded.
     """
 
@@ -139,7 +139,12 @@ def export(
 
 
 def can_export(kind: str, codec: str) -> bool:
-    """Return True if messages of a codec can be exported to a format."""
+    """Return True if a format supports messages of a codec.
+
+    Args:
+        kind: One of `FORMATS`.
+        codec: Name of the codec.
+    """
     if kind in {"pictures", "mp4"}:
         return codec == "image"
     return kind == "mcap" or codec in {"json", "msgpack", "string"}
@@ -213,7 +218,7 @@ def _file_name(topic: str, used_names: set[str], suffix: str) -> str:
 
 
 class _Progress:
-    """Progress of the whole export, over all its files."""
+    """Progress of an export over all its files."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._progress = total, progress
@@ -226,7 +231,7 @@ class _Progress:
 
 
 class _Source:
-    """Messages of one topic in the exported part."""
+    """Messages of one topic in the part that is exported."""
 
     def __init__(self, recording: Recording, topic: str, part: Part, counted: _Progress) -> None:
         self._recording, self.topic, self._part, self._counted = recording, topic, part, counted
@@ -272,9 +277,9 @@ def _encodable(text: str) -> str:
 
 
 def flatten(payload: object) -> dict[str, object]:
-    """Return the scalar values of a payload by field path, such as "pose.x" and "joints[3]".
+    """Return the scalar values of a payload by field path, such as "pose.x" or "joints[3]".
 
-    The key for a scalar payload is "value".
+    A payload that is a scalar itself has the path "value".
     """
     columns: dict[str, object] = {}
     _flatten(payload, "", columns, _MAX_DEPTH)

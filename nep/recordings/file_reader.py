@@ -1,7 +1,7 @@
-"""Reading of raw messages from any time of a recording, with bounded memory.
+"""Reading of raw messages at any time of a recording, with bounded memory.
 
-This module handles channels and bytes; `nep.recordings.reader` handles topics and messages. Therefore it can
-run in another process (`nep.recordings.apart.remote`).
+This module provides channels and bytes, so that it can run in another process
+(`nep.recordings.apart.remote`); `nep.recordings.reader` provides topics and messages.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 
 CACHE_BYTES = 64_000_000
 _MAX_EXACT_CHUNKS = 200
-"""Maximum number of chunks whose message indexes are read for exact counts; enough for some minutes."""
+"""Maximum number of chunks, some minutes long, that `densities` counts exactly with message indexes."""
 _MAX_COUNTED_CHUNKS = 10_000
-"""Maximum number of chunks that are counted; beyond, the statistics in the file are used."""
+"""Maximum number of chunks that are counted. For more chunks, the statistics in the file are used."""
 _MAX_HELD_BYTES = 64_000_000
-"""Maximum size of overlapping chunks kept in memory to sort their messages; beyond, they are not sorted."""
+"""Maximum size in bytes of overlapping chunks in memory; if it is exceeded, messages are not fully sorted."""
 _LARGE_CHUNK_BYTES = 8_000_000
-"""Chunk size above which messages are copied, so that a message doesn't keep its chunk in memory."""
+"""Chunk size above which messages are copied, so that a single message doesn't retain the whole chunk."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,10 @@ class FileFacts:
         channels: Channels by number.
         counts: Number of messages by channel, including channels without messages.
         start_ns: Time of the first message in ns since 1970; 0 if there are no messages.
-        end_ns: Time of the last message; 0 if there are no messages.
+        end_ns: Time of the last message in ns since 1970; 0 if there are no messages.
         size_bytes: Size of the intact part of the file.
         is_complete: True if the file was closed properly.
-        metadata: Metadata records.
+        metadata: Metadata records, as (name, values).
         attachments: Attached files.
         compressions: Number of chunks by compression ("" for none, "-" for messages outside of chunks).
         profile: MCAP profile.
@@ -79,7 +79,7 @@ class FileFacts:
 
 
 class RawFile(Protocol):
-    """Recording file that is open for reading in this or another process. Thread-safe."""
+    """Interface to a recording file that is open in this or another process. Thread-safe."""
 
     @property
     def facts(self) -> FileFacts:
@@ -87,7 +87,7 @@ class RawFile(Protocol):
 
     @property
     def corruption(self) -> Sequence[CorruptRange]:
-        """Unreadable pieces of the file found so far."""
+        """Unreadable places of the file found so far."""
 
     def read_raw(
         self,
@@ -96,31 +96,43 @@ class RawFile(Protocol):
         channels: Collection[int],
         pieces: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
-        """Iterate over the messages of channels by log time.
+        """Iterate over the messages of some channels, sorted by log time.
 
         Args:
-            start_ns: Start (inclusive), or None.
-            end_ns: End (exclusive), or None.
+            start_ns: Start in ns since 1970 (inclusive); None for no limit.
+            end_ns: End in ns since 1970 (exclusive); None for no limit.
             channels: Numbers of the channels.
-            pieces: Chunks to read, as returned by `pieces_of`; None for all.
+            pieces: Numbers of the chunks to read, as returned by `chunks_with`; None for all.
         """
 
     def newest(self, at_ns: int, groups: Sequence[Collection[int]]) -> list[RawMessage | None]:
-        """Return the last message at or before `at_ns` for each group of channels."""
+        """Return the last message at or before a time for each group of channels; None if there is none.
+
+        Args:
+            at_ns: Time in ns since 1970.
+            groups: Groups of channel numbers.
+        """
 
     def newest_times(self, at_ns: int, channels: Collection[int]) -> dict[int, int]:
-        """Return the log time of the last message at or before `at_ns` by channel. Reads only indexes."""
+        """Return the log time of the last message at or before `at_ns`, by channel. Reads only indexes."""
 
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
-        """Return the number of messages by channel in each of ``buckets`` equal parts of [start, end)."""
+        """Return the number of messages in each of several equal time intervals, by channel.
+
+        Args:
+            start_ns: Start of the first interval in ns since 1970.
+            end_ns: End of the last interval (exclusive).
+            buckets: Number of intervals.
+            channels: Numbers of the channels.
+        """
 
     def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
         """Return the numbers of the chunks that contain messages of these channels, in order."""
 
     def close(self) -> None:
-        """Close the file; later calls raise `ClosedError`. Idempotent."""
+        """Close the file. Later calls raise `ClosedError`. Idempotent."""
 
 
 class _LoadedChunk:
@@ -166,13 +178,13 @@ class FileReader:
         progress: Callable[[int, int], object] | None = None,
         budget: ReadBudget | None = None,
     ) -> None:
-        """Open a file using its summary; if there is none, by scanning the records.
+        """Open a file using its summary or, if there is none, by scanning the records.
 
         Args:
             path: File to open.
             cache_bytes: Maximum size of cached decompressed chunks.
             progress: Called with bytes done and in total during a scan; its exceptions propagate.
-            budget: Limit of the work until the file is closed. Default: only opening is limited.
+            budget: Limit of the work until the file is closed; None limits only opening.
 
         Raises:
             RecordingError: The file can't be opened or is not a recording.
@@ -247,7 +259,7 @@ class FileReader:
 
     @property
     def corruption(self) -> Sequence[CorruptRange]:
-        """Unreadable pieces of the file found so far."""
+        """Unreadable places of the file found so far."""
         with self._lock:
             return tuple(
                 sorted(
@@ -269,7 +281,7 @@ class FileReader:
         channels: Collection[int],
         pieces: Collection[int] | None = None,
     ) -> Iterator[RawMessage]:
-        """Iterate over messages of channels by log time. See `RawFile.raw`."""
+        """Iterate over the messages of some channels, sorted by log time. See `RawFile.read_raw`."""
         numbers = self._chunks_in(start_ns, end_ns, channels, pieces)
         first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
         pending: list[tuple[int, int, RawMessage]] = []
@@ -382,11 +394,11 @@ class FileReader:
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, channels: Collection[int]
     ) -> dict[int, Sequence[int]]:
-        """Return the number of messages by channel in each part of [start, end). See `RawFile.densities`.
+        """Return the number of messages in each of several equal time intervals. See `RawFile.densities`.
 
-        Payloads are not read. Short spans are counted exactly with the indexes. For long spans, the messages
-        of a chunk are distributed evenly over its duration, which is at most half a second in recordings of
-        nep.
+        Payloads are not read. Short spans are counted exactly with the indexes. For long spans, the
+        messages of a chunk are distributed evenly over its duration, which is at most half a second in
+        recordings of nep.
         """
         result: dict[int, list[int]] = {}
         first = bisect_left(self._latest_ends, max(0, start_ns))
@@ -408,7 +420,7 @@ class FileReader:
         return dict(result)
 
     def chunks_with(self, channels: Collection[int]) -> Sequence[int]:
-        """Return the numbers of the chunks with messages of these channels. See `RawFile.pieces_of`."""
+        """Return the numbers of the chunks with messages of these channels. See `RawFile.chunks_with`."""
         return sorted({number for channel in channels for number in self._in_chunks.get(channel, ())})
 
     def _chunk_counts(self, number: int) -> Mapping[int, int]:
@@ -426,7 +438,7 @@ class FileReader:
     def check(
         self, progress: Callable[[int, int], object] | None = None, most_bytes: int | None = None
     ) -> bool:
-        """Read every chunk once, so that `damage` is complete.
+        """Read every chunk once, so that `corruption` becomes complete.
 
         Args:
             progress: Called with bytes done and in total.

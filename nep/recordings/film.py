@@ -1,4 +1,4 @@
-"""Videos from a recording's images, in a container that OpenCV can write on this computer.
+"""Video files of a recording's images, in a container that OpenCV can write on this computer.
 
 MP4 requires FFmpeg, which Studio's packages don't include. OpenCV itself can write Motion JPEG in .avi files,
 which VLC and the players of Windows and Linux support.
@@ -18,20 +18,33 @@ from nep.messages.message import Message
 from nep.system.replace_file import replace_file
 
 MAX_DURATION_S = 86_400.0
-"""Maximum duration in seconds; an image from another day would cause millions of frames."""
+"""Maximum duration in seconds, because an image from another day would cause millions of frames."""
 _TRIAL_SIZE_PX = (64, 48)
 
 
 @dataclass(frozen=True)
 class Container:
-    """Video container: file suffix, codec, and OpenCV back end that writes and reads it."""
+    """Video container, and the OpenCV back end that writes and reads it.
+
+    Attributes:
+        suffix: File suffix, such as ".mp4".
+        fourcc: Four-character code of the codec.
+        api: Name of the OpenCV back end.
+    """
 
     suffix: str
     fourcc: str
     api: str
 
     def new_writer(self, opencv: Any, path: Path, fps: float, size: tuple[int, int]) -> Any:  # noqa: ANN401
-        """Create an OpenCV writer for a file; check `isOpened` of the writer."""
+        """Create an OpenCV `VideoWriter`, which may have failed to open (see its `isOpened`).
+
+        Args:
+            opencv: The module cv2.
+            path: File to write.
+            fps: Frame rate in Hz.
+            size: Width and height in px.
+        """
         code = opencv.VideoWriter_fourcc(*self.fourcc)
         return opencv.VideoWriter(str(path), getattr(opencv, self.api), code, fps, size)
 
@@ -41,9 +54,15 @@ CONTAINERS = (Container(".mp4", "mp4v", "CAP_ANY"), Container(".avi", "MJPG", "C
 
 
 def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401 - a module
-    """Return the first container that OpenCV can write, trying in a temporary subfolder of `folder`.
+    """Return the first container that OpenCV can write, determined by writing a test file.
 
-    Raises `RecordingError` if there is none, and `OSError` if the folder is not writable.
+    Args:
+        opencv: The module cv2.
+        folder: Writable folder, in which a temporary folder is created.
+
+    Raises:
+        RecordingError: OpenCV can't write any container.
+        OSError: The folder is not writable.
     """
     with tempfile.TemporaryDirectory(prefix=".film-", dir=folder) as trial:
         for container in CONTAINERS:
@@ -58,7 +77,10 @@ def available_container(opencv: Any, folder: Path) -> Container:  # noqa: ANN401
 
 
 def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
-    """Convert an image to three channels of 8 bits; return None if the image can't be decoded."""
+    """Convert the image of a message to a BGR array with 8 bits per channel.
+
+    Returns None if the image can't be decoded.
+    """
     try:
         frame: Any = message.payload
     except DecodeError:
@@ -73,7 +95,14 @@ def frame_of(opencv: Any, message: Message) -> Any:  # noqa: ANN401 - an array
 
 
 class VideoFile:
-    """Video file with a constant frame rate. The first image determines the frame size."""
+    """Video file with a constant frame rate. The first image determines the frame size.
+
+    Args:
+        opencv: The module cv2.
+        path: File to write.
+        fps: Frame rate in Hz.
+        container: Container of the video.
+    """
 
     def __init__(
         self,
@@ -92,9 +121,14 @@ class VideoFile:
         self._written = path.with_name(f"{path.name}{container.suffix}")
 
     def add(self, log_ns: int, frame: Any) -> None:  # noqa: ANN401 - an array
-        """Add an image at a time in ns since 1970.
+        """Add an image, and repeat the previous one until that time.
 
-        Raises `RecordingError` if the video can't be written or is too long.
+        Args:
+            log_ns: Time of the image in ns since 1970.
+            frame: BGR array with 8 bits per channel.
+
+        Raises:
+            RecordingError: The video can't be written or is too long.
         """
         if self._film is None:
             height, width = frame.shape[:2]
@@ -114,9 +148,10 @@ class VideoFile:
         self._last = frame
 
     def finish(self) -> None:
-        """Write the last frame and close the file. Raises `RecordingError` if frames are missing in the file.
+        """Write the last frame and complete the file.
 
-        OpenCV does not report a full disk, so the frames in the file are counted.
+        Raises `RecordingError` if frames are missing: OpenCV does not report a full disk, so the frames in
+        the file are counted.
         """
         if self._film is None:
             return
@@ -136,7 +171,7 @@ class VideoFile:
             self._film.release()
 
     def remove(self) -> None:
-        """Close and delete an incomplete file."""
+        """Close and delete the incomplete file."""
         self.close()
         with suppress(OSError):
             self._written.unlink(missing_ok=True)

@@ -1,8 +1,8 @@
 """Replay of recordings with their original timing.
 
-`Playback` contains the timing, with an injected clock and without waiting. `Player` is a thread that passes
-due messages to a sink. Neither publishes messages; a sink may. The module also contains functions for such
-sinks, above all to find the topics that move robots.
+`Playback` computes the timing, with an injected clock and without waiting. `Player` is a thread that passes
+due messages to a sink. Neither publishes messages; a sink may. The module also contains functions for sinks
+that publish, such as `moving_topics`.
 """
 
 from __future__ import annotations
@@ -46,16 +46,17 @@ __all__ = [
 
 SPEED_MIN, SPEED_MAX = 0.1, 10.0
 _MAX_LAG_S = 0.25
-"""Maximum delay caused by a slow sink in seconds.
+"""Maximum delay in seconds that a slow sink may cause.
 
-Beyond, playback slows down (see `PlayerStatus.true_speed`) instead of catching up with a burst.
+When it is exceeded, playback slows down (see `PlayerStatus.true_speed`) instead of catching up with a
+burst.
 """
 _MAX_BATCH = 2_000
 _MAX_WAIT_S = 0.05
 _SPEED_WINDOW_S = 1.0
 _MAX_KINDS = 10_000
 _COMMAND_TYPES = frozenset({COMMAND_TYPE, "geometry_msgs/Twist", "geometry_msgs/TwistStamped"})
-"""Message types of commands that move a robot or a ROS base (docs/robots.md)."""
+"""Message types of commands to a robot or a ROS base (docs/robots.md)."""
 _MAX_DESCRIPTIONS = 10_000
 
 
@@ -66,10 +67,10 @@ class PlayerStatus:
     Attributes:
         position_ns: Position in ns since 1970.
         is_playing: True while playing.
-        is_at_end: True at the end of the part or recording.
-        speed: Requested speed.
-        true_speed: Speed over the last second; None while paused or unknown.
-        loop: Start and end of the chosen part; None for the whole recording.
+        is_at_end: True if the position is at the end of the selected part or of the recording.
+        speed: Requested speed factor.
+        true_speed: Measured speed factor over the last second; None while paused or unknown.
+        loop: Start and end of the selected part in ns since 1970; None for the whole recording.
         is_looping: True if the part is repeated.
     """
 
@@ -87,11 +88,10 @@ class DueMessages:
     """Messages that are due now.
 
     Attributes:
-        messages: Messages in order.
-        is_jump: True if these are the newest messages of each topic after a seek, instead of the next
-            messages.
+        messages: Messages in order of their log times.
+        is_jump: True after a seek, when the messages are the newest of each topic instead of the next ones.
         wait_s: Seconds until the next call; None while paused.
-        log_ns: Time of receipt of each message; empty for a jump.
+        log_ns: Time of receipt of each message in ns since 1970; empty for a jump.
     """
 
     messages: Sequence[Message]
@@ -111,13 +111,13 @@ class Playback:
         topics: Collection[str] | None = None,
         remap: Mapping[str, str] | None = None,
     ) -> None:
-        """Initialize, paused before the first message.
+        """Initialize the playback, paused before the first message.
 
         Args:
             recording: Recording to play.
             clock: Monotonic clock in seconds.
             topics: Names of the topics to play; None for all.
-            remap: New names of topics.
+            remap: New names of topics, by recorded name.
         """
         self._recording, self._clock = recording, clock
         self._topics = topics
@@ -140,7 +140,7 @@ class Playback:
     # ---- controls
 
     def play(self) -> None:
-        """Start to play; from the beginning if the position is at the end."""
+        """Start playing; from the beginning if the position is at the end."""
         if not self._is_playing:
             if self._is_at_end():
                 self.rewind()
@@ -154,7 +154,10 @@ class Playback:
             self._set_anchor()
 
     def seek(self, at_ns: int) -> None:
-        """Move to a time. The newest message of each topic at or before that time becomes due at once."""
+        """Move to a time in ns since 1970.
+
+        The newest message of each topic at or before that time becomes due at once.
+        """
         at_ns = max(self._recording.start_ns, min(at_ns, self._recording.end_ns))
         self._jump_to(at_ns, at_ns)
 
@@ -167,7 +170,7 @@ class Playback:
         self._set_anchor()
 
     def step(self, topic: str, *, forward: bool = True) -> bool:
-        """Move to the next or previous message of a topic, and pause; return False if there is none."""
+        """Pause, and move to the next or previous message of a topic; return False if there is none."""
         find = self._recording.after if forward else self._recording.before
         found = find(self._position_ns, topic)
         self.pause()
@@ -180,7 +183,8 @@ class Playback:
         """Replace the topics to play.
 
         Returns:
-            The newest message of each added topic; empty if a jump is due, which includes these messages.
+            The newest message of each added topic; empty while a jump is due, because the jump includes
+            them.
         """
         new = set(topics) if self._topics is None else set(topics).difference(self._topics)
         self._topics = frozenset(topics)
@@ -208,7 +212,15 @@ class Playback:
         self._set_anchor()
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
-        """Repeat a part of the recording, or the whole recording. Raises `ValueError` for an empty part."""
+        """Repeat a part of the recording, or the whole recording.
+
+        Args:
+            start_ns: Start of the part in ns since 1970; None for the whole recording.
+            end_ns: End of the part in ns since 1970; None for the whole recording.
+
+        Raises:
+            ValueError: The part is empty or outside the recording.
+        """
         if start_ns is None or end_ns is None:
             self._loop = None
         else:
@@ -222,15 +234,15 @@ class Playback:
         self._is_looping = True
 
     def clear_loop(self) -> None:
-        """Stop repeating, and play beyond the end of the part."""
+        """Stop repeating and deselect the part; playback continues beyond its end."""
         self._is_looping, self._loop = False, None
 
     def play_once(self) -> None:
-        """Stop repeating; playback ends at the end of the part."""
+        """Stop repeating; playback stops at the end of the part."""
         self._is_looping = False
 
     def rewind(self) -> None:
-        """Move before the first message of the part without making messages due at once."""
+        """Move before the first message of the part, without a jump."""
         self._position_ns, self._jump = self._first_ns(), None
         self._read_from(self._position_ns)
         self._set_anchor()
@@ -250,7 +262,7 @@ class Playback:
         )
 
     def advance(self) -> DueMessages:
-        """Return the messages that are due. Call this again within `wait_s` seconds."""
+        """Return the messages that are due. Must be called again within `DueMessages.wait_s` seconds."""
         if self._jump is not None:
             messages, self._jump = self._jump, None
             return DueMessages(messages, is_jump=True, wait_s=0.0 if self._is_playing else None)
@@ -270,10 +282,13 @@ class Playback:
         return DueMessages(messages, False, self._wait_s(), [each.log_ns for each in due])
 
     def messages_at_start(self, topics: Collection[str]) -> Sequence[Message]:
-        """Return the messages at the start of the part if a jump has already shown them.
+        """Return the first messages of the part if a jump has already returned them, else an empty list.
 
-        For sinks that ignore jumps: these messages are not due again, so such a sink would miss them when
-        playing from the beginning.
+        For sinks that ignore jumps: these messages are not due again, so that such a sink would miss them
+        when playing from the beginning.
+
+        Args:
+            topics: Names of the topics.
         """
         first_ns = self._first_ns()
         if self._position_ns != first_ns or self._from_ns != first_ns + 1:
@@ -375,7 +390,7 @@ def _log_ns(each: RecordedMessage) -> int:
 def moving_topics(recording: Recording) -> MovingTopics:
     """Return the topics that move robots, according to descriptions, message types and names.
 
-    The commanded robot may not be in the recording, so its description may be missing.
+    Names are used because a robot that receives commands may not be described in the recording.
     """
     described = {each.name for each in recording.topics.values() if each.msg_type == DESCRIPTION_TYPE}
     robots = dict[RobotControls, None]()
@@ -389,13 +404,17 @@ def moving_topics(recording: Recording) -> MovingTopics:
 
 
 def latched_topics(recording: Recording, topics: Iterable[str]) -> frozenset[str]:
-    """Return those of the topics that are latched."""
+    """Return the subset of `topics` that is latched in the recording."""
     newest = recording.newest(recording.end_ns, list(topics))
     return frozenset(each.message.topic for each in newest.values() if each.message.is_latched)
 
 
 def published_type(message: Message) -> str:
-    """Return the message type for publishing a recorded message so that its bytes are decoded as before."""
+    """Return the message type with which to publish a recorded message.
+
+    If the recorded type would use another codec, the name of the codec is returned, so that the bytes are
+    decoded as before.
+    """
     return message.msg_type if codec_for(message.msg_type).name == message.codec else message.codec
 
 
@@ -405,7 +424,7 @@ class Player:
     Slow callbacks slow down the playback; no message is lost.
 
     Args:
-        playback: Playback to run. After this, change it only with `order`.
+        playback: Playback to run. From now on, change it only with `apply`.
         sink: Called in the player's thread with batches of messages in order.
         on_jump: Called with the newest message of each topic after a seek. Default: `sink`.
         on_end: Called at the end, and after an exception of a callback or of the recording, which is stored
@@ -430,7 +449,11 @@ class Player:
         self._thread.start()
 
     def apply(self, change: Callable[[Playback], object]) -> PlayerStatus:
-        """Change the playback and return its state: `player.order(Playback.play)`. Exceptions propagate."""
+        """Apply a change to the playback and return the new state.
+
+        Args:
+            change: Function of the playback, such as `Playback.play`. Its exceptions propagate.
+        """
         with self._lock:
             change(self._playback)
             self._lock.notify_all()
@@ -469,7 +492,11 @@ class Player:
                 self._on_end()
 
     def close(self, timeout_s: float = 10.0) -> None:
-        """Stop the thread; the recording stays open. Idempotent."""
+        """Stop the thread. The recording stays open. Idempotent.
+
+        Args:
+            timeout_s: Maximum time in seconds to wait for the thread.
+        """
         with self._lock:
             self._is_closed = True
             self._lock.notify_all()

@@ -22,7 +22,12 @@ if TYPE_CHECKING:
 
 
 class RecordedMessage(NamedTuple):
-    """Message and its time of receipt (ns since 1970)."""
+    """Message and its time of receipt.
+
+    Attributes:
+        log_ns: Time of receipt in ns since 1970.
+        message: The message.
+    """
 
     log_ns: int
     message: Message
@@ -38,8 +43,8 @@ class RecordedTopic:
         codec: Codec, according to the first channel.
         message_count: Number of messages.
         publishers: Ids of the publishers; None where unknown.
-        encoding: Message encoding as named in the file.
-        schema_encoding: Schema encoding as named in the file, or "".
+        encoding: Name of the message encoding in the file.
+        schema_encoding: Name of the schema encoding in the file, or "".
     """
 
     name: str
@@ -60,10 +65,10 @@ class Recording:
 
     Attributes:
         start_ns: Time of the first message in ns since 1970; 0 if there are no messages.
-        end_ns: Time of the last message; 0 if there are no messages.
+        end_ns: Time of the last message in ns since 1970; 0 if there are no messages.
         is_complete: False if the file was not closed properly (killed program, truncated file). Its intact
             part can be read; `nep.recordings.repair` completes the file.
-        topics: Topics by name, including those without messages.
+        topics: Topics by name, including topics without messages.
     """
 
     def __init__(
@@ -81,7 +86,7 @@ class Recording:
             cache_bytes: Maximum size of cached decompressed chunks.
             progress: Called with bytes done and in total if the whole file must be scanned; its exceptions
                 propagate.
-            file: File that is already open, for example in another process; closed with the recording.
+            file: File that is already open, such as one of another process; closed with the recording.
 
         Raises:
             RecordingError: The file can't be opened or is not a recording.
@@ -150,22 +155,25 @@ class Recording:
 
     @property
     def size_bytes(self) -> int:
-        """Size of the intact part of the file."""
+        """Size of the intact part of the file in bytes."""
         return self.facts.size_bytes
 
     @property
     def corruption(self) -> Sequence[CorruptRange]:
-        """Unreadable pieces of the file found so far."""
+        """Unreadable places of the file found so far."""
         return self.file.corruption
 
     @property
     def corrupt_range_count(self) -> int:
-        """Number of unreadable pieces found so far."""
+        """Number of unreadable places found so far."""
         return len(self.file.corruption)
 
     @property
     def recorder_metadata(self) -> Mapping[str, str]:
-        """Metadata written by the recorder, as far as known: "note", "end", "started_ns", "ended_ns"."""
+        """Metadata that the recorder wrote to the file.
+
+        The keys are "note", "end", "started_ns" and "ended_ns", as far as known.
+        """
         metadata: dict[str, str] = {}
         for name, values in self.facts.metadata:
             if name == "nep.recording":
@@ -173,10 +181,10 @@ class Recording:
         return metadata
 
     def stats(self) -> dict[str, TopicStats]:
-        """Return the recorder's counts by topic; empty for recordings of other programs.
+        """Return the message counts by topic; empty for recordings of other programs.
 
-        A complete recording has the counts in its metadata. Otherwise they are collected from the recorder's
-        entries, which are written once a second.
+        A complete recording has the counts in its metadata. Otherwise they are read from the entries that
+        the recorder writes once a second.
         """
         totals: dict[str, TopicStats] = {}
         for name, values in self.facts.metadata:
@@ -192,16 +200,22 @@ class Recording:
         return totals
 
     def stats_chunks(self) -> Sequence[int]:
-        """Return the pieces of the file that contain counts, sorted by time, without reading them."""
+        """Return the numbers of the chunks that contain message counts, sorted by time.
+
+        The chunks are not read.
+        """
         return self.file.chunks_with(self._channels_with("figures"))
 
     def stats_over_time(
         self, pieces: Collection[int] | None = None
     ) -> Iterator[tuple[int, dict[str, TopicStats]]]:
-        """Iterate over (time, changed counts by topic), to locate losses in time.
+        """Iterate over the message counts in the recording, to locate losses in time.
 
         Args:
-            pieces: Pieces to read, from `figure_pieces`; None for the whole file.
+            pieces: Numbers of the chunks to read, from `stats_chunks`; None for the whole file.
+
+        Yields:
+            Time in ns since 1970, and the changed counts by topic.
         """
         for log_ns, value in self.entries("figures", pieces):
             topics = value.get("topics") if isinstance(value, dict) else None
@@ -210,11 +224,14 @@ class Recording:
                 yield log_ns, {topic: each for topic, each in parsed.items() if each is not None}
 
     def entries(self, role: Role, pieces: Collection[int] | None = None) -> Iterator[tuple[int, object]]:
-        """Iterate over (time, value) of the recorder's own entries of a role, such as "alerts" or "notes".
+        """Iterate over the entries of one role that the recorder itself wrote.
 
         Args:
-            role: Role of the entries.
-            pieces: Pieces of the file to read; None for the whole file.
+            role: Role of the entries, such as "alerts" or "notes".
+            pieces: Numbers of the chunks to read; None for the whole file.
+
+        Yields:
+            Time in ns since 1970, and the value of the entry.
         """
         for raw in self.file.read_raw(None, None, self._channels_with(role), pieces):
             try:
@@ -235,11 +252,11 @@ class Recording:
     ) -> Iterator[RecordedMessage]:
         """Iterate over messages, sorted by time of receipt.
 
-        Damaged pieces of the file are skipped and listed in `damage`.
+        Damaged places of the file are skipped and listed in `corruption`.
 
         Args:
-            start_ns: Start in ns since 1970 (inclusive), or None.
-            end_ns: End in ns since 1970 (exclusive), or None.
+            start_ns: Start in ns since 1970 (inclusive); None for no limit.
+            end_ns: End in ns since 1970 (exclusive); None for no limit.
             topics: Names of topics; None for all.
         """
         for raw in self.read_raw(start_ns, end_ns, topics):
@@ -251,9 +268,9 @@ class Recording:
         end_ns: int | None = None,
         topics: Collection[str] | None = None,
     ) -> Iterator[RawMessage]:
-        """Iterate over raw messages with their channel numbers (`facts.channels`).
+        """Iterate over raw messages, sorted by time of receipt.
 
-        Arguments are those of `read`.
+        The arguments are those of `read`. The channel numbers of messages refer to `facts.channels`.
         """
         return self.file.read_raw(start_ns, end_ns, self._channels(topics))
 
@@ -263,7 +280,12 @@ class Recording:
         return {number for topic in topics for number in self._channels_of.get(topic, ())}
 
     def newest(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, RecordedMessage]:
-        """Return the newest message of each topic at or before `at_ns`; topics without one are omitted."""
+        """Return the newest message at or before a time, by topic. Topics without such a message are omitted.
+
+        Args:
+            at_ns: Time in ns since 1970.
+            topics: Names of topics; None for all.
+        """
         wanted = [topic for topic in self._known_topics(topics) if self.topics[topic].message_count]
         found = self.file.newest(at_ns, [self._channels_of[topic] for topic in wanted])
         return {
@@ -280,7 +302,12 @@ class Recording:
         )
 
     def newest_times(self, at_ns: int, topics: Collection[str] | None = None) -> dict[str, int]:
-        """Return the time of the newest message of each topic at or before `at_ns`. Reads only indexes."""
+        """Return the time of the newest message at or before a time, by topic. Reads only indexes.
+
+        Args:
+            at_ns: Time in ns since 1970.
+            topics: Names of topics; None for all.
+        """
         times: dict[str, int] = {}
         for channel, log_ns in self.file.newest_times(at_ns, self._channels(topics)).items():
             topic = self.facts.channels[channel].topic
@@ -298,11 +325,17 @@ class Recording:
     def densities(
         self, start_ns: int, end_ns: int, buckets: int, topics: Collection[str] | None = None
     ) -> dict[str, list[int]]:
-        """Return the number of messages by topic in each of `buckets` equal parts of [start, end).
+        """Return the number of messages in each of several equal time intervals, by topic.
 
-        Payloads are not read. Short spans are counted exactly with the indexes. For long spans, the messages
-        of a chunk are distributed evenly over its duration, which is at most half a second in recordings of
-        nep.
+        Payloads are not read. Short spans are counted exactly with the indexes. For long spans, the
+        messages of a chunk are distributed evenly over its duration, which is at most half a second in
+        recordings of nep.
+
+        Args:
+            start_ns: Start of the first interval in ns since 1970.
+            end_ns: End of the last interval (exclusive).
+            buckets: Number of intervals.
+            topics: Names of topics; None for all.
         """
         result: dict[str, list[int]] = {}
         if buckets < 1 or end_ns <= start_ns:
@@ -314,7 +347,7 @@ class Recording:
         return result
 
     def close(self) -> None:
-        """Close the file; concurrent reads raise `ClosedError`. Idempotent."""
+        """Close the file. Concurrent reads raise `ClosedError`. Idempotent."""
         self.file.close()
 
     def __enter__(self) -> Self:
@@ -325,7 +358,7 @@ class Recording:
 
 
 class _Decoders(dict[int, ChannelDecoder]):
-    """Decoders by channel number, created at their first use."""
+    """Decoders by channel number, created when they are first used."""
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition]) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Recorder: subscribes to selected topics, including new ones, and passes their messages to a writer."""
+"""`Recorder`: subscribes to selected topics, including new ones, and passes their messages to a writer."""
 
 from __future__ import annotations
 
@@ -25,28 +25,30 @@ if TYPE_CHECKING:
 
 _GRAPH_POLL_S = 1.0
 _MASTER_TIMEOUT_S = 0.5
-"""Time limit of requests to the master in seconds, so that a missing master does not delay the recorder."""
+"""Time limit in seconds of requests to the master, so that a missing master doesn't delay the recorder."""
 _MAX_CACHED_TOPICS = 20_000
 _ALL_TOPICS = "**"
 
 
 class _Writer(Protocol):
-    """Interface of a `RecordingWriter` or a `FlightRecorder` to the recorder."""
+    """Interface to a `RecordingWriter` or `FlightRecorder`."""
 
     def post(self, messages: Sequence[Message]) -> None:
         """Record messages that were just received."""
 
     def write_entry(self, role: Role, value: object) -> None:
-        """Write an own entry of the recorder."""
+        """Record an entry of the recorder itself, such as an alert."""
 
 
 @dataclass(frozen=True)
 class TopicSelection:
-    """Selection of topics by names and patterns (`*`, `?`, `**`). Raises `BadTopicError` for invalid names.
+    """Selection of topics by names and patterns (`*`, `?`, `**`).
+
+    The constructor raises `BadTopicError` for invalid names.
 
     Attributes:
-        topics: Included topics; empty for all.
-        left_out: Excluded topics, which take precedence.
+        topics: Included topics and patterns; empty for all topics.
+        excluded: Excluded topics and patterns, which take precedence.
     """
 
     topics: tuple[str, ...] = ()
@@ -79,9 +81,9 @@ class TopicSelection:
 class Recorder:
     """Recorder of selected topics. Usable as a context manager.
 
-    Everything published after its creation is recorded. This includes the first message of a new topic if the
-    back end supports patterns; otherwise a new topic is recorded within a second. The recorder also records
-    changed alerts, and subscribes to descriptions of robots, once a second.
+    All messages published after its creation are recorded. This includes the first message of a new topic
+    if the back end supports patterns; otherwise a new topic is recorded within a second. Once a second, the
+    recorder also records changed alerts and subscribes to the descriptions of new robots.
     """
 
     def __init__(
@@ -92,9 +94,13 @@ class Recorder:
         *,
         look_s: float = _GRAPH_POLL_S,
     ) -> None:
-        """Subscribe to the topics; the node is not closed with the recorder.
+        """Subscribe to the topics. Raises the exceptions of `Node.new_sub`.
 
-        Raises the exceptions of `Node.new_sub`.
+        Args:
+            node: Node that subscribes; stays open after `close`.
+            writer: Receiver of the messages.
+            selection: Topics to record; all by default.
+            look_s: Interval in seconds at which the graph is polled.
         """
         self._node, self._writer, self._selection = node, writer, selection
         self._subscriptions = selection.subscriptions

@@ -1,8 +1,8 @@
-"""Repair of truncated and damaged recordings, into a new file.
+"""Repair of truncated and damaged recordings by copying their intact messages to a new file.
 
-Records are read up to the end or a damaged place. A chunk with a wrong CRC is skipped, and the search
-continues with the next intact chunk. All whole messages of a truncated last chunk are recovered. The new file
-is verified, and the old file is not changed.
+Records are read up to the end or a damaged place. A chunk with a wrong CRC is skipped, and reading continues
+with the next intact chunk. All whole messages of a truncated last chunk are recovered. The new file is
+verified, and the old file is not modified.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ from nep.system.replace_file import replace_file
 
 _WINDOW_BYTES = 4_000_000
 _CHUNK_PATTERN = re.compile(rb"\x06.{4}[\x00-\x7f]\x00\x00\x00", re.DOTALL)
-"""Pattern of a chunk's opcode, followed by a length below 2^39."""
+"""Pattern that finds chunk records: the opcode of a chunk, followed by a length below 2^39."""
 _FLUSH_BYTES = 1_000_000
 _PARSED_OPCODES = frozenset(
     {Opcode.MESSAGE, Opcode.MESSAGE_INDEX, Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA}
 )
-"""Opcodes of records that are parsed during a repair; one that is very long has a damaged length."""
+"""Opcodes of records that a repair parses. If such a record is very long, its length is damaged."""
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,10 @@ class RepairReport:
         recovered: Number of messages in the new file.
         discarded: Number of lost messages; None if unknown.
         discarded_bytes: Number of unreadable bytes in the old file; 0 if nothing was lost.
-        lost_s: Time between the last recovered message and the end of the recording in seconds, if known.
+        lost_s: Time in seconds between the last recovered message and the end of the recording, as far as
+            known.
         duration_s: Duration of the new file in seconds.
-        damaged_places: Number of damaged places.
+        damaged_range_count: Number of damaged places in the old file.
     """
 
     path: Path
@@ -78,7 +79,7 @@ class RepairReport:
 
     @property
     def is_complete(self) -> bool:
-        """True if nothing was lost, because the file was undamaged but not closed properly."""
+        """True if no message was lost, because the old file only was not closed properly."""
         return not self.discarded_bytes and not self.discarded
 
 
@@ -91,7 +92,7 @@ class _Counts:
     """True if the number of lost messages is unknown."""
     damaged_range_count: int = 0
     last_ns: int = 0
-    """Time of the end of the recording in ns, as far as known."""
+    """Time of the end of the recording in ns since 1970, as far as known."""
     stats: dict[str, object] = field(default_factory=dict)
     recorder_metadata: dict[str, str] = field(default_factory=dict)
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
@@ -110,11 +111,11 @@ def repaired_path(path: Path) -> Path:
 def repair(
     path: Path, target: Path | None = None, progress: Callable[[int, int], object] | None = None
 ) -> RepairReport:
-    """Write the intact part of a recording to a new file and verify the new file.
+    """Write the intact part of a recording to a new file, and verify the new file.
 
     Args:
         path: Damaged recording.
-        target: File to write. Default: `repaired_path`.
+        target: File to write; None for `repaired_path`.
         progress: Called with bytes done and in total.
 
     Raises:

@@ -1,8 +1,8 @@
-"""`FlightRecorder`: ring of files on disk with the last messages, bounded in bytes and seconds.
+"""`FlightRecorder`: ring buffer on disk that contains the newest messages, limited in bytes and seconds.
 
-Messages are written to segments. The oldest segment is deleted if the ring exceeds its size, or if the
-segment is older than the time limit. `keep` copies the chunks of the last seconds to a recording while the
-ring continues.
+Messages are written to files, called segments. The oldest segment is deleted if the ring exceeds its size, or
+if the segment is older than the time limit. `keep` copies the chunks of the last seconds to a recording while
+the ring continues.
 """
 
 from __future__ import annotations
@@ -49,7 +49,14 @@ _MAX_SECONDS = 1e9
 
 @dataclass(frozen=True)
 class RingStatus:
-    """State of the ring; `problem` is the error that stopped it, or ""."""
+    """State of a ring.
+
+    Attributes:
+        seconds: Time span of the messages in the ring, in seconds.
+        size_bytes: Size on disk.
+        unkept: Number of received messages that were not recorded because writing was too slow.
+        problem: Error that stopped the ring, or "".
+    """
 
     seconds: float
     size_bytes: int
@@ -59,7 +66,13 @@ class RingStatus:
 
 @dataclass(frozen=True)
 class SavedRecording:
-    """Recording that was saved by `keep`."""
+    """Recording that was saved by `FlightRecorder.save`.
+
+    Attributes:
+        path: File of the recording.
+        message_count: Number of messages.
+        duration_s: Duration in seconds.
+    """
 
     path: Path
     message_count: int
@@ -68,7 +81,13 @@ class SavedRecording:
 
 @dataclass
 class _Segment:
-    """File of the ring; `users` is the number of recordings that are being copied from it."""
+    """File of the ring.
+
+    Attributes:
+        writer: Writer of the file.
+        user_count: Number of recordings for which the file is currently copied.
+        is_removed: True if the file is deleted when it is no longer copied.
+    """
 
     writer: FileWriter
     user_count: int = 0
@@ -142,7 +161,7 @@ class _Segments:
                 self._remove_oldest_locked()
 
     is_full = False
-    """Always False. Old segments are deleted without finishing them."""
+    """Always False, because old segments are deleted without being finished."""
 
     def next_file(self) -> None: ...
 
@@ -201,7 +220,7 @@ def _remove_stale_segments(folder: Path) -> None:
 
 
 class FlightRecorder:
-    """Flight recorder: buffers the last seconds of messages on disk.
+    """Flight recorder: buffers the messages of the last seconds on disk.
 
     Thread-safe; usable as a context manager.
 
@@ -223,10 +242,11 @@ class FlightRecorder:
         """Start the ring.
 
         Args:
-            folder: Folder used only for the ring's files; created if needed.
-            seconds: Length of the buffer.
+            folder: Folder for the ring's files only; created if needed.
+            seconds: Length of the buffer in seconds.
             size_bytes: Maximum size on disk.
-            clock: Time of receipt in ns since 1970; must not decrease.
+            clock: Clock for times of receipt in ns since 1970, which must not decrease; None for the
+                default.
             limits: Limits of the writer.
             on_problem: Called once with the reason if the ring stops because of an error.
 
@@ -254,7 +274,7 @@ class FlightRecorder:
         self._writer.post(messages)
 
     def write_entry(self, role: Role, value: object) -> None:
-        """Write an own entry of the recorder. See `RecordingWriter.write_entry`."""
+        """Record an entry of the recorder itself. See `RecordingWriter.write_entry`."""
         self._writer.write_entry(role, value)
 
     @property
@@ -267,12 +287,12 @@ class FlightRecorder:
     def save(self, path: str | os.PathLike[str], seconds: float, note: str = "") -> SavedRecording:
         """Save the last seconds, up to the newest message, as a recording.
 
-        The recording may start up to half a second earlier. The call takes as long as copying the bytes;
-        meanwhile the ring continues.
+        The recording may start up to half a second earlier. The call returns when all bytes are copied; the
+        ring continues meanwhile.
 
         Args:
             path: File to write.
-            seconds: Duration to save.
+            seconds: Duration to save in seconds.
             note: Text for the metadata.
 
         Raises:
@@ -368,7 +388,10 @@ def _split_indexes(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 class _ChunkStats:
-    """Counts of messages within the saved chunks, because the ring's counts start when the ring starts."""
+    """Message counts within the saved chunks.
+
+    The counts are differences, because the ring counts messages since its start.
+    """
 
     def __init__(self, table: ChannelTable) -> None:
         self._table = table

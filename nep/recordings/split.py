@@ -1,4 +1,4 @@
-"""Recording split into several files of limited size, each of which is complete."""
+"""`SplitFiles`: destination that splits a recording into files of limited size, each of them complete."""
 
 from __future__ import annotations
 
@@ -13,14 +13,20 @@ MIN_PART_BYTES = 100_000
 
 
 def part_path(path: Path, number: int) -> Path:
-    """Return the path of a part: part 1 of "tour.mcap" is "tour-001.mcap"."""
+    """Return the path of a numbered part, such as "tour-001.mcap" for part 1 of "tour.mcap"."""
     return path.with_name(f"{path.stem}-{number:03d}{path.suffix}")
 
 
 class SplitFiles:
     """Destination that starts a new file at a given size (a `nep.recordings.writer.Destination`).
 
-    A file ends with the chunk that reaches the size, so it may be larger by one chunk: 1 MB, or one message.
+    A file ends with the chunk that reaches the size, so it may be larger by one chunk: 1 MB, or one
+    message.
+
+    Args:
+        path: Path from which the names of the files are derived, see `part_path`.
+        part_bytes: Size in bytes at which a new file starts.
+        limits: Limits of the writer.
     """
 
     def __init__(self, path: Path, part_bytes: int, limits: WriterLimits = DEFAULT_LIMITS) -> None:
@@ -44,7 +50,7 @@ class SplitFiles:
 
     @property
     def file(self) -> FileWriter:
-        """File that is currently written."""
+        """File to which messages are currently written."""
         return self._part.file
 
     @property
@@ -53,16 +59,16 @@ class SplitFiles:
         return self.file.size_bytes >= self._part_bytes
 
     def on_flushed(self) -> None:
-        """Do nothing."""
+        """Do nothing, because `is_full` starts the next file."""
 
     def next_file(self) -> None:
-        """Open the next file, and finish the current one."""
+        """Open the next file and finish the current one. Raises `RecordingError` or `OSError`."""
         full = self._part
         self._part = self._new_file()
         full.finish()
 
     def check_file(self) -> None:
-        """Check the current file and its disk. Raises `RecordingError`."""
+        """Raise `RecordingError` if the current file no longer exists or the disk is full."""
         self._part.check_file()
 
     def finish(self) -> None:

@@ -1,6 +1,6 @@
-"""`RecordingWriter`: accepts messages from any thread and records them in a background thread.
+"""`RecordingWriter`: accepts messages from any thread and writes them to a file in a background thread.
 
-`post` never blocks. The queue is bounded in bytes and number; dropped messages are counted, and the counts
+`post` never blocks. The queue is limited in bytes and messages; dropped messages are counted, and the counts
 are recorded. Chunks are written at 1 MB or after half a second: if the process is killed, less than a second
 is lost, and the file ends with whole records.
 """
@@ -39,19 +39,20 @@ if TYPE_CHECKING:
 
 
 MAX_PUBLISHER_CHANNELS = 10_000
-"""Number of channels beyond which new publishers share one channel per topic."""
+"""Number of channels above which new publishers share one channel per topic."""
 _CLOSE_TIMEOUT_S = 30.0
 _MAX_CACHED_KINDS = 10_000
 _MAX_LATCHED, _MAX_LATCHED_BYTES = 1_000, 16_000_000
 _OTHER_TOPICS = ""
-"""Key of the counter that all topics beyond the limit share."""
+"""Key of the counter shared by all topics above the maximum number of topics."""
 _log = logging.getLogger("nep.recordings")
 
 
 class LogClock:
-    """Clock for times of receipt in ns since 1970: the system time at its creation, continued monotonically.
+    """Clock for times of receipt in ns since 1970.
 
-    The time of a recording therefore never jumps, even if the system clock is set.
+    The clock starts with the system time and then runs monotonically, so that the times in a recording
+    never jump, even if the system clock is set.
     """
 
     def __init__(self) -> None:
@@ -70,9 +71,9 @@ class RecordingStatus:
         message_count: Number of messages in the file.
         size_bytes: Size of the file.
         duration_s: Time since the first message in seconds.
-        queued_bytes: Size of messages that wait to be written.
-        unkept: Number of received messages that were not recorded.
-        topics: Counts by topic.
+        queued_bytes: Size of the messages that wait to be written.
+        unkept: Number of received messages that were not recorded because writing was too slow.
+        topics: Message counts by topic.
         problem: Error that stopped the writer, or "".
     """
 
@@ -87,7 +88,7 @@ class RecordingStatus:
 
 @dataclass
 class _KindCache:
-    """Cached properties of messages with the same `MessageKind` and publisher."""
+    """Cached counter and channels for messages with the same `MessageKind` and publisher."""
 
     kind: MessageKind
     publisher: int | None
@@ -96,7 +97,7 @@ class _KindCache:
 
 
 class _Entry:
-    """Own entry of the recorder in the queue."""
+    """Queued entry that the recorder itself writes, such as a note."""
 
     __slots__ = ("role", "text")
 
@@ -113,9 +114,9 @@ class _Part:
     messages_before: int = 0
     bytes_before: int = 0
     repeated: int = 0
-    """Number of latched messages that were repeated from earlier files."""
+    """Number of latched messages in this file that were repeated from earlier files."""
     before: Mapping[str, TopicStats] = field(default_factory=dict)
-    """Counts at the start of the file."""
+    """Message counts by topic at the start of the file."""
     latched: dict[tuple[str, int | None], Message] = field(default_factory=dict)
     latched_bytes: int = 0
 
@@ -147,10 +148,12 @@ class _Part:
 
 
 class RecordingWriter:
-    """Writer of a recording. Thread-safe; usable as a context manager.
+    """Writer of a recording.
 
-    with RecordingWriter("tour.mcap", note="first floor") as writer, Recorder(node, writer):
-        time.sleep(60.0)
+    Thread-safe; usable as a context manager.
+
+        with RecordingWriter("tour.mcap", note="first floor") as writer, Recorder(node, writer):
+            time.sleep(60.0)
     """
 
     def __init__(
@@ -162,13 +165,14 @@ class RecordingWriter:
         limits: WriterLimits = DEFAULT_LIMITS,
         on_problem: Callable[[str], object] | None = None,
     ) -> None:
-        """Create the file and start the thread.
+        """Create the file and start the writer's thread.
 
         Args:
             path: File to create, which must not exist, or a destination.
             note: Text for the metadata.
-            clock: Time of receipt in ns since 1970; must not decrease.
-            limits: Limits of queue, disk and times.
+            clock: Clock for times of receipt in ns since 1970, which must not decrease; None for a
+                `LogClock`.
+            limits: Limits of the queue, the disk and times.
             on_problem: Called once in the writer's thread with the reason if an error stops the writer.
 
         Raises:
@@ -258,9 +262,11 @@ class RecordingWriter:
             self._lock.notify_all()
 
     def write_entry(self, role: Role, value: object) -> None:
-        """Queue an own entry of the recorder, such as "alerts" or "notes", to be written as JSON.
+        """Queue an entry of the recorder itself, which is written as JSON. Never blocks.
 
-        Never blocks.
+        Args:
+            role: Role of the entry, such as "alerts" or "notes".
+            value: JSON-serializable value.
         """
         text = orjson.dumps(value, option=orjson.OPT_NON_STR_KEYS)
         with self._lock:
@@ -274,7 +280,11 @@ class RecordingWriter:
                 self._lock.notify_all()
 
     def flush(self, timeout_s: float = 10.0) -> bool:
-        """Wait until everything posted is in the file; return False after the time limit or an error."""
+        """Wait until all messages posted so far are in the file.
+
+        Returns:
+            False if the time limit has passed or an error has stopped the writer.
+        """
         with self._lock:
             self._flush_wanted += 1
             wanted = self._flush_wanted
@@ -286,7 +296,7 @@ class RecordingWriter:
 
     @property
     def status(self) -> RecordingStatus:
-        """Current state of the writer. Counts by topic are at most a second old."""
+        """Current state of the writer. The counts by topic are at most a second old."""
         with self._lock:
             first = self._first_ns
             waiting = sum(count for count, _size in self._dropped_counts.values())
@@ -308,11 +318,14 @@ class RecordingWriter:
     def close(self, timeout_s: float = _CLOSE_TIMEOUT_S) -> RecordingStatus:
         """Write queued messages and finish the file. Idempotent.
 
+        Args:
+            timeout_s: Maximum time in seconds to wait for the disk.
+
         Returns:
-            The final state, which includes an error that occurred.
+            The final state, with the error if one has stopped the writer.
 
         Raises:
-            ClosedError: The disk did not respond within `timeout_s` seconds.
+            ClosedError: The disk did not respond within the time limit.
         """
         with self._lock:
             self._is_closing = True

@@ -39,14 +39,14 @@ ANY_HOST = "0.0.0.0"  # noqa: S104 - bound only at a user's request
 _RETRY_INTERVAL_S = 5.0
 _WAIT_SLICE_S = 0.1
 _LOCAL_NAMES = frozenset({"localhost", "*"})
-"""Host names of this computer that need no resolution; a master listening at "*" is local, too."""
+"""Host names of this computer that need no resolution; "*" is a master on all interfaces."""
 _TUNNEL_PREFIXES = ("docker", "br-", "veth", "virbr", "tun", "tap", "wg", "utun", "vmnet")
 
 
 def master_address(address: str | None = None) -> str:
     """Return the master's address: `address`, else $NEP_MASTER, else "127.0.0.1:7780".
 
-    Port 7780 is appended if the address has none. Raises `NepError` for an invalid address.
+    Port 7780 is appended if the address has no port. Raises `NepError` for an invalid address.
     """
     if address is not None and not isinstance(address, str):
         raise WrongTypeError(
@@ -210,7 +210,10 @@ def resolve_host(host: str) -> str:
 
 
 def resolve_address(address: str) -> str:
-    """Return an address with its host name resolved to an IPv4 address. Blocks; raises `NepError`."""
+    """Resolve the host name of an address HOST:PORT, and return the address with an IPv4 host.
+
+    Blocks until the name is resolved. Raises `NepError` if the name can't be resolved.
+    """
     host = host_of(address)
     if _is_numeric(host):
         return address

@@ -16,9 +16,9 @@ from nep.text import escaped, first_control, shortened
 T = TypeVar("T")
 F = TypeVar("F", bound=Callable[..., object])
 _MAX_LENGTH = 200
-"""Maximum length of a message type's name; the master has the same limit."""
+"""Maximum length in characters of a message type's name; the master has the same limit."""
 _MAX_SECONDS = sys.float_info.max
-"""Maximum time limit in seconds. Larger ints overflow a float, so they count as no limit."""
+"""Maximum time limit in seconds. Larger values are treated as no limit, because they may overflow a float."""
 
 
 def check_type_name(name: str, value: object) -> str:

@@ -12,7 +12,8 @@ class CpuLoad:
     """Meter of CPU usage in cores: 1.0 means that one core was busy, 2.0 two cores.
 
     Args:
-        used_s: Returns the CPU time so far in seconds, or None if unknown. Default: that of this process.
+        used_s: Returns the CPU time used so far in seconds, or None if unknown. Default: CPU time of
+            this process.
         clock: Monotonic clock in seconds.
     """
 
@@ -27,9 +28,9 @@ class CpuLoad:
         self._ratio: float | None = None
 
     def ratio(self) -> float | None:
-        """Return the average usage since the last reading; None at the first.
+        """Return the average usage since the previous reading; None at the first reading or if unknown.
 
-        Readings within 0.5 s are cached.
+        A call within 0.5 s of the previous reading returns the same value.
         """
         now = self._clock()
         if self._last_reading is not None and now - self._last_reading[0] < _MIN_INTERVAL_S:

@@ -88,11 +88,11 @@ _descriptor_check = _DescriptorCheck()
 
 
 def check_free_descriptors(needed: int, what: str) -> None:
-    """Raise `TooManyFilesError` if opening `needed` descriptors would leave fewer than `SPARE`.
+    """Raise `TooManyFilesError` if fewer than `RESERVED_DESCRIPTORS` would be left.
 
     Args:
         needed: Number of descriptors to be opened.
-        what: What they are opened for; part of the error message.
+        what: Purpose of the descriptors, for the error message.
     """
     _descriptor_check.check(needed, what)
 

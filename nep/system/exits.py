@@ -15,14 +15,14 @@ _handlers: list[Callable[[], object]] = []
 def call_after_nodes(call: Callable[[], object]) -> None:
     """Register a function to be called at interpreter exit, after all nodes are closed.
 
-    If the function is registered with `atexit`, it is unregistered there.
+    If the function is already registered with `atexit`, that registration is removed.
     """
     atexit.unregister(call)
     _handlers.append(call)
 
 
 def cancel_after_nodes(call: Callable[[], object]) -> None:
-    """Unregister a function that was registered with `after_nodes`."""
+    """Unregister a function that was registered with `call_after_nodes`."""
     _handlers[:] = [each for each in _handlers if each is not call]
 
 

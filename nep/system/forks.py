@@ -36,7 +36,7 @@ _ANY_HOSTS = frozenset({"*", "0.0.0.0"})  # noqa: S104 - nothing is bound
 
 
 def watch(owner: ForkAware) -> None:
-    """Register an object whose `forked` is called in every child process. Keeps only a weak reference."""
+    """Register an object whose `forked` is called in every child process. Only a weak reference is stored."""
     _watched.add(owner)
 
 
@@ -50,7 +50,10 @@ def close_in_child(*endpoints: str) -> None:
 
 
 def call_in_child(call: Callable[[], None]) -> None:
-    """Register a function to be called in every child process after all owners were notified. For modules."""
+    """Register a function to be called in every child process, after the `forked` of all objects.
+
+    For the global state of modules; use `watch` for objects.
+    """
     _handlers.append(call)
 
 

@@ -1,8 +1,8 @@
-"""Import modules from a frozen program's file even if it is replaced or removed while the program runs.
+"""Import of modules from a frozen program's file even if the file is replaced or removed meanwhile.
 
 PyInstaller opens the program file by name for each imported module. After an update the file has other
-contents at that position (``zlib.error``, or another module); if the file is missing, PyInstaller raises
-SystemExit. A file that is already open keeps its contents.
+contents at that position (``zlib.error``, or another module); if the file is missing, PyInstaller
+raises SystemExit. A file that is already open keeps its contents.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
 """Modules that are imported at their first use, to reduce the startup time.
 
-if TYPE_CHECKING:
-    import psutil
-else:
-    psutil = lazy_module("psutil")
+    if TYPE_CHECKING:
+        import psutil
+    else:
+        psutil = lazy_module("psutil")
+
+Type checkers see the real module.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Log repeated events at increasing intervals: the 1st, 10th, 100th and so on."""
+"""Logging of repeated events at increasing intervals: the 1st, 10th, 100th and so on."""
 
 from __future__ import annotations
 
@@ -17,12 +17,17 @@ def is_logged(count: int) -> bool:
 class SuppressedErrors:
     """Context manager that suppresses, counts and logs exceptions, for threads that must keep running.
 
-    Exceptions are logged at increasing intervals. SystemExit is suppressed too, because a callback may raise
-    it and it would end the thread.
+    Exceptions are logged at increasing intervals. SystemExit, which a callback may raise, is
+    suppressed too, because it would end the thread.
     """
 
     def __init__(self, logger: logging.Logger, what: str) -> None:
-        """Initialize with the name of the work; the log message is "`what` failed"."""
+        """Initialize the context manager.
+
+        Args:
+            logger: Logger for the exceptions.
+            what: Name of the work; the log message is "WORK failed (N so far)".
+        """
         self.count = 0
         self._logger, self._what = logger, what
 

@@ -1,4 +1,7 @@
-"""Plug-in discovery. Each module of a package binds one description, so that a new file is a new plug-in."""
+"""Plug-in discovery.
+
+Each module of a plug-in package binds one object, so that a new file is a new plug-in.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +35,18 @@ T = TypeVar("T", bound=Named)
 
 
 def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """Find the plug-ins in a package without entry points, whose search reads all installed packages.
+    """Return the plug-ins of a package by name, without entry points of other distributions.
 
-    Arguments and exceptions are those of `discover`.
+    Faster than `discover`, because the search for entry points reads all installed packages.
+
+    Args:
+        package: Name of the package.
+        attribute: Name that each plug-in module binds.
+        kind: Required class of the bound object.
+
+    Raises:
+        PluginsMissingError: The package has no plug-ins (left out of a frozen program).
+        TypeError: A module binds an object of another type.
     """
     found: dict[str, T] = {}
     home = importlib.import_module(package)
@@ -51,10 +63,10 @@ def discover_own(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]
 
 
 def discover(package: str, attribute: str, kind: type[T]) -> Mapping[str, T]:
-    """Return plug-ins by name: objects that modules of `package` bind as `attribute`, and entry points.
+    """Return the plug-ins of a package by name: objects bound by its modules, and entry points.
 
-    Modules without the attribute are ignored. Entry points of third parties that fail to load are logged and
-    ignored; they can't replace plug-ins of the package.
+    Modules without the attribute are ignored. Entry points of third parties that fail to load are
+    logged and ignored; they can't replace plug-ins of the package.
 
     Args:
         package: Name of the package, and of the entry point group.

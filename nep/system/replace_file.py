@@ -1,4 +1,4 @@
-"""Replace a file atomically, even while another program has it open."""
+"""Atomic replacement of a file, even while another program has it open."""
 
 from __future__ import annotations
 
@@ -24,8 +24,14 @@ def replace_file(
 ) -> None:
     """Rename `new` to `old` atomically.
 
-    Windows refuses this while another program (virus scanner, cloud sync, editor) has `old` open, so the
-    rename is retried for a second. `replace` and `pause` are for tests.
+    Windows rejects this while another program (virus scanner, cloud sync, editor) has `old` open, so
+    the rename is retried for a second.
+
+    Args:
+        new: Path of the new file.
+        old: Path of the file to replace.
+        replace: Renames a file; replaced in tests.
+        pause: Waits for a number of seconds; replaced in tests.
 
     Raises:
         OSError: The file can't be replaced; `old` is unchanged.

@@ -48,7 +48,8 @@ def prepare_streams() -> None:
 def buffer_output() -> None:
     """Add a buffer to an unbuffered standard output (`python -u`, or PYTHONUNBUFFERED in a container).
 
-    Then `output_problem` can detect failed writes by flushing. Programs that call this must flush.
+    With a buffer, `output_problem` can detect failed writes by flushing. A program that calls this
+    function must flush its output.
     """
     stream = sys.stdout
     if isinstance(stream, TextIOWrapper) and isinstance(stream.buffer, RawIOBase):

@@ -1,7 +1,7 @@
 """Non-blocking terminal output through a writer thread.
 
-A terminal blocks while text is selected (Windows) or after Ctrl+S, a pipe while its reader is busy. Excess
-text is dropped; the number of dropped lines is written when the queue has room again.
+A terminal blocks while text is selected (Windows) or after Ctrl+S, and a pipe while its reader is busy.
+Excess text is dropped; the number of dropped lines is written when the queue has room again.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`Waker`: wakes a thread that polls file descriptors."""
+"""Waking of a thread that polls file descriptors."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Waker:
             self._close()
 
     def forked(self) -> None:
-        """Close the inherited descriptors in a forked child process; those of the parent stay open."""
+        """Close the inherited descriptors in a forked child process; the parent's descriptors stay open."""
         self._lock = threading.RLock()
         self._close()
 

@@ -402,7 +402,7 @@ FAR_MASTER = """
     real_ns = time.time_ns
     time.time_ns = lambda: real_ns() - 86_400 * 10**9
     from nep.system import computer
-    computer.clock_name = lambda: "another computer"
+    computer.system_identifier = lambda: "another computer"
     import nep
     from nep.masters.master import Master
     with Master("127.0.0.1:0", learn_s=0.0) as master, nep.node("far", master=master.address) as node:

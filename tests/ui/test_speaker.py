@@ -156,7 +156,7 @@ def test_voice_engine_that_crashes_in_its_trial_process_is_not_created(qtbot, mo
 def test_voice_engine_trial_that_hangs_is_terminated(monkeypatch) -> None:
     monkeypatch.setattr("app.ui.speaker.TRIAL_TIMEOUT_S", 0.2)
     assert not passes_trial([sys.executable, "-c", "import threading; threading.Event().wait()"])
-    hangs = "import threading; from app.ui import speaker; speaker.TRIAL_S = 0.2; "
+    hangs = "import threading; from app.ui import speaker; speaker.TRIAL_TIMEOUT_S = 0.2; "
     hangs += "speaker._make_voice = lambda: threading.Event().wait(); speaker.try_voice()"
     assert subprocess.run([sys.executable, "-c", hangs], check=False).returncode == 1
 

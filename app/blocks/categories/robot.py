@@ -26,7 +26,7 @@ _ICONS = {
     "Sensors": "eye",
 }
 GROUPS = tuple(_ICONS)
-"""Titles of the groups in display order; descriptions may define further groups."""
+"""Titles of the groups of action blocks in display order; robot descriptions may define further groups."""
 _GROUP_TITLES = {
     "": "Movement",
     "actions": "Movement",
@@ -41,7 +41,9 @@ _NUMBER_KINDS = ("number", "integer")
 def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
     """Return all blocks of a robot.
 
-    ``known`` are all robots; those of the same model are offered in the drop-down.
+    Args:
+        robot: Description of the robot.
+        known: All robots; the drop-down of the robot's blocks offers the robots of the same model.
     """
     alike = [other.name for other in known if other.model == robot.model] or [robot.name]
     blocks = [_action(robot, action, alike) for action in robot.actions]
@@ -51,7 +53,12 @@ def robot_blocks(robot: Robot, known: Sequence[Robot]) -> tuple[Block, ...]:
 
 
 def robot_groups(robot: Robot, known: Sequence[Robot]) -> tuple[Group, ...]:
-    """Return the groups under the heading of a robot; sensors and events come last."""
+    """Return the block groups under the heading of a robot; sensors and events come last.
+
+    Args:
+        robot: Description of the robot.
+        known: All robots; see `robot_blocks`.
+    """
     titles = {action.name: _group_title(action) for action in robot.actions}
     groups: dict[str, list[ToolboxEntry]] = {title: [] for title in GROUPS}
     for block in robot_blocks(robot, known):

@@ -1,4 +1,4 @@
-"""Compiler: fills the template of each block with the syntax trees of the blocks inside it."""
+"""Compiler: fills the Python template of each block with the syntax trees of the blocks in its slots."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ COMMANDS = frozenset(
         *calculation.__all__, *clock.__all__, *lists.__all__, *texts.__all__,
     }
 )  # fmt: skip
-"""Names of the functions that a program may call (`app.blocks.commands`), which no variable can have."""
+"""Names of the functions that a program can call (`app.blocks.commands`); variables can't have such names."""
 
 RESERVED = COMMANDS | {"step", "value", "number", "called", "message", "_"}
 
@@ -75,7 +75,16 @@ class _UsedResources:
 
 
 def saved_value(block: Block, placed: PlacedBlock, name: str) -> object:
-    """Return the saved value of a block's field, or None if it has no such field. Raises FieldError."""
+    """Return the value of a field of a placed block; None if the block has no such field.
+
+    Args:
+        block: Description of the block.
+        placed: Block in the workspace.
+        name: Name of the field.
+
+    Raises:
+        FieldError: The saved value is invalid.
+    """
     argument = block.argument(name)
     return argument.read(placed.fields.get(name)) if isinstance(argument, Field) else None
 
@@ -86,9 +95,9 @@ def _first_robot(block: Block) -> str:
 
 
 class _SkippedBlock(Exception):  # noqa: N818 (control flow, not an error)
-    """Raised for a block that can't be compiled.
+    """Raised for a block that can't be compiled; the compiler skips the block that contains it.
 
-    The block is reported, and the block around it is skipped.
+    The problem was reported before.
     """
 
 
@@ -99,7 +108,9 @@ def compile_behaviour(
     absent: Sequence[Robot] = (),
     name: str = "Behaviour",
 ) -> Program:
-    """Compile a workspace to a program. Invalid files cause problems in the result, not exceptions.
+    """Compile a workspace to a program.
+
+    Never raises for an invalid workspace; `Program.problems` contains the problems.
 
     Args:
         workspace: Saved workspace of Blockly.
@@ -150,7 +161,7 @@ class _Compiler:
             *own,
             *functions,
         ]
-        actions = invoked_actions(body)  # before `instrumented` changes the trees
+        actions = invoked_actions(body)  # before `render_instrumented` changes the trees
         source, lines = render_source(
             [*import_statements(body), *body, *run_statements(self._name)], self._marks
         )
@@ -400,7 +411,14 @@ class _Compiler:
 
 
 def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, list[ast.keyword]]:
-    """Return keyword arguments. Names that aren't valid identifiers are passed as ``**{"a-b": …}``."""
+    """Return the keyword arguments for each placeholder in `Block.keywords`.
+
+    Names that aren't valid identifiers are passed as ``**{"a-b": …}``.
+
+    Args:
+        block: Description of the block.
+        expressions: Expression of each argument by name.
+    """
     made: dict[str, list[ast.keyword]] = {}
     for hole, pairs in block.keywords.items():
         plain = [ast.keyword(name, expressions[at]) for at, name in pairs if _is_keyword_name(name)]
@@ -413,7 +431,13 @@ def keywords(block: Block, expressions: Mapping[str, ast.expr]) -> dict[str, lis
 
 
 def template(block: Block, placed: PlacedBlock, *, in_function: bool) -> str:
-    """Return the Python template of a placed block."""
+    """Return the Python template of a placed block.
+
+    Args:
+        block: Description of the block.
+        placed: Block in the workspace, whose field values may select the template.
+        in_function: True if the block is inside a function definition.
+    """
     if in_function and block.python_in_function:
         return block.python_in_function
     if isinstance(block.python, str):
@@ -427,9 +451,10 @@ def _is_keyword_name(name: str) -> bool:
 
 
 def invoked_actions(body: Sequence[ast.stmt]) -> dict[str, tuple[str, ...]] | None:
-    """Return the actions that a program invokes on each robot; None if that isn't statically known.
+    """Return the names of the actions that a program executes, by robot; None if not statically known.
 
-    The actions are read from the tree that is executed, so that a block can't invoke more than is reported.
+    The actions are read from the syntax tree that is executed, so that a program can't execute an action that
+    is not in the result.
     """
     found: dict[str, dict[str, None]] = {}
     for call in (node for statement in body for node in ast.walk(statement)):
@@ -450,7 +475,11 @@ def _first_argument_text(node: ast.expr) -> str | None:
 
 
 def import_statements(body: Sequence[ast.stmt]) -> list[ast.stmt]:
-    """Return the import statement of a program file."""
+    """Return the import statement of a program file.
+
+    Args:
+        body: Statements of the program, in which the used commands are looked up.
+    """
     names = {
         node.id for statement in body for node in ast.walk(statement) if isinstance(node, ast.Name)
     } & COMMANDS
@@ -458,5 +487,9 @@ def import_statements(body: Sequence[ast.stmt]) -> list[ast.stmt]:
 
 
 def run_statements(name: str) -> list[ast.stmt]:
-    """Return the last statement of a program file."""
+    """Return the last statement of a program file, the call of ``run``.
+
+    Args:
+        name: Name of the behaviour.
+    """
     return statements("run(%NAME)", {"NAME": literal(name)})

@@ -2,8 +2,8 @@
 
 Two "when started" scripts run in parallel; if both move the base of a robot, one action replaces the other.
 Only certain conflicts are reported: actions after a condition or a wait may be timed correctly, and event
-scripts may interrupt other scripts on purpose. Such conflicts are reported when they occur
-(`app.blocks.runtime.robot_handle`).
+scripts may interrupt other scripts on purpose. `app.blocks.runtime.robot_handle` reports these conflicts when
+they occur.
 """
 
 from __future__ import annotations
@@ -31,7 +31,15 @@ _REPLACE = "replace"
 
 @dataclass(frozen=True)
 class ActionUse:
-    """Action block of a robot; ``endless`` is True inside a loop that never ends."""
+    """Action block of a robot whose action uses a resource.
+
+    Attributes:
+        block: Block in the workspace.
+        robot: Name of the robot.
+        action: Description of the action.
+        timing: `IMMEDIATE` (starts with the script), `LATER` (after other actions or waits) or `UNCERTAIN`.
+        is_endless: True inside a loop that never ends.
+    """
 
     block: PlacedBlock
     robot: str
@@ -44,8 +52,12 @@ class ActionUse:
 class Conflict:
     """Two blocks of two scripts that use the same resource of a robot at the same time.
 
-    ``put`` are the start block of the script that can be moved to the end of the other one, and the start
-    block of the other one; None if both run forever.
+    Attributes:
+        first: Block in the first script.
+        second: Block in the second script.
+        resource: Name of the resource.
+        reordering: Ids of two start blocks: the script of the first one can be moved to the end of the script
+            of the second one. None if both scripts run forever.
     """
 
     first: ActionUse
@@ -55,7 +67,7 @@ class Conflict:
 
 
 class ConflictFinder:
-    """Search through the start scripts of a workspace and the functions that they call."""
+    """Finder of conflicts between "when started" scripts, including the functions that the scripts call."""
 
     def __init__(
         self, workspace: Workspace, catalogue: Catalogue, function: Callable[[PlacedBlock], Function | None]
@@ -63,7 +75,7 @@ class ConflictFinder:
         self._workspace, self._catalogue, self._function = workspace, catalogue, function
 
     def conflicts(self) -> Iterator[Conflict]:
-        """Yield each conflict between two scripts, once for each resource of a robot."""
+        """Yield the conflicts of all pairs of scripts; for each pair, one per robot and resource."""
         scripts = [
             script
             for script in self._workspace.scripts

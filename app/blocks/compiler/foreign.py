@@ -1,4 +1,4 @@
-"""Blocks of Blockly's standard set and of Scratch, and the equivalent blocks of Studio."""
+"""Equivalent blocks of Studio for the standard blocks of Blockly and for blocks of Scratch."""
 
 from __future__ import annotations
 
@@ -84,4 +84,4 @@ EQUIVALENT_BLOCKS: Mapping[str, str] = {
     "operator_subtract": "values_arithmetic",
     "sensing_askandwait": "asking_ask",
 }
-"""Block type of Studio by the type of the other program; identical types are omitted."""
+"""Block types of Studio by the equivalent type of Blockly or Scratch; types with equal names are omitted."""

@@ -1,4 +1,4 @@
-"""Variables that are never set, and broadcasts that are never sent or received."""
+"""Detection of variables that are never set, and of broadcasts that are never sent or received."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _READS, _CHANGES, _RECEIVES = "variables_get", "variables_change", "events_recei
 
 
 class NameUsage:
-    """Collects the variables and broadcasts of all blocks that will run."""
+    """Collector of the variables and broadcasts that the running blocks of a workspace use."""
 
     def __init__(self) -> None:
         self._read: dict[str, tuple[PlacedBlock, Block]] = {}  # first block that reads a variable

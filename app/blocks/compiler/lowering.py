@@ -1,7 +1,8 @@
-"""Lowering: blocks with a variable number of inputs are rewritten to plain blocks.
+"""Lowering: blocks with a variable number of slots are rewritten to blocks with a fixed number of slots.
 
-These are lists of n items, ifs with n branches, and function calls. A workspace is rewritten once before it
-is compiled: each such block gets a separate type, which the catalogue describes like any other block.
+Such blocks are lists of n items, ifs with n branches, and function calls. A workspace is rewritten once
+before it is compiled: each such block gets a type that only it uses, whose description is added to the
+catalogue.
 """
 
 from __future__ import annotations
@@ -26,7 +27,16 @@ _HAS_RESULT = {PLAIN: False, RESULT: True}
 
 @dataclass(frozen=True)
 class Function:
-    """Function of the behaviour; ``parameters`` are the Python names of its inputs by id."""
+    """Function defined in a behaviour.
+
+    Attributes:
+        definition: Block that defines the function.
+        name: Name given by the user.
+        python_name: Name in the program.
+        parameters: Python names of the inputs, by id of the input.
+        inputs: Inputs in order.
+        has_result: True if the function returns a result.
+    """
 
     definition: PlacedBlock
     name: str
@@ -37,7 +47,12 @@ class Function:
 
 
 class Lowering:
-    """Functions of a workspace, and the rewritten ``workspace``."""
+    """Rewriting of a workspace, and look-up of its functions.
+
+    Attributes:
+        workspace: Rewritten workspace.
+        variables: Names of the variables by id, without the inputs of functions.
+    """
 
     def __init__(self, workspace: Workspace, catalogue: Catalogue, names: PythonNames) -> None:
         self._catalogue = catalogue
@@ -52,11 +67,11 @@ class Lowering:
         self.workspace = replace(workspace, scripts=scripts, variables={**workspace.variables, **shown})
 
     def function(self, definition: PlacedBlock) -> Function | None:
-        """Return the function that this block defines; None if it is disabled."""
+        """Return the function that a block defines; None for disabled blocks and other blocks."""
         return self._by_id.get(definition.id)
 
     def called_function(self, placed: PlacedBlock) -> Function | None:
-        """Return the function that a block of the rewritten ``workspace`` calls, or None."""
+        """Return the function that a block of the rewritten `workspace` calls; None if there is none."""
         kind = placed.type.partition(":")[0]
         found = self._find_function(placed) if kind in (CALL, CALL_RESULT) else None
         if found is None:

@@ -32,12 +32,12 @@ _RESOURCE_NAMES = {
     "lights": lazy("the lights"),
     "light": lazy("the light"),
 }
-"""Display names of the resources of our robots; those of other robots are shown as described."""
+"""Display names of the resources of Studio's own robots; resources of other robots are shown by name."""
 _START_BLOCK = "events_started"
 
 
 class ProblemCollector:
-    """Collects problems during compilation. Each message is reported once per block."""
+    """Collector of the problems that the compiler finds; duplicate messages of a block are dropped."""
 
     def __init__(self, catalogue: Catalogue, workspace: Workspace) -> None:
         self._catalogue = catalogue
@@ -45,7 +45,7 @@ class ProblemCollector:
         self._problems: dict[tuple[str | None, str], Problem] = {}
 
     def problems(self) -> tuple[Problem, ...]:
-        """Return all problems, worst first."""
+        """Return all problems, the most severe first."""
         return tuple(sorted(self._problems.values(), key=lambda problem: _SEVERITY_ORDER[problem.severity]))
 
     def label(self, placed: PlacedBlock, block: Block | None) -> str:
@@ -53,7 +53,11 @@ class ProblemCollector:
         return label_of_unknown(placed) if block is None else label(placed, block)
 
     def check_starts(self, starts: int) -> None:
-        """Report that no block starts a script, unless the workspace is empty."""
+        """Report a workspace that contains blocks but no script that can start.
+
+        Args:
+            starts: Number of scripts with a start block.
+        """
         if starts or not self._workspace.scripts:
             return
         subject = pgettext("block", "when started")
@@ -65,7 +69,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def report_unattached(self, placed: PlacedBlock, block: Block) -> None:
-        """Report blocks that are not below a start block."""
+        """Report a block that is neither below a start block nor in a slot of another block."""
         name = self.label(placed, block)
         if block.shape in ("value", "boolean"):
             words = _("{block} isn't used. Drag it into an empty slot of another block.")
@@ -82,7 +86,7 @@ class ProblemCollector:
         self._add("warning", placed, block, name, sentence.format(block=name))
 
     def report_too_deep(self, placed: PlacedBlock) -> None:
-        """Report nesting that is too deep for Python."""
+        """Report a block that is nested too deeply for Python."""
         block = self._catalogue.blocks.get(placed.type)
         name = self.label(placed, block)
         self._add(
@@ -93,7 +97,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def report_no_message(self, placed: PlacedBlock, block: Block) -> None:
-        """Report a block that reads the received message in a script that isn't started by a message."""
+        """Report a block that reads the received message but is not in a script started by a message."""
         name = self.label(placed, block)
         self._add(
             "warning", placed, block, name,
@@ -101,7 +105,7 @@ class ProblemCollector:
         )  # fmt: skip
 
     def report_unknown_input(self, placed: PlacedBlock, block: Block) -> None:
-        """Report an input of a function that is used outside of the function or was removed."""
+        """Report a function input that is used outside of its function, or that was removed."""
         name = block_text(placed, self._catalogue.blocks, self._workspace.variables)
         sentence = _("“{name}” only works inside its own function. It is kept but skipped.").format(name=name)
         self._add("warning", placed, block, name, sentence)
@@ -116,7 +120,15 @@ class ProblemCollector:
     def report_never_set(
         self, placed: PlacedBlock, block: Block, id: str, name: str, *, is_list: bool
     ) -> None:
-        """Report a variable that is read but never set, so that its value remains 0."""
+        """Report a variable that is read but never set, so that its value remains 0.
+
+        Args:
+            placed: First block that reads the variable.
+            block: Description of the block.
+            id: Id of the variable.
+            name: Name of the variable.
+            is_list: True if the variable is used as a list.
+        """
         subject = f"“{name}”"
         self._add(
             "warning", placed, block, subject, _("{name} is used but never set.").format(name=subject),
@@ -167,7 +179,13 @@ class ProblemCollector:
     def report_unsupported(
         self, placed: PlacedBlock, block: Block | None, holder: PlacedBlock | None
     ) -> bool:
-        """Report a block that no connected robot supports; return False if it isn't such a block."""
+        """Report a block that is unknown or not supported by its robot, and return True if it was reported.
+
+        Args:
+            placed: Block in the workspace.
+            block: Description of the block; None if the type is unknown.
+            holder: Block that contains the block in a slot, and that is skipped too; None for a statement.
+        """
         robot = placed.fields.get("ROBOT")
         name = self.label(placed, block)
         skipped = name
@@ -220,7 +238,7 @@ class ProblemCollector:
             self._add("warning", placed, None, name, sentence.format(block=name))
 
     def check_unknown(self) -> None:
-        """Report unknown blocks inside of skipped blocks."""
+        """Report unknown blocks that the compiler didn't reach because they are inside skipped blocks."""
         told = {id for id, _sentence in self._problems}
         for placed in self._enabled_blocks():
             if placed.type not in self._catalogue.blocks and placed.id not in told:
@@ -236,7 +254,7 @@ class ProblemCollector:
                 waiting += reversed(inner)
 
     def check_names(self) -> None:
-        """Report variables whose names are missing in the file."""
+        """Report used variables that have no name in the file."""
         told: set[str] = set()
         for placed in self._enabled_blocks() if self._workspace.nameless_variables else ():
             block = self._catalogue.blocks.get(placed.type)
@@ -256,7 +274,7 @@ class ProblemCollector:
                 )  # fmt: skip
 
     def absent_blocks(self) -> tuple[str, ...]:
-        """Return the ids of all blocks of disconnected robots, including those in scripts that can't run."""
+        """Return the ids of all blocks of disconnected robots, including blocks outside of scripts."""
         return tuple(
             placed.id
             for placed in self._workspace.all_blocks()
@@ -280,7 +298,7 @@ class ProblemCollector:
         return known is not None
 
     def report_empty_slot(self, placed: PlacedBlock, block: Block) -> str | None:
-        """Report an empty slot without default and return the message; None if there is none."""
+        """Report the first required slot that is empty and return the message; None if there is none."""
         for argument in block.arguments:
             if not isinstance(argument, ValueInput):
                 continue
@@ -296,7 +314,7 @@ class ProblemCollector:
         return None
 
     def report_hints(self, placed: PlacedBlock, block: Block) -> None:
-        """Report hints about a block that will run."""
+        """Report a wait without time limit, and invalid values in the input of an action."""
         if block.type == "control_wait_until" and not _is_literal(placed, "CONDITION"):
             self._add(
                 "info", placed, block, self.label(placed, block), self._wait_forever_message(placed, block),
@@ -308,7 +326,14 @@ class ProblemCollector:
             self._check_input(placed, block, action)
 
     def report_motion(self, placed: PlacedBlock, block: Block, topic: str, robots: Sequence[str]) -> None:
-        """Report a block that moves robots by publishing on their topics."""
+        """Report a block that moves robots by publishing on a topic.
+
+        Args:
+            placed: Block in the workspace.
+            block: Description of the block.
+            topic: Name of the topic.
+            robots: Names of the moved robots; virtual robots are not reported.
+        """
         real = [name for name in robots if not self._catalogue.connected[name].virtual]
         if real:
             who, name = format_list(real), self.label(placed, block)

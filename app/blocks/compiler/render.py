@@ -1,4 +1,4 @@
-"""Rendering of a syntax tree as readable source, and as instrumented code that reports its position."""
+"""Rendering of a syntax tree as readable source code, and as code that reports the block being executed."""
 
 from __future__ import annotations
 
@@ -10,11 +10,16 @@ from app.blocks.model.template import literal
 from nep.system.syntax import parse_module
 
 BlockIdByNode = Mapping[ast.AST, str]
-"""Block ids by the first node of each block."""
+"""Block ids by the first syntax node of each block."""
 
 
 def render_source(body: Sequence[ast.stmt], marks: BlockIdByNode) -> tuple[str, dict[int, str]]:
-    """Return readable source code, and the block ids of the lines at which a block begins."""
+    """Return readable source code, and the block id for each line at which a block starts.
+
+    Args:
+        body: Statements of the program.
+        marks: Block ids by node.
+    """
     parts: list[str] = []
     for before, statement in zip((None, *body[:-1]), body, strict=True):
         ast.fix_missing_locations(statement)
@@ -32,13 +37,13 @@ def render_source(body: Sequence[ast.stmt], marks: BlockIdByNode) -> tuple[str, 
 def render_instrumented(
     body: Sequence[ast.stmt], marks: BlockIdByNode, numbers: AbstractSet[str], calls: AbstractSet[str]
 ) -> str:
-    """Return the code that is executed. Changes the tree, so call `readable` first.
+    """Return the source code that is executed. Modifies the syntax tree, so call `render_source` first.
 
     Args:
-        body: Syntax tree of the program.
+        body: Statements of the program.
         marks: Block ids by node.
-        numbers: Blocks that must return a number.
-        calls: Blocks that call a function.
+        numbers: Ids of blocks that must return a number.
+        calls: Ids of blocks that call a function.
     """
     stepper = _Instrumenter(marks, numbers, calls)
     steps: list[ast.stmt] = []
@@ -65,7 +70,7 @@ def _matched_statements(
 
 
 class _Instrumenter(ast.NodeTransformer):
-    """Inserts ``step(id)`` before blocks and at the end of loop bodies, and wraps values.
+    """Transformer that inserts ``step(id)`` before blocks and at the end of loop bodies, and wraps values.
 
     The step at the end of a loop body highlights the loop while its condition is evaluated, and lets Stop
     interrupt an empty loop.

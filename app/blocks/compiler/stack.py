@@ -1,4 +1,4 @@
-"""Single stack of a behaviour as a program, to try it without the rest.
+"""Compilation of a single stack of a behaviour, so that the user can try it without the rest.
 
 The stack runs as if it were below "when started", with the variables and functions of the behaviour.
 """
@@ -15,17 +15,17 @@ from app.blocks.model.workspace import saved_blocks
 SavedJson = Mapping[str, object]
 _HAT = {"type": "events_started", "id": "try hat"}
 SHOW_BLOCK_ID = "try value"
-"""Id of the block that prints a tried value."""
+"""Id of the generated block that prints the value of a tried value block."""
 
 
 @dataclass(frozen=True)
 class Stack:
-    """Stack to try.
+    """Stack of blocks to try.
 
     Attributes:
         id: Id of the first block.
-        kind: "value" if the value is printed, "hat" if the blocks below are run; otherwise the block and
-            those below it are run.
+        kind: "value" to print the value of the block, "hat" to run only the blocks below it; otherwise the
+            block and the blocks below it are run.
         state: Saved state of a block in the toolbox; None for a block of the behaviour.
     """
 
@@ -35,12 +35,15 @@ class Stack:
 
     @property
     def is_value(self) -> bool:
-        """True for a value block."""
+        """True if the stack is a value block."""
         return self.kind == "value"
 
     @classmethod
     def from_json(cls, told: object) -> Stack:
-        """Parse a request of the editor's page; an invalid one refers to no block."""
+        """Parse a request of the editor's page.
+
+        An invalid request results in a stack whose block doesn't exist.
+        """
         known: SavedJson = told if isinstance(told, Mapping) else {}
         state = known.get("state")
         return cls(
@@ -48,7 +51,13 @@ class Stack:
         )
 
     def workspace(self, behaviour: SavedJson) -> dict[str, object] | None:
-        """Return the behaviour reduced to this stack and its functions; None if the block doesn't exist."""
+        """Return a workspace with only this stack, below a start block, and the functions of the behaviour.
+
+        Returns None if the block doesn't exist, or if there is no block below an event block.
+
+        Args:
+            behaviour: Saved workspace of the behaviour.
+        """
         made: dict[str, object] = copy.deepcopy(dict(behaviour))
         blocks = made.get("blocks")
         tops = blocks.get("blocks") if isinstance(blocks, dict) else None
@@ -68,7 +77,7 @@ class Stack:
         return str(found.get("type")) if found is not None else ""
 
     def variable_id(self, behaviour: SavedJson) -> str | None:
-        """Return the id of the variable if the stack is a variable block; None for anything else."""
+        """Return the id of the variable if the stack is a variable block, else None."""
         found = self.state if self.state is not None else self._find_first_block(behaviour)
         if not self.is_value or found is None or found.get("type") != "variables_get":
             return None

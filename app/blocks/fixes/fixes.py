@@ -13,17 +13,25 @@ from app.blocks.toolbox.catalogue import categories
 DEFAULT_TIME_LIMIT_S = 10
 LEFT, TOP = 40, 40
 SCRIPT_SPACING = 420
-"""Horizontal distance of a new script from the others, most of which are not wider."""
+"""Horizontal offset in px of a new script; most existing scripts are narrower."""
 
 
 def fix(workspace: Mapping[str, object], action: str) -> dict[str, object] | None:
-    """Return the workspace after applying the ``fix_action`` of a problem; None for other actions.
+    """Return the workspace after applying a fix; None for actions that don't change the workspace.
 
-    ``limit:<id>`` sets a time limit for a "wait until", ``add:<type>`` puts a block above the first script
-    without a start, ``define:<id>`` creates the function that a block calls, ``begin:list:<id>`` and
-    ``begin:number:<id>`` set a variable at the start of the behaviour, ``receive:<name>`` creates a script
-    that receives a broadcast, and ``after:<hat>:<hat>`` moves the script of the first start block to the end
-    of the script of the second one.
+    Actions:
+
+    - ``limit:<id>`` sets a time limit for a "wait until".
+    - ``add:<type>`` puts a block above the first script without a start.
+    - ``define:<id>`` creates the function that a block calls.
+    - ``begin:list:<id>`` and ``begin:number:<id>`` set a variable at the start of the behaviour.
+    - ``receive:<name>`` creates a script that receives a broadcast.
+    - ``after:<hat>:<hat>`` moves the script of the first start block to the end of the script of the second
+      one.
+
+    Args:
+        workspace: Saved workspace of Blockly; it is not modified.
+        action: `Problem.fix_action` of a problem.
     """
     verb, _, object_ = action.partition(":")
     made: dict[str, object] = copy.deepcopy(dict(workspace))

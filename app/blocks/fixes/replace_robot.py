@@ -1,4 +1,4 @@
-"""Replacement of a disconnected robot in a behaviour by another robot."""
+"""Replacement of a disconnected robot by another robot in all blocks of a behaviour."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from app.robots.description.description import Robot
 
 
 def blocks_of(workspace: Mapping[str, object], robot: str) -> tuple[dict[str, object], ...]:
-    """Return all blocks that use the robot, outermost first."""
+    """Return all saved blocks that use a robot, outermost first."""
     return tuple(block for block in saved_blocks(workspace) if _robot_of(block) == robot)
 
 
 def block_types_by_robot(workspace: Mapping[str, object]) -> Mapping[str, frozenset[str]]:
-    """Return the types of the blocks that use each robot."""
+    """Return the block types that a workspace uses, by name of the robot."""
     found: dict[str, set[str]] = {}
     for block in saved_blocks(workspace):
         robot = _robot_of(block)
@@ -27,7 +27,7 @@ def block_types_by_robot(workspace: Mapping[str, object]) -> Mapping[str, frozen
 
 
 def block_counts_by_robot(workspace: Mapping[str, object], ids: Collection[str]) -> Mapping[str, int]:
-    """Count the blocks with these ids for each robot."""
+    """Return the number of blocks with one of these ids, by name of the robot."""
     wanted = frozenset(ids)
     found: dict[str, int] = {}
     for block in saved_blocks(workspace) if wanted else ():
@@ -45,9 +45,13 @@ def block_types_of(robot: Robot) -> frozenset[str]:
 def supports_blocks(
     asked: Collection[str], model: str, robot: Robot, known: Collection[str] | None = None
 ) -> bool:
-    """Return True if a robot supports all blocks of these types, which belong to a robot of this model.
+    """Return True if a robot supports all given block types of another robot; False if there are none.
 
-    ``known`` are the types of the robot's own blocks, if they were already determined.
+    Args:
+        asked: Block types that the other robot uses.
+        model: Model of the other robot.
+        robot: Robot to check.
+        known: Result of ``types_of(robot)`` if it was already computed.
     """
     known = block_types_of(robot) if known is None else known
     return bool(asked) and all(_translated_type(each, model, robot) in known for each in asked)
@@ -56,7 +60,14 @@ def supports_blocks(
 def with_robot_replaced(
     workspace: Mapping[str, object], missing: str, model: str, robot: Robot
 ) -> dict[str, object]:
-    """Return the workspace with all blocks of the missing robot changed to another robot."""
+    """Return a copy of a workspace in which all blocks of a missing robot use another robot.
+
+    Args:
+        workspace: Saved workspace of Blockly.
+        missing: Name of the missing robot.
+        model: Model of the missing robot.
+        robot: Robot to use instead.
+    """
     made: dict[str, object] = copy.deepcopy(dict(workspace))
     for block in blocks_of(made, missing):
         block["type"] = _translated_type(str(block.get("type")), model, robot)

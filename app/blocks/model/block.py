@@ -1,4 +1,4 @@
-"""Description of a block, which defines its appearance in the editor, its Python code and its texts."""
+"""Description of a kind of block: its appearance in the editor, its Python code and its texts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,14 @@ _PLACEHOLDER = re.compile(r"%([A-Z][A-Z0-9_]*)")
 
 @dataclass(frozen=True)
 class RobotUse:
-    """Action, sensor or event that a block of a robot uses."""
+    """Action, sensor or event of a robot that a block uses.
+
+    Attributes:
+        kind: "action", "sensor" or "event".
+        name: Name in the robot's description; "" if the block can use any sensor.
+        title: Display name.
+        model: Model of the robot.
+    """
 
     kind: Kind
     name: str
@@ -29,12 +36,12 @@ class RobotUse:
 
 @dataclass(frozen=True)
 class Block:
-    """Kind of block.
+    """Description of a kind of block.
 
     Attributes:
         text: Text on the block, with ``%NAME`` for an argument.
         python: Template (`app.blocks.model.template`), or one template for each value of the field `variant`.
-            For an event block, the decorator.
+            For an event block, the template of the decorator.
         constants: Values of placeholders that aren't arguments.
         keywords: Placeholders that take keyword arguments: placeholder -> (argument, Python keyword).
     """
@@ -79,7 +86,7 @@ class Block:
         return (self.python,) if isinstance(self.python, str) else tuple(self.python.values())
 
     def problems(self) -> tuple[str, ...]:
-        """Return the errors of the description; empty if it is consistent."""
+        """Return the inconsistencies of the description, one message each; empty if it is consistent."""
         known = {argument.name for argument in self.arguments} | {
             *self.constants,
             *self.constant_trees,
@@ -99,10 +106,13 @@ class Block:
         return tuple(found)
 
     def translated(self, say: Translate) -> Block:
-        """Return the block with its English texts translated by ``say``; type and Python code are unchanged.
+        """Return the block with translated texts; type and Python code are unchanged.
 
-        ``say`` is called for every text that the user reads; ``tools/words.py`` uses that to collect the
-        texts.
+        ``tools/words.py`` calls this method to collect the texts.
+
+        Args:
+            say: Called with the context and the English text of everything that the user reads; returns the
+                translation.
         """
         words = say(f"words to find {self.type}", self.search_words) if self.search_words else ""
         return replace(
@@ -118,7 +128,10 @@ class Block:
         )
 
     def to_blockly(self) -> dict[str, object]:
-        """Return the definition in Blockly's JSON; each statement input is on a separate line."""
+        """Return the definition of the block in Blockly's JSON format.
+
+        Each statement input is on a separate line.
+        """
         definition: dict[str, object] = {"type": self.type, "style": self.style, "tooltip": self.tooltip}
         definition.update(_message_json(self))
         definition["inputsInline"] = True
@@ -133,7 +146,11 @@ class Block:
         return definition
 
     def to_toolbox(self, fields: Mapping[str, object] | None = None) -> dict[str, object]:
-        """Return the toolbox entry, with a shadow block in each slot that has a default."""
+        """Return the toolbox entry of the block in Blockly's JSON format, with initial content in its slots.
+
+        Args:
+            fields: Preset values of fields.
+        """
         entry: dict[str, object] = {"kind": "block", "type": self.type}
         if fields:
             entry["fields"] = dict(fields)

@@ -1,4 +1,4 @@
-"""Blocks as text, such as "wait 2 s" or "say “Touch my head.”"."""
+"""Formatting of blocks as text, such as "wait 2 s" or "say “Touch my head.”"."""
 
 from __future__ import annotations
 
@@ -26,9 +26,13 @@ _MAX_LENGTH = 80
 def block_text(
     placed: PlacedBlock, blocks: Mapping[str, Block], variables: Mapping[str, str], *, robot: bool = True
 ) -> str:
-    """Return the block with its arguments as one line of limited length.
+    """Return a block with its arguments as one line of text, truncated to 80 characters.
 
-    If ``robot`` is False, the name of the robot is omitted.
+    Args:
+        placed: Block in the workspace.
+        blocks: Descriptions of blocks by type.
+        variables: Names of variables by id.
+        robot: False to omit the name of the robot.
     """
     block = blocks.get(placed.type)
     if block is None:
@@ -62,8 +66,8 @@ def block_text(
 def label(placed: PlacedBlock, block: Block) -> str:
     """Return the label of a block: its text before the first slot, such as "wait until".
 
-    For an action of a robot, the title of the action. In Japanese, where the verb comes last, the whole text
-    with "…" for slots.
+    The label of an action block is the title of the action. In Japanese, where the verb comes last, the label
+    is the whole text with "…" for slots.
     """
     if block.robot is not None and block.robot.kind == "action":
         return block.robot.title
@@ -86,7 +90,7 @@ def label(placed: PlacedBlock, block: Block) -> str:
 
 
 def label_of_type(block_type: str) -> str:
-    """Derive a label from the type of a block without description: ``robot_nao_do_wave`` is "wave"."""
+    """Derive a label from the type of a block without description: "wave" for ``robot_nao_do_wave``."""
     for verb in ("_do_", "_get_", "_when_"):
         if block_type.startswith("robot_") and verb in block_type:
             return block_type.partition(verb)[2].replace("_", " ")
@@ -94,7 +98,7 @@ def label_of_type(block_type: str) -> str:
 
 
 def label_of_unknown(placed: PlacedBlock) -> str:
-    """Return the label of a block without description, as on the grey block in the editor."""
+    """Return the label of a block without description; the editor shows the same text on the grey block."""
     if placed.type.startswith("robot_"):
         return label_of_type(placed.type)
     words = re.sub(r"[_\s]+", " ", placed.type).strip()

@@ -1,4 +1,7 @@
-"""Category of the toolbox. A plug-in is a module of `app.blocks.categories` that binds ``CATEGORY``."""
+"""Categories of the toolbox.
+
+A plug-in is a module of `app.blocks.categories` that binds ``CATEGORY``.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from app.robots.description.description import Robot
 
 @dataclass(frozen=True)
 class ToolboxEntry:
-    """Block in the toolbox, with preset fields."""
+    """Block in the toolbox, with preset field values."""
 
     block: Block
     fields: Mapping[str, object] = field(default_factory=dict)
@@ -20,7 +23,7 @@ class ToolboxEntry:
 
 @dataclass(frozen=True)
 class Group:
-    """Part of the toolbox under the heading of a robot, such as "Speech"."""
+    """Titled group of blocks under the heading of a robot in the toolbox, such as "Speech"."""
 
     title: str
     icon: str
@@ -30,14 +33,13 @@ class Group:
 
 @dataclass(frozen=True)
 class Category:
-    """Category of blocks.
+    """Category of blocks in the toolbox.
 
     Attributes:
         order: Position in the toolbox.
         button: Text and key of a button above the blocks.
-        make: Returns the blocks of a robot. The second argument are all known robots; those of the same model
-            are offered in the drop-down.
-        groups: Returns the groups under the heading of a robot; arguments as for `make`.
+        make_blocks: Returns the blocks of a robot, given its description and the descriptions of all robots.
+        make_groups: Returns the groups under the heading of a robot; arguments as for `make_blocks`.
     """
 
     name: str
@@ -54,7 +56,7 @@ class Category:
     make_groups: Callable[[Robot, Sequence[Robot]], tuple[Group, ...]] | None = None
 
     def translated(self, say: Translate) -> Category:
-        """Return the category with its English texts translated by ``say``; see `Block.translated`."""
+        """Return the category with translated texts; see `Block.translated`."""
         button = None if self.button is None else (say(None, self.button[0]), self.button[1])
         return replace(
             self,

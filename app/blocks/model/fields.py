@@ -1,6 +1,6 @@
 """Arguments of blocks: slots for other blocks, and fields with a value.
 
-A field converts its saved value (`Field.read`) to a plain value, or raises an exception with the reason.
+`Field.read` validates the saved value of a field and converts it to a plain value.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Literal
 from nep.i18n import _
 
 Translate = Callable[[str | None, str], str]
-"""Translates (context, English text); see `app.blocks.model.block.Block.translated`."""
+"""Function that translates a text, given its context and the English text; see `Block.translated`."""
 Check = Literal["Number", "String", "Boolean", "List"]
 
 _HEX_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
@@ -23,12 +23,16 @@ _MAX_TOPIC_BYTES = 200
 
 
 class FieldError(ValueError):
-    """Raised for a field value that the block can't use. The message completes a sentence."""
+    """Raised for an invalid field value. The message is the end of a sentence, such as "needs a number"."""
 
 
 @dataclass(frozen=True)
 class Argument:
-    """Argument in the text of a block; ``name`` is the name of Blockly's field or input."""
+    """Argument in the text of a block.
+
+    Attributes:
+        name: Name of the field or input in Blockly.
+    """
 
     name: str
 
@@ -38,15 +42,18 @@ class Argument:
         return False
 
     def to_blockly(self) -> dict[str, object]:
-        """Return the entry of the argument in Blockly's ``args``."""
+        """Return the definition of the argument for the ``args`` of a block in Blockly's JSON format."""
         raise NotImplementedError
 
     def initial_inputs(self) -> dict[str, object]:
-        """Return the initial content of the argument's slots in the toolbox, by name of the slot."""
+        """Return the initial content of the argument's slots in the toolbox, by name of the slot.
+
+        The content is in Blockly's JSON format.
+        """
         return {}
 
     def translated(self, say: Translate) -> Argument:  # noqa: ARG002 (most have no words)
-        """Return the argument with texts and initial values translated; names and values are unchanged."""
+        """Return the argument with translated texts and initial values; name and values are unchanged."""
         return self
 
 
@@ -55,9 +62,11 @@ class ValueInput(Argument):
     """Slot for a value block.
 
     Attributes:
+        check: Type of the accepted values; None for any.
         default: Value of the shadow block; None leaves the slot empty.
-        only: Field and value; the slot exists only while the field has this value.
-        variable: Name of a variable that the toolbox puts into the slot.
+        unit: Unit of the value, for the help.
+        only_if: Name and value of a field; the slot exists only while the field has this value.
+        variable: Name of a variable whose block is in the slot in the toolbox.
     """
 
     check: Check | None = None
@@ -67,7 +76,7 @@ class ValueInput(Argument):
     variable: str | None = None
 
     def to_blockly(self) -> dict[str, object]:
-        """Return a value input with its type check."""
+        """Return the definition of Blockly's value input, with its type check."""
         entry: dict[str, object] = {"type": "input_value", "name": self.name}
         if self.check is not None:
             entry["check"] = self.check
@@ -76,7 +85,7 @@ class ValueInput(Argument):
         return entry
 
     def is_present(self, fields: Mapping[str, object]) -> bool:
-        """Return True if the slot exists with these saved fields."""
+        """Return True if the slot exists on a block with these saved field values; see `only_if`."""
         return self.only_if is None or str(fields.get(self.only_if[0], self.only_if[1])) == self.only_if[1]
 
     def translated(self, say: Translate) -> Argument:
@@ -86,7 +95,7 @@ class ValueInput(Argument):
         return replace(self, variable=variable, default=default)
 
     def initial_inputs(self) -> dict[str, object]:
-        """Return a variable block, or a shadow block."""
+        """Return the initial content of the slot: a variable block, a shadow block, or nothing."""
         if self.variable is not None:
             variable = {"VAR": {"name": self.variable, "type": ""}}
             return {self.name: {"block": {"type": "variables_get", "fields": variable}}}
@@ -94,7 +103,7 @@ class ValueInput(Argument):
         return {} if shadow is None else {self.name: {"shadow": shadow}}
 
     def shadow(self) -> dict[str, object] | None:
-        """Return the shadow block that fills the slot while it is empty."""
+        """Return the shadow block that is shown while the slot is empty; None if there is no default."""
         if self.default is None or isinstance(self.default, bool):
             return None
         if isinstance(self.default, str):
@@ -104,16 +113,16 @@ class ValueInput(Argument):
 
 @dataclass(frozen=True)
 class StatementInput(Argument):
-    """Slot for statements."""
+    """Slot for a sequence of statement blocks."""
 
     def to_blockly(self) -> dict[str, object]:
-        """Return a statement input."""
+        """Return the definition of Blockly's statement input."""
         return {"type": "input_statement", "name": self.name}
 
 
 @dataclass(frozen=True)
 class Field(Argument):
-    """Argument whose value is entered in the block."""
+    """Argument whose value is entered or selected on the block."""
 
     def read(self, saved: object) -> object:
         """Convert a saved value to a plain value. Raises FieldError if the value is invalid."""
@@ -122,14 +131,14 @@ class Field(Argument):
 
 @dataclass(frozen=True)
 class NumberField(Field):
-    """Number entered in the block."""
+    """Field for a number."""
 
     value: float = 0
     minimum: float | None = None
     maximum: float | None = None
 
     def to_blockly(self) -> dict[str, object]:
-        """Return Blockly's number field."""
+        """Return the definition of Blockly's number field."""
         entry: dict[str, object] = {"type": "field_number", "name": self.name, "value": self.value}
         if self.minimum is not None:
             entry["min"] = self.minimum
@@ -138,7 +147,11 @@ class NumberField(Field):
         return entry
 
     def read(self, saved: object) -> object:
-        """Return a finite number within the limits; text that represents a number is accepted."""
+        """Return a finite number within the limits. Accepts text that represents a number.
+
+        Raises:
+            FieldError: The value is not a number or is outside the limits.
+        """
         number = _number(self.value if saved is None else saved)
         if self.minimum is not None and number < self.minimum:
             raise FieldError(_("needs a number of at least {minimum:g}").format(minimum=self.minimum))
@@ -149,12 +162,12 @@ class NumberField(Field):
 
 @dataclass(frozen=True)
 class TextField(Field):
-    """Text entered in the block."""
+    """Field for a text."""
 
     value: str = ""
 
     def to_blockly(self) -> dict[str, object]:
-        """Return Blockly's text field."""
+        """Return the definition of Blockly's text field."""
         return {"type": "field_input", "name": self.name, "text": self.value}
 
     def translated(self, say: Translate) -> Argument:
@@ -162,22 +175,27 @@ class TextField(Field):
         return replace(self, value=say("example", self.value))
 
     def read(self, saved: object) -> object:
-        """Return the text."""
+        """Return the saved value as text."""
         return self.value if saved is None else str(saved)
 
 
 @dataclass(frozen=True)
 class ChoiceField(Field):
-    """Drop-down. ``options`` are (text, value) pairs; Blockly stores the values as text.
+    """Drop-down field.
 
-    ``source`` tells the editor where to find further options ("robots:<model>"); then any text is valid.
+    Attributes:
+        options: Pairs of text and value; Blockly stores the values as text.
+        source: Source of further options in the editor, such as "robots:<model>"; any text is valid then.
     """
 
     options: tuple[tuple[str, object], ...] = ()
     source: str | None = None
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our drop-down field, which preserves a value that is not among the options."""
+        """Return the definition of Studio's drop-down field.
+
+        Unlike Blockly's field, it preserves a value that is not among the options.
+        """
         entry: dict[str, object] = {
             "type": "field_choice",
             "name": self.name,
@@ -205,22 +223,26 @@ class ChoiceField(Field):
         return replace(self, options=tuple((say("choice", words), value) for words, value in self.options))
 
     def option_text(self, value: object) -> str:
-        """Return the text of the option with this value."""
+        """Return the text of the option with this value; the value as text if there is no such option."""
         return next((words for words, option in self.options if option == value), str(value))
 
 
 @dataclass(frozen=True)
 class TopicField(Field):
-    """Name of a topic, entered or selected from the existing ones."""
+    """Field for the name of a topic, entered or selected from the existing topics."""
 
     value: str = "/blackboard"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our topic field."""
+        """Return the definition of Studio's topic field."""
         return {"type": "field_topic", "name": self.name, "value": self.value}
 
     def read(self, saved: object) -> object:
-        """Return a valid topic name (`WIRE`: no white space, control characters or "{", 1 to 200 bytes)."""
+        """Return a valid topic name: 1 to 200 bytes without white space, control characters and "{".
+
+        Raises:
+            FieldError: The name is invalid.
+        """
         topic = self.value if saved is None else str(saved)
         if not topic:
             raise FieldError(_("needs the name of a topic"))
@@ -233,12 +255,12 @@ class TopicField(Field):
 
 @dataclass(frozen=True)
 class BroadcastField(Field):
-    """Name of a broadcast within one behaviour, selected or entered."""
+    """Field for the name of a broadcast within one behaviour, entered or selected."""
 
     value: str = "start"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our drop-down of the broadcast names of the behaviour."""
+        """Return the definition of Studio's drop-down field with the broadcast names of the behaviour."""
         return {"type": "field_broadcast", "name": self.name, "value": self.value}
 
     def translated(self, say: Translate) -> Argument:
@@ -246,7 +268,10 @@ class BroadcastField(Field):
         return replace(self, value=say("example", self.value))
 
     def read(self, saved: object) -> object:
-        """Return a name on one line, without surrounding spaces."""
+        """Return the name on one line, without surrounding white space.
+
+        Raises FieldError if the name is empty.
+        """
         name = " ".join((self.value if saved is None else str(saved)).split())
         if not name:
             raise FieldError(_("needs the name of a message"))
@@ -255,28 +280,33 @@ class BroadcastField(Field):
 
 @dataclass(frozen=True)
 class PathField(Field):
-    """Path of a field in the messages of a topic, such as ``faces.0.name``, entered or selected."""
+    """Field for a field path in the messages of a topic, such as ``faces.0.name``, entered or selected.
+
+    Attributes:
+        value: Initial path.
+        topic_field: Name of the block's topic field, whose topic determines the suggested paths.
+    """
 
     value: str = "value"
     topic_field: str = "TOPIC"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our topic field, which suggests fields of the topic in ``of``."""
+        """Return the definition of Studio's topic field, which suggests field paths of the topic."""
         return {"type": "field_topic", "name": self.name, "value": self.value, "of": self.topic_field}
 
     def read(self, saved: object) -> object:
-        """Return the path; empty means the whole message."""
+        """Return the path; "" means the whole message."""
         return self.value if saved is None else str(saved)
 
 
 @dataclass(frozen=True)
 class ColourField(Field):
-    """Colour in the form "#rrggbb"."""
+    """Field for a colour in the form "#rrggbb"."""
 
     value: str = "#37b6ff"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our colour field."""
+        """Return the definition of Studio's colour field."""
         return {"type": "field_colour_chip", "name": self.name, "value": self.value}
 
     def read(self, saved: object) -> object:
@@ -289,12 +319,12 @@ class ColourField(Field):
 
 @dataclass(frozen=True)
 class VariableField(Field):
-    """Variable of the behaviour; the compiler resolves its name."""
+    """Field for a variable of the behaviour; the compiler resolves its name."""
 
     value: str = "count"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return Blockly's variable field."""
+        """Return the definition of Blockly's variable field."""
         return {"type": "field_variable", "name": self.name, "variable": self.value}
 
     def translated(self, say: Translate) -> Argument:
@@ -302,7 +332,11 @@ class VariableField(Field):
         return replace(self, value=say("variable", self.value))
 
     def read(self, saved: object) -> object:
-        """Return the id of the variable. Blockly saves ``{"id": …}``, older files contain a name."""
+        """Return the id of the variable; older files contain its name instead.
+
+        Raises:
+            FieldError: The value is missing or invalid.
+        """
         if isinstance(saved, Mapping):
             saved = saved.get("id", saved.get("name"))
         if not isinstance(saved, str) or not saved:
@@ -312,15 +346,15 @@ class VariableField(Field):
 
 @dataclass(frozen=True)
 class LiveField(Field):
-    """Display of a sensor's newest value, filled by the editor and not saved."""
+    """Display of a sensor's newest value on the block, updated by the editor and not saved."""
 
     @property
     def is_display_only(self) -> bool:
-        """True: the display is not part of the Python code."""
+        """True, because the display is not part of the Python code."""
         return True
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our field that displays a live value."""
+        """Return the definition of Studio's field that displays a live value."""
         return {"type": "field_live", "name": self.name}
 
     def read(self, saved: object) -> object:  # noqa: ARG002 (saved values are ignored)
@@ -347,7 +381,12 @@ def _number(saved: object) -> int | float:
 
 
 def robot_field(model: str, names: Sequence[str]) -> ChoiceField:
-    """Return the drop-down of all robots of a model, which is the first field of each robot block."""
+    """Return the drop-down field with all robots of a model, the first field of each robot block.
+
+    Args:
+        model: Model of the robots.
+        names: Names of the robots.
+    """
     return _robot_field(model, tuple(names))
 
 

@@ -1,6 +1,7 @@
 """Arguments that the user adds and removes on the block: items of a list, inputs of a function.
 
-The editor saves them in ``extraState`` of the block; in a file, that may contain anything.
+The editor saves these arguments in the block's ``extraState``, which is validated because a file may contain
+anything.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ MAX_NAME_LENGTH = 60
 
 @dataclass(frozen=True)
 class Items(Argument):
-    """Row of slots ``<name>0``, ``<name>1``, …, whose values fill the placeholder as one list."""
+    """Variable number of slots ``<name>0``, ``<name>1``, …, whose values fill the placeholder as one list."""
 
     count: int = 3
     texts: tuple[str, ...] = ()  # initial texts in the toolbox
 
     def initial_inputs(self) -> dict[str, object]:
-        """Return a text block for each slot."""
+        """Return a shadow text block for each of the initial texts, by name of the slot."""
         return {
             f"{self.name}{number}": {"shadow": {"type": "values_text", "fields": {"TEXT": words}}}
             for number, words in enumerate(self.texts)
@@ -36,11 +37,15 @@ class Items(Argument):
         return replace(self, texts=tuple(say("example", words) for words in self.texts))
 
     def to_blockly(self) -> dict[str, object]:
-        """Return a placeholder at which the editor's mutator inserts the slots."""
+        """Return the definition of an empty input, at which the editor's mutator inserts the slots."""
         return {"type": "input_dummy", "name": self.name}
 
     def slots(self, extra: Mapping[str, object]) -> tuple[ValueInput, ...]:
-        """Return the slots of a block with this saved state."""
+        """Return the slots of a placed block.
+
+        Args:
+            extra: Saved ``extraState`` of the block; the number of slots defaults to `count`.
+        """
         count = extra.get("items")
         sound = isinstance(count, int) and not isinstance(count, bool)
         many = min(max(int(count), 0), MAX_ITEMS) if sound and isinstance(count, int) else self.count
@@ -49,16 +54,18 @@ class Items(Argument):
 
 @dataclass(frozen=True)
 class ListInput(ValueInput):
-    """Slot for a list.
+    """Slot for a list, which contains an extensible list block in the toolbox.
 
-    In the toolbox, the slot contains a list block with these texts, which can be extended.
+    Attributes:
+        check: Type of the accepted values.
+        texts: Initial texts of the list block.
     """
 
     check: Check | None = "List"
     texts: tuple[str, ...] = ()
 
     def initial_inputs(self) -> dict[str, object]:
-        """Return a list block that is not a shadow block, because values can be put into its slots."""
+        """Return a list block with the initial texts. Not a shadow block, so that its slots accept values."""
         items = Items("ITEM", len(self.texts), self.texts)
         held = {
             "type": "lists_create",
@@ -74,14 +81,24 @@ class ListInput(ValueInput):
 
 @dataclass(frozen=True)
 class Branches:
-    """Further branches of an "if": the number of "else if", and ``has_else``, True if there is an "else"."""
+    """Branches of an "if" after the first one.
+
+    Attributes:
+        else_ifs: Number of "else if" branches.
+        has_else: True if there is an "else" branch.
+    """
 
     else_ifs: int = 0
     has_else: bool = False
 
     @classmethod
     def from_extra_state(cls, extra: Mapping[str, object], *, has_else: bool) -> Branches:
-        """Parse the saved state of a block; by default no "else if", and an "else" as given by the type."""
+        """Parse the saved state of a block; invalid values are replaced by defaults.
+
+        Args:
+            extra: Saved ``extraState`` of the block.
+            has_else: Default for the "else" branch.
+        """
         count, told = extra.get("elseIfs"), extra.get("else")
         sound = isinstance(count, int) and not isinstance(count, bool)
         many = min(max(int(count), 0), MAX_ELSE_IFS) if sound and isinstance(count, int) else 0
@@ -97,14 +114,23 @@ class Branches:
 
 @dataclass(frozen=True)
 class FunctionInput:
-    """Input of a function: an id that never changes, and a name that the user can change."""
+    """Input of a function.
+
+    Attributes:
+        id: Id that never changes.
+        name: Name, which the user can change.
+    """
 
     id: str
     name: str
 
 
 def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
-    """Return the saved inputs of a function definition or call; duplicate ids are dropped."""
+    """Return the inputs of a function definition or call; duplicate ids are dropped.
+
+    Args:
+        extra: Saved ``extraState`` of the block.
+    """
     saved = extra.get("inputs")
     found: dict[str, FunctionInput] = {}
     for each in saved if isinstance(saved, list) else ():
@@ -116,34 +142,34 @@ def inputs_of(extra: Mapping[str, object]) -> tuple[FunctionInput, ...]:
 
 @dataclass(frozen=True)
 class Inputs(Argument):
-    """Inputs of a function: names on its definition, slots ``IN_<id>`` on its calls."""
+    """Inputs of a function: names on the definition, slots ``IN_<id>`` on the calls."""
 
     @property
     def is_display_only(self) -> bool:
-        """True: the compiler converts them to parameters and arguments."""
+        """True, because the compiler converts the inputs to parameters and arguments."""
         return True
 
     def to_blockly(self) -> dict[str, object]:
-        """Return a placeholder at which the editor's mutator inserts names or slots."""
+        """Return the definition of an empty input, at which the editor's mutator inserts names or slots."""
         return {"type": "input_dummy", "name": self.name}
 
     def slots(self, inputs: tuple[FunctionInput, ...]) -> tuple[tuple[FunctionInput, ValueInput], ...]:
-        """Return each input of a call with its slot."""
+        """Return pairs of an input and its slot on a call."""
         return tuple((each, ValueInput(f"IN_{each.id}")) for each in inputs)
 
 
 @dataclass(frozen=True)
 class InputField(VariableField):
-    """Input of the surrounding function. The compiler resolves the name."""
+    """Field for an input of the surrounding function; the compiler resolves its name."""
 
     value: str = "input"
 
     def to_blockly(self) -> dict[str, object]:
-        """Return our field that displays the name of the input."""
+        """Return the definition of Studio's field that displays the name of the input."""
         return {"type": "field_function_input", "name": self.name}
 
 
 def function_name(placed: PlacedBlock) -> str:
-    """Return the name of the function that a block defines or calls."""
+    """Return the name of the function that a block defines or calls; "function" if it has no name."""
     saved = placed.fields.get("NAME", placed.extra_state.get("name"))
     return " ".join(str(saved or "function").split())[:MAX_NAME_LENGTH] or "function"

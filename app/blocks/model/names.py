@@ -1,4 +1,4 @@
-"""Unique Python names, derived from texts of the user."""
+"""Generation of unique Python names from texts of the user."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ _NON_WORD_CHARACTERS = re.compile(r"\W+")
 
 
 class UniqueTexts:
-    """Generator of unique texts: duplicates get a number, starting with 2."""
+    """Generator of unique texts: a number is appended to duplicates, starting with 2.
+
+    Args:
+        before_number: Separator between text and number.
+        taken: Texts that must not be returned.
+    """
 
     def __init__(self, before_number: str, taken: Iterable[str] = ()) -> None:
         self._before_number = before_number
@@ -20,7 +25,7 @@ class UniqueTexts:
         self._next: dict[str, int] = {}  # next number to try: 4000 scripts may share a name
 
     def make_unique(self, text: str) -> str:
-        """Return the text, with the first unused number appended if the text was already used."""
+        """Return the text, or the text with the first unused number if it is not unique."""
         made, number = text, self._next.get(text, 2)
         while made in self._taken:
             made, number = f"{text}{self._before_number}{number}", number + 1
@@ -30,15 +35,22 @@ class UniqueTexts:
 
 
 class PythonNames:
-    """Generator of unique Python names."""
+    """Generator of unique Python names that are neither keywords nor names of builtins.
+
+    Args:
+        taken: Names that must not be returned.
+    """
 
     def __init__(self, taken: frozenset[str]) -> None:
         self._unique = UniqueTexts("_", {*taken, *keyword.kwlist, *keyword.softkwlist, *dir(builtins)})
 
     def new(self, words: str, otherwise: str) -> str:
-        """Return a name similar to ``words``, such as ``when_started_2``.
+        """Return a new name derived from a text, such as ``when_started_2``.
 
-        If no valid character remains, the name is derived from ``otherwise``.
+        Args:
+            words: Text.
+            otherwise: Name to use if the text contains no valid character, and prefix if it starts with a
+                digit.
         """
         # Python normalizes names to NFKC: different names must stay different.
         plain = _NON_WORD_CHARACTERS.sub("_", unicodedata.normalize("NFKC", words)).strip("_")[:60]

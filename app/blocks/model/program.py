@@ -16,12 +16,14 @@ class Problem:
     An error means that the program would stop with this message at this block.
 
     Attributes:
-        sentence: Message.
-        subject: Part of `sentence` that is shown in bold.
-        category: Style of the block's colour.
-        icon: Icon of the block.
-        fix: Text of the button.
+        severity: "error", "warning" or "info".
+        block_id: Id of the block; None for a problem of the whole workspace.
+        category: Name of the style that defines the block's colour.
+        subject: Part of `message` that is shown in bold.
+        message: Message for the user.
+        fix: Text of the button that fixes the problem; None for no button.
         fix_action: Action of the button (`app.blocks.fixes.fixes`, or ``connect:<robot>``).
+        icon: Icon of the block.
     """
 
     severity: Severity
@@ -56,14 +58,16 @@ class Program:
     Attributes:
         source: Readable code, which can also be run as a file.
         lines: Block ids by line of `source`.
-        runnable: The same code with a ``step`` before each block.
+        runnable: The same code with a call of ``step`` before each block.
         robots: Connected robots that the blocks use, or that the program moves by publishing on their topics.
+        publishes: Topics on which the blocks publish.
+        listens: Topics that the blocks subscribe to.
         moves: Robots that the program moves by publishing on their topics.
         sensors: Used sensors as (robot, name).
         events: Used events as (robot, name).
-        actions: Actions invoked on each robot; None if that isn't statically known.
-        readings: Blocks as text, such as "wait 2 s".
-        labels: Labels of blocks, such as "wait".
+        actions: Names of the executed actions by robot; None if they aren't statically known.
+        readings: Blocks as text by block id, such as "wait 2 s".
+        labels: Labels of blocks by block id, such as "wait".
         variables: Variables, which are shared by all scripts.
     """
 
@@ -89,11 +93,11 @@ class Program:
 
     @property
     def errors(self) -> tuple[Problem, ...]:
-        """Problems at which the program would stop."""
+        """Problems with the severity "error", at which the program would stop."""
         return tuple(problem for problem in self.problems if problem.severity == "error")
 
     def to_json(self) -> dict[str, object]:
-        """Return the parts of the program that a child process needs, as a JSON object."""
+        """Return the parts of the program that the program's process needs, as a JSON object."""
         kept = asdict(self)
         for name in ("source", "lines", "problems", "absent", "actions"):
             del kept[name]
@@ -101,7 +105,7 @@ class Program:
 
     @classmethod
     def from_json(cls, saved: Mapping[str, object]) -> Program:
-        """Restore a program from `to_json`. Raises KeyError or TypeError for other data."""
+        """Create a program from the result of `to_json`. Raises KeyError or TypeError for invalid data."""
         return cls(
             name=str(saved["name"]),
             source="",

@@ -1,4 +1,4 @@
-"""Conversion of the texts and parameters in a robot description to parts of a block."""
+"""Conversion of texts and parameters in a robot description to texts and arguments of blocks."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ _NUMBER_KINDS = ("number", "integer", "angle")
 
 
 class BlockTemplate:
-    """Text of a description in which parameters are replaced by names of block arguments.
+    """Text of a block, made from a text in a robot description.
 
     Attributes:
-        arguments: Argument name of each parameter.
+        text: Text in which parameters are replaced by names of block arguments.
+        arguments: Names of the block arguments by parameter.
         shown: Parameters that occur in the text.
     """
 
@@ -54,16 +55,26 @@ class BlockTemplate:
 
 
 def block_type_of(model: str, verb: str, name: str, *, plain: bool = False) -> str:
-    """Return a block type such as ``robot_pepper_do_say``.
+    """Return the type of a robot block, such as ``robot_pepper_do_say``.
 
-    With ``plain``, the type belongs to no action, sensor or event: ``robot_pepper_changes``.
+    Args:
+        model: Model of the robot.
+        verb: "do", "get" or "when".
+        name: Name of the action, sensor or event.
+        plain: True to omit the verb, for blocks of no particular action, sensor or event:
+            ``robot_pepper_changes``.
     """
     middle = "" if plain else f"{verb}_"
     return f"robot_{_type_part(model)}_{middle}{_type_part(name)}"
 
 
 def input_of(parameter: Parameter, name: str) -> Argument:
-    """Return the slot or field for a parameter of an action."""
+    """Return the slot or field for a parameter of an action.
+
+    Args:
+        parameter: Parameter of the action.
+        name: Name of the block argument.
+    """
     default = parameter.default
     if parameter.kind in _NUMBER_KINDS:
         number = default if isinstance(default, (int, float)) else (parameter.minimum or 0)
@@ -78,7 +89,12 @@ def input_of(parameter: Parameter, name: str) -> Argument:
 
 
 def field_of(parameter: Parameter | None, name: str) -> Field:
-    """Return the field for a parameter with a fixed set of values, or for the filter of an event."""
+    """Return the field for a parameter with a fixed set of values, or for the filter of an event.
+
+    Args:
+        parameter: Parameter or event field; None for a text field.
+        name: Name of the block argument.
+    """
     if parameter is None:
         return TextField(name)
     default = parameter.default
@@ -102,7 +118,7 @@ def field_of(parameter: Parameter | None, name: str) -> Field:
 
 
 def about(parameter: Parameter) -> str:
-    """Format the limits and the unit of a parameter."""
+    """Format the limits and the unit of a parameter, such as "from 0 to 100 %"; "" if there are none."""
     unit = f" {display_unit(parameter.unit)}" if parameter.unit else ""
     low = None if parameter.minimum is None else format_number(parameter.minimum)
     high = None if parameter.maximum is None else format_number(parameter.maximum)

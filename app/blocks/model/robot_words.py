@@ -1,4 +1,4 @@
-"""Search words for robot blocks, independent of the names that a description uses."""
+"""Search words for robot blocks, derived from parts of the names in a robot description."""
 
 from __future__ import annotations
 
@@ -12,7 +12,12 @@ _NAME_PART = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
 
 
 class _Ability(NamedTuple):
-    """Kind of action or sensor: the parts of names that identify it, and its search words."""
+    """Kind of action or sensor, recognized by parts of names.
+
+    Attributes:
+        names: Parts of names that identify the ability, in lower case.
+        search_words: Search words in English, separated by commas.
+    """
 
     names: frozenset[str]
     search_words: str
@@ -271,7 +276,7 @@ _ABILITY_OF_RESOURCE: Mapping[str, str] = {
     "camera": "photo",
     "audio": "sound",
 }
-"""Ability by resource, for actions whose names are not recognized."""
+"""Keys of `_ACTION_ABILITIES` by resource, for actions whose names aren't recognized."""
 
 CHANGE_SEARCH_WORDS = plazy(
     "words to find “when … changes”", "sensor, change, new value, whenever, event, update"
@@ -283,7 +288,12 @@ PASS_SEARCH_WORDS = plazy(
 
 
 class SearchWords(NamedTuple):
-    """Search words in the current language, and in English if that differs."""
+    """Search words of a block, separated by commas.
+
+    Attributes:
+        words: Search words in the current language.
+        english: Search words in English; without those in `words`.
+    """
 
     words: str
     english: str
@@ -292,7 +302,9 @@ class SearchWords(NamedTuple):
 def action_search_words(names: Iterable[str], uses: Iterable[str] = ()) -> SearchWords:
     """Return the search words of an action.
 
-    ``names`` are its name, title and types; ``uses`` are its resources.
+    Args:
+        names: Name, title and types of the action.
+        uses: Resources of the action, used if the names aren't recognized.
     """
     parts = _name_parts(names)
     found = _matching_abilities(_ACTION_ABILITIES, parts) or [
@@ -302,13 +314,21 @@ def action_search_words(names: Iterable[str], uses: Iterable[str] = ()) -> Searc
 
 
 def sensor_search_words(names: Iterable[str]) -> SearchWords:
-    """Return the search words of a sensor or event."""
+    """Return the search words of a sensor or event.
+
+    Args:
+        names: Name, title and types of the sensor or event.
+    """
     parts = _name_parts(names)
     return _collect_search_words(parts, _matching_abilities(_SENSOR_ABILITIES, parts))
 
 
 def bilingual_search_words(english: str) -> SearchWords:
-    """Return search words in the current language and in English."""
+    """Return search words in the current language and in English.
+
+    Args:
+        english: Search words in English, marked for translation.
+    """
     return SearchWords(gettext(english), "" if language() == ENGLISH else str(english))
 
 

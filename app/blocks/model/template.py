@@ -1,7 +1,7 @@
 """Python templates: text with ``%PLACEHOLDERS``, parsed once and filled with syntax trees.
 
-Templates are part of Studio, in its categories. Values from files are inserted as trees (`literal`), never as
-text, so that no text in a file can become code.
+Only Studio's block categories contain templates. Values from files are inserted as trees (`literal`), never
+as text, so that no text in a file can become code.
 
 ``%NAME`` in an expression takes an expression, ``%NAME`` alone on a line takes statements, ``**%NAME`` takes
 keyword arguments.
@@ -24,7 +24,7 @@ Node = TypeVar("Node", bound=ast.AST)
 
 
 def literal(value: object) -> ast.expr:
-    """Return the expression for a plain value (None, bool, int, float, str, and lists and dicts of them).
+    """Return the syntax tree of a plain value (None, bool, int, float, str, and lists and dicts of them).
 
     Raises:
         ValueError: The value has another type or is not finite.
@@ -50,7 +50,17 @@ def statements(
     bodies: Mapping[str, Sequence[ast.stmt]] | None = None,
     keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
 ) -> list[ast.stmt]:
-    """Return the filled statements of a template. Raises KeyError if a placeholder has no value."""
+    """Return the statements of a template, with all placeholders filled.
+
+    Args:
+        text: Template.
+        expressions: Expressions by placeholder.
+        bodies: Statements by placeholder.
+        keywords: Keyword arguments by placeholder.
+
+    Raises:
+        KeyError: A placeholder has no value.
+    """
     filled: list[ast.stmt] = []
     filler = _Filler(expressions, bodies or {}, keywords or {})
     for statement in _parse_template(text).body:
@@ -64,7 +74,12 @@ def expression(
     expressions: Mapping[str, ast.expr],
     keywords: Mapping[str, Sequence[ast.keyword]] | None = None,
 ) -> ast.expr:
-    """Return the filled expression of a template."""
+    """Return the expression of a template, with all placeholders filled; arguments as for `statements`.
+
+    Raises:
+        KeyError: A placeholder has no value.
+        ValueError: The template is not a single expression.
+    """
     (statement,) = statements(text, expressions, None, keywords)
     if isinstance(statement, ast.Expr):
         return statement.value

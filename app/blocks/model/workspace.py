@@ -19,7 +19,16 @@ _DISABLED_BY_USER = "MANUALLY_DISABLED"
 
 @dataclass(frozen=True)
 class PlacedBlock:
-    """Block in a workspace, with its saved fields and the blocks in its inputs; statements are in order."""
+    """Block in a workspace.
+
+    Attributes:
+        id: Unique id.
+        type: Type of the block.
+        fields: Saved field values by name.
+        inputs: Blocks in each slot by name; statements are in order.
+        enabled: False if the user has disabled the block.
+        shadow: True for a shadow block.
+    """
 
     id: str
     type: str
@@ -32,16 +41,20 @@ class PlacedBlock:
     is_too_deep: bool = False  # inner blocks were dropped because of deep nesting
 
     def field_text(self, name: str) -> str:
-        """Return the saved value of a field if that is text, else ""."""
+        """Return the saved value of a field if it is a text, else ""."""
         saved = self.fields.get(name)
         return saved if isinstance(saved, str) else ""
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Scripts (sequences of blocks), and names of variables by id.
+    """Parsed workspace.
 
-    ``nameless`` are the ids of used variables that have no name in the file; their names are placeholders.
+    Attributes:
+        scripts: Scripts, each a sequence of blocks.
+        variables: Names of variables by id.
+        nameless_variables: Ids of used variables that have no name in the file; `variables` contains
+            placeholders.
     """
 
     scripts: tuple[tuple[PlacedBlock, ...], ...]
@@ -49,7 +62,7 @@ class Workspace:
     nameless_variables: frozenset[str] = frozenset()
 
     def all_blocks(self) -> list[PlacedBlock]:
-        """Return every block, including shadows."""
+        """Return all blocks of all scripts, including shadow blocks."""
         found: list[PlacedBlock] = []
         waiting = [block for script in self.scripts for block in script]
         while waiting:
@@ -61,7 +74,7 @@ class Workspace:
 
 
 def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
-    """Yield every block of a saved workspace, including shadows, outermost first."""
+    """Yield all blocks of a saved workspace as JSON objects, including shadow blocks, outermost first."""
     blocks = saved.get("blocks")
     waiting = deque(_as_list(blocks.get("blocks") if isinstance(blocks, Mapping) else None))
     while waiting:
@@ -76,7 +89,7 @@ def saved_blocks(saved: Mapping[str, object]) -> Iterator[dict[str, object]]:
 
 
 def parse_workspace(saved: Mapping[str, object]) -> Workspace:
-    """Parse Blockly's JSON. Never raises."""
+    """Parse a workspace saved by Blockly. Never raises; invalid parts are dropped."""
     blocks = saved.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     ids = UniqueTexts("~")
@@ -158,9 +171,9 @@ def _has_breakpoint(saved: Mapping[str, object]) -> bool:
 
 
 def is_enabled(saved: Mapping[str, object]) -> bool:
-    """Return False if the user has disabled the block.
+    """Return False if the user has disabled a saved block.
 
-    Other reasons, such as a missing robot, don't count.
+    Blocks that are disabled for other reasons, such as a missing robot, count as enabled.
     """
     if saved.get("enabled") is False:
         return False

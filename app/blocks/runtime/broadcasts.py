@@ -1,7 +1,7 @@
 """Broadcasts: messages within a program, which start the scripts that receive them.
 
-A script that is still running when its broadcast is sent again is restarted, as in Scratch. All this is done
-by the script whose turn it is (`app.blocks.runtime.scheduler`), so that no lock is needed.
+A script that is still running when its broadcast is sent again is restarted, as in Scratch. No locks are
+needed, because only the script whose turn it is accesses the broadcasts (`app.blocks.runtime.scheduler`).
 """
 
 from __future__ import annotations
@@ -13,21 +13,32 @@ from app.blocks.runtime.scheduler import EndScript, Scheduler, Script
 
 
 class Delivery:
-    """Broadcast to one script; `done` is True when the script has run, or will not run for this broadcast."""
+    """Delivery of a broadcast to one script.
+
+    Attributes:
+        done: True after the script has run, or when it will not run for this broadcast.
+    """
 
     def __init__(self, over: Callable[[], None]) -> None:
         self.done = False
         self._on_end = over
 
     def finish(self) -> None:
-        """Mark the delivery as done: the script has run, or another broadcast replaced this one."""
+        """Mark the delivery as done: the script has run, or a newer delivery replaced this one."""
         if not self.done:
             self.done = True
             self._on_end()
 
 
 class Receiver:
-    """Script that receives a broadcast, and its pending delivery."""
+    """Script that receives a broadcast.
+
+    Attributes:
+        name: Name of the broadcast.
+        script: Function to run.
+        waiting: Pending delivery, or None.
+        runs_in: Script of the scheduler in which `serve` runs; None before.
+    """
 
     def __init__(self, name: str, script: Callable[[], None]) -> None:
         self.name, self.script = name, script
@@ -54,14 +65,24 @@ class Receiver:
 
 
 class Broadcasts:
-    """All scripts of one program that receive broadcasts."""
+    """Receivers of broadcasts in one program.
+
+    Args:
+        scheduler: Scheduler of the program.
+        began: Called when a delivery starts.
+        over: Called when a delivery is done.
+    """
 
     def __init__(self, scheduler: Scheduler, began: Callable[[], None], over: Callable[[], None]) -> None:
         self._scheduler, self._on_begin, self._on_end = scheduler, began, over
         self.receivers: list[Receiver] = []
 
     def send(self, name: str) -> tuple[Delivery, ...]:
-        """Start or restart every script that receives this broadcast; return the deliveries."""
+        """Start or restart every script that receives a broadcast, and return the deliveries.
+
+        Args:
+            name: Name of the broadcast.
+        """
         return tuple(self._deliver(each) for each in self.receivers if each.name == name)
 
     def _deliver(self, receiver: Receiver) -> Delivery:

@@ -8,8 +8,8 @@ name, "value": …}`` (set a variable), ``{"do": "breakpoints", "blocks": [ids]}
 robots connect or restart.
 
 Output: ``{"is": "ready" | "running" | "paused" | "error" | "warning" | "print" | "variables" | "ask" |
-"ended", …}``; question 0 of "ask" means that no question is open. When the input is closed, the program ends
-and its robots are stopped.
+"ended", …}``; question 0 of "ask" means that no question is open. When the input is closed, the program stops
+its robots and exits.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from nep.system.crash_trace import enable_crash_trace
 
 SAMPLE_INTERVAL_S = 1 / 30
 VARIABLES_PERIOD_SAMPLES = 3
-"""Number of samples between two reads of the variables, which are read ten times a second."""
+"""Number of samples (one per `SAMPLE_INTERVAL_S`) per check of the variables, which takes place at 10 Hz."""
 STOP_REPLY_TIMEOUT_S = 1.0
 FLUSH_TIMEOUT_S = 0.03
 MAX_LINE_LENGTH = 2000
@@ -53,7 +53,10 @@ LINES_PER_SAMPLE = 50
 
 
 class RunnerOutput:
-    """Writes lines to the runner. Printed text is limited: long lines are truncated, excess lines dropped."""
+    """Writer of JSON lines to the runner. Thread-safe.
+
+    Printed text is limited: long lines are truncated, excess lines dropped.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -65,7 +68,12 @@ class RunnerOutput:
         self._dropped = 0
 
     def send(self, kind: str, **content: object) -> None:
-        """Write one line; do nothing if the pipe is closed."""
+        """Write one JSON object as a line; do nothing if the pipe is closed.
+
+        Args:
+            kind: Value of ``is``.
+            content: Further members of the object.
+        """
         line = json.dumps({"is": kind, **content}, default=str)
         with self._lock:
             try:
@@ -75,7 +83,7 @@ class RunnerOutput:
                 return
 
     def print(self, text: str) -> None:
-        """Queue a printed line until the next sample."""
+        """Queue printed text for `send_printed`."""
         for line in text[: MAX_LINE_LENGTH * 4].splitlines() or [""]:
             try:
                 self._printed.put_nowait(line[:MAX_LINE_LENGTH])
@@ -84,7 +92,7 @@ class RunnerOutput:
             self.told(line[:MAX_LINE_LENGTH])
 
     def send_printed(self) -> None:
-        """Send the queued lines, as far as their number allows."""
+        """Send the queued lines, at most `MAX_LINES` in total."""
         while self._left > 0:
             try:
                 self.send("print", text=self._printed.get_nowait())
@@ -112,14 +120,19 @@ class PrintStream(io.TextIOBase):
         self._out = out
 
     def write(self, text: str) -> int:
-        """Queue one line without its line break."""
+        """Queue a text without line breaks at its ends; an empty text is ignored."""
         if text.strip("\n"):
             self._out.print(text.strip("\n"))
         return len(text)
 
 
 class Run:
-    """Execution of one program."""
+    """Execution of one program.
+
+    Args:
+        order: Command "start" of the runner.
+        out: Writer to the runner.
+    """
 
     def __init__(self, order: Mapping[str, object], out: RunnerOutput) -> None:
         program = order["program"]
@@ -150,7 +163,7 @@ class Run:
             self._runtime.scheduler.pause()
 
     def commands(self) -> dict[str, Callable[[], None]]:
-        """Return the functions for commands that have no arguments, by name."""
+        """Return the handlers of commands without arguments, by name of the command."""
         scheduler = self._runtime.scheduler
         return {
             "pause": self.pause,
@@ -178,19 +191,19 @@ class Run:
             self._out.send("ask", question=question.id, text=question.text, choices=question.choices)
 
     def answer(self, order: Mapping[str, object]) -> None:
-        """Pass the user's answer to the question."""
+        """Pass the user's answer to the open question; command "answer"."""
         question, words = order.get("question"), order.get("text")
         if isinstance(question, int) and isinstance(words, str):
             self._runtime.questions.set_answer(question, words)
 
     def set_pace(self, order: Mapping[str, object]) -> None:
-        """Set the delay before each block in seconds; 0 for full speed."""
+        """Set the delay before each block; command "pace"."""
         pace_s = order.get("pace_s")
         if isinstance(pace_s, (int, float)):
             self._runtime.scheduler.set_pace(pace_s)
 
     def update_robots(self, order: Mapping[str, object]) -> None:
-        """Update the connected robots and the topics that move them."""
+        """Update the connected robots and the topics that move them; command "robots"."""
         topics = order.get("guarded")
         if isinstance(topics, Mapping):
             self._guard.set_topics({str(topic): tuple(map(str, names)) for topic, names in topics.items()})
@@ -198,13 +211,16 @@ class Run:
             self._network.update_owners(_string_map(order.get("owners")))
 
     def stop(self) -> None:
-        """Stop the scripts and return from `run` immediately; the runner waits for the robots' replies."""
+        """Stop the scripts and make `run` return without waiting for the robots' replies.
+
+        The runner waits for these replies.
+        """
         self._stop_answer_s = 0.0
         self._runtime.scheduler.stop()
         self._runtime.finished.set()
 
     def run(self) -> bool:
-        """Run until the program ends and stop the robots; return True if no block failed."""
+        """Run the program until it ends, then stop the robots; return True if no block failed."""
         with nep.node(f"program {self._program.name}"[:100], master=self._master) as node:
             self._out.told = partial(node.log.info, "%s")
             silent = self._run_with_node(node)
@@ -266,13 +282,13 @@ class Run:
             self._runtime.step(block)
 
     def set_breakpoints(self, order: Mapping[str, object]) -> None:
-        """Replace the breakpoints."""
+        """Replace the breakpoints; command "breakpoints"."""
         blocks = order.get("blocks")
         if isinstance(blocks, list):
             self._breakpoints = frozenset(map(str, blocks))
 
     def set_variable(self, order: Mapping[str, object]) -> None:
-        """Set a variable to a value entered by the user."""
+        """Set a variable to a value entered by the user; command "variable"."""
         value = order.get("value")
         if isinstance(value, (str, int, float)):
             self._variables.set_value(str(order.get("python")), value)
@@ -313,7 +329,7 @@ def _string_map(told: object) -> dict[str, str]:
 
 
 def read_commands(stream: TextIO) -> Iterator[Mapping[str, object]]:
-    """Yield the runner's commands until the pipe closes; invalid ones are ignored."""
+    """Yield the runner's commands until the pipe is closed; invalid lines are ignored."""
     for line in stream:
         try:
             order = json.loads(line)
@@ -324,7 +340,12 @@ def read_commands(stream: TextIO) -> Iterator[Mapping[str, object]]:
 
 
 def main(stdin: TextIO | None = None, stdout: TextIO | None = None) -> int:
-    """Run one program; return 0 if no block failed, else 1."""
+    """Run one program and return the exit code: 0 if no block failed, else 1.
+
+    Args:
+        stdin: Commands of the runner (default: ``sys.stdin``).
+        stdout: Output to the runner (default: ``sys.stdout``).
+    """
     out = RunnerOutput(stdout or sys.stdout)
     incoming = read_commands(stdin or sys.stdin)
     sys.stdout = PrintStream(out)

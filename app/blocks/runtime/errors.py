@@ -18,9 +18,11 @@ _OTHER_TYPE_NAME = lazy("something else")
 
 
 class BehaviourError(AppError):
-    """Error at a block. ``block`` is the id of the block, if known.
+    """Error at a block.
 
-    ``unknown`` is True if the error is only that a value is not known yet.
+    Attributes:
+        block: Id of the block; None if it is not known.
+        unknown: True if the error is caused by a value that is not known yet.
     """
 
     def __init__(self, sentence: str, block: str | None = None, *, unknown: bool = False) -> None:
@@ -30,7 +32,13 @@ class BehaviourError(AppError):
 
 
 def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
-    """Convert an exception in a block to an error with a message for the user; ``label`` names the block."""
+    """Convert an exception raised by a block to an error with a message for the user.
+
+    Args:
+        error: Exception.
+        label: Label of the block; "" if it is not known.
+        block: Id of the block; None if it is not known.
+    """
     if isinstance(error, BehaviourError):
         error.block = error.block or block
         return error
@@ -55,7 +63,7 @@ def explain(error: Exception, label: str, block: str | None) -> BehaviourError:
 
 
 def type_name(value: object) -> str:
-    """Return the type of a value as words: "a text"."""
+    """Return the type of a value with its article, such as "a text"."""
     return _(_TYPE_NAMES.get(type(value).__name__, _OTHER_TYPE_NAME))
 
 

@@ -31,19 +31,26 @@ MAX_STORED_DESCRIPTIONS = 8
 
 
 class Subscription(Protocol):
-    """Part of the interface of nep's subscriber that is used here."""
+    """Interface of the subscriber that `find_robots` uses.
+
+    Implemented by `nep.nodes.subscriber.Subscriber`.
+    """
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
-        """Return the next message, or None."""
+        """Return the next message, or None on timeout.
+
+        Args:
+            timeout_s: Maximum wait in seconds; None for no limit.
+        """
         ...
 
     def close(self) -> None:
-        """Unsubscribe."""
+        """Close the subscriber."""
         ...
 
 
 class GraphNode(Protocol):
-    """Part of the interface of nep's node that is used here."""
+    """Interface of the node that `find_robots` uses; implemented by `nep.nodes.node.Node`."""
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
         """Return the current graph."""
@@ -56,9 +63,12 @@ class GraphNode(Protocol):
 
 @dataclass(frozen=True)
 class FoundRobots:
-    """Robots that were found. ``owners`` are their programs by name of the robot.
+    """Result of `find_robots`.
 
-    ``claims`` are messages about programs whose claim to a name was rejected.
+    Attributes:
+        robots: Descriptions of the robots, sorted by name.
+        owners: Programs by name of the robot.
+        rejected_claims: Messages about programs whose announcement was ignored.
     """
 
     robots: tuple[Robot, ...] = ()
@@ -68,7 +78,7 @@ class FoundRobots:
 
 @dataclass
 class _DescriptionTopic:
-    """Topic of a description: its owner, and the messages received on it."""
+    """Topic of a robot description: its subscription, owner, and newest messages."""
 
     subscription: Subscription
     owner: Identity
@@ -88,16 +98,17 @@ def find_robots(
     clock: Callable[[], float] = time.monotonic,
     wait: Callable[[float], object] | None = None,
 ) -> FoundRobots:
-    """Find the robots that announce themselves; each name belongs to the first program that announced it.
+    """Find the robots in the graph. If several programs announce a name, the first one is used.
 
-    Robots of RIZE announce nothing: those in ``known`` are found if their command topic has a subscriber.
+    Robots of RIZE don't announce themselves: those in `known` are found if their command topic has a
+    subscriber.
 
     Args:
-        node: Node for the graph and subscriptions.
-        timeout_s: Maximum wait.
-        wanted: Names to wait for; without any, the currently connected robots are returned.
-        known: Robots known before.
-        clock: Returns monotonic seconds.
+        node: Node that is used to read the graph and to subscribe to descriptions.
+        timeout_s: Maximum wait in seconds.
+        wanted: Names of robots to wait for; if empty, the currently connected robots are returned.
+        known: Descriptions of robots that were connected before.
+        clock: Monotonic clock in seconds.
         wait: Sleeps for a number of seconds.
     """
     wait = wait or threading.Event().wait

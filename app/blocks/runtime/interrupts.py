@@ -1,4 +1,4 @@
-"""Protection of the final stop of the robots against Ctrl+C, so that its result is always shown."""
+"""Protection of the final stop of the robots against Ctrl+C, so that the result is always shown."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def without_interrupts() -> Iterator[None]:
-    """Return a context that ignores Ctrl+C; its body must end without it."""
+    """Return a context manager that ignores Ctrl+C.
+
+    Use it only for code that always ends by itself.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield  # signals are handled in the main thread only
         return

@@ -13,7 +13,15 @@ STATES = ("accepted", "running", *FINAL_STATES)
 
 @dataclass
 class RobotCall:
-    """Command to a robot and its replies. Written by the network's thread, read by a script."""
+    """Command to a robot and its replies. Written in the network's thread, read by a script.
+
+    Attributes:
+        id: Unique id of the command.
+        robot: Name of the robot.
+        action: Name of the action.
+        output: Result of the action.
+        error: Message if the action failed, else "".
+    """
 
     id: str
     robot: str
@@ -34,17 +42,25 @@ class RobotCall:
 
 
 class ProgramLink(Protocol):
-    """Robots and topics as used by a program. Callbacks are called in the network's thread."""
+    """Interface of a program to its robots and topics. Callbacks are called in the network's thread."""
 
     def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
         """Set the callbacks.
 
-        ``poke`` is called for each reply and message, ``stopped_outside`` when another program stops a robot.
+        Args:
+            poke: Called after each reply and message.
+            stopped_outside: Called with the name of a robot when another program stops the robot.
         """
         ...
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
-        """Send a command."""
+        """Send a command to a robot; the returned call is updated as replies arrive.
+
+        Args:
+            robot: Name of the robot.
+            action: Name of the action.
+            input: Input of the action.
+        """
         ...
 
     def cancel(self, call: RobotCall) -> None:
@@ -52,15 +68,15 @@ class ProgramLink(Protocol):
         ...
 
     def sensor(self, robot: str, name: str) -> object:
-        """Return the newest value of a sensor; None until one is received."""
+        """Return the newest value of a sensor; None if no value has been received yet."""
         ...
 
     def newest(self, topic: str) -> object:
-        """Return the newest message of a topic; None until one is received."""
+        """Return the payload of the newest message of a topic; None if no message has been received yet."""
         ...
 
     def publish(self, topic: str, payload: object) -> None:
-        """Publish a message."""
+        """Publish a message on a topic."""
         ...
 
     def on_sensor(self, robot: str, name: str, callback: Callable[[object], None]) -> None:
@@ -72,5 +88,5 @@ class ProgramLink(Protocol):
         ...
 
     def on_message(self, topic: str, callback: Callable[[object], None]) -> None:
-        """Call `callback` with each message of a topic."""
+        """Call `callback` with the payload of each message of a topic."""
         ...

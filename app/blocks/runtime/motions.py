@@ -1,6 +1,6 @@
-"""Motions that continue after their command has ended (a speed), which are paused with the program.
+"""Motions that continue after their command has ended (such as a speed), and their pausing with the program.
 
-With a delay between blocks, motions are also paused while the script that started them waits at a block;
+With a delay between blocks, motions are also stopped while the script that started them waits at a block;
 otherwise the robot would drive too far.
 """
 
@@ -25,14 +25,14 @@ class _Motion:
 
 
 class Motions:
-    """Tracks continuing motions.
+    """Tracker of motions that continue after their command has ended.
 
-    Thread-safe: `stop_all` and `go_on` are called in another thread than the replies.
+    Thread-safe: `stop_all` and `resume_all` are called in a different thread than `record_final_reply`.
 
     Args:
-        stop: Ends everything that a robot does.
-        stand: Ends only the motion of a robot.
-        invoke: Sends a command again.
+        stop: Stops all actions of a robot.
+        stand: Stops a robot if it runs no action except such motions.
+        invoke: Sends a command (robot, action, input) again.
     """
 
     def __init__(
@@ -50,7 +50,13 @@ class Motions:
         self._acting_for = threading.local()
 
     def record_command(self, call: RobotCall, robot: Robot, input: Mapping[str, object]) -> None:
-        """Record a new command: the resources it uses no longer belong to an earlier motion."""
+        """Record a new command, which ends earlier motions that use the same resources.
+
+        Args:
+            call: Command.
+            robot: Description of the robot.
+            input: Input of the action.
+        """
         action = robot.action(call.action)
         if action is None:
             return
@@ -65,7 +71,7 @@ class Motions:
                 self._unanswered[call.id] = motion
 
     def is_motion(self, call: RobotCall) -> bool:
-        """Return True if a command without a final reply starts a motion."""
+        """Return True if a pending command starts a motion that continues after the command."""
         with self._lock:
             return call.id in self._unanswered
 
@@ -86,7 +92,7 @@ class Motions:
             self._stand(motion.robot)
 
     def stop_all(self) -> tuple[str, ...]:
-        """Stop all motions, because the program is paused; return the names of the stopped robots."""
+        """Stop all motions until `resume_all`, and return the names of the stopped robots."""
         with self._lock:
             self._paused = True
             moving = {motion.robot.name: motion.robot for motion in self._motions.values()}
@@ -95,7 +101,7 @@ class Motions:
         return tuple(moving)
 
     def resume_all(self) -> None:
-        """Resume all motions, because the program continues."""
+        """Resume the motions that `stop_all` stopped."""
         with self._lock:
             if not self._paused:
                 return
@@ -105,7 +111,7 @@ class Motions:
 
     @contextmanager
     def suspend(self) -> Iterator[None]:
-        """Return a context in which the motions of the calling script are stopped, for a delay at a block."""
+        """Return a context manager that stops the motions of the calling script during a delay at a block."""
         script = self._script_id()
         with self._lock:
             moving = {

@@ -1,4 +1,4 @@
-"""Network of a running program over NEP: its robots and topics. Imported only in the program's process."""
+"""Implementation of `ProgramLink` over NEP. Imported only in the program's process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from nep.system.log_rarely import SuppressedErrors
 from nep.text import bounded_str
 
 LOOKUP_INTERVAL_S = 0.2
-"""Minimum interval of graph queries that look up unknown publishers."""
+"""Minimum interval in seconds between graph queries that look up unknown publishers."""
 MAX_HELD_PER_PUBLISHER = 32
 
 Callback = Callable[[object], None]
@@ -41,7 +41,7 @@ _log = logging.getLogger(__name__)
 
 
 class ProgramPublisher(Protocol):
-    """Part of the interface of nep's publisher that is used here."""
+    """Interface of the publisher that `Network` uses; implemented by `nep.nodes.publisher.Publisher`."""
 
     def publish(self, payload: object) -> None:
         """Publish one message."""
@@ -49,16 +49,28 @@ class ProgramPublisher(Protocol):
 
 
 class ProgramNode(Protocol):
-    """Part of the interface of nep's node that is used here."""
+    """Interface of the node that `Network` uses; implemented by `nep.nodes.node.Node`."""
 
     def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> ProgramPublisher:
-        """Open a publisher. Without ``batch``, each message is sent immediately."""
+        """Open a publisher.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            batch: False to send each message immediately.
+        """
         ...
 
     def new_sub(
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
     ) -> object:
-        """Open a subscriber that passes messages to ``sink`` in the node's thread."""
+        """Open a subscriber.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            sink: Called with received messages in the node's thread.
+        """
         ...
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
@@ -75,35 +87,32 @@ def payload_of(message: Message) -> object:
 
 
 def value_of(payload: object) -> object:
-    """Return the value in ``{"value": …}``, the payload of a property.
-
-    Any other payload is returned unchanged.
-    """
+    """Return the value in a sensor's payload ``{"value": …}``; other payloads are returned unchanged."""
     if isinstance(payload, Mapping) and set(payload) == {"value"}:
         return payload["value"]
     return payload
 
 
 def new_id(kind: str) -> str:
-    """Return a unique id that starts with ``kind``."""
+    """Return a unique id with the prefix ``kind``."""
     return f"{kind}-{uuid.uuid4().hex[:12]}"
 
 
 class Network:
-    """Link of a program to its robots and topics.
+    """Connection of a program to its robots and topics.
 
-    The publishers and subscribers are opened by the constructor.
+    The constructor opens the publishers and subscribers.
 
     Args:
         node: Node of the program.
-        program: Program id in its commands.
-        robots: Robots of the program.
+        program: Id of the program, sent with its commands.
+        robots: Descriptions of the program's robots.
         sensors: Used sensors as (robot, name).
         events: Used events as (robot, name).
-        publishes: Topics to publish on; others are opened at first use.
-        listens: Topics to subscribe to; others are opened at first use.
-        owners: Node ids by robot name. Replies of other nodes are ignored. By default, the first node that
-            announced the robot.
+        publishes: Topics to publish on; other topics are opened at first use.
+        listens: Topics to subscribe to; other topics are opened at first use.
+        owners: Node ids by robot name; replies of other nodes are ignored. The default for each robot is the
+            first node that announced it.
     """
 
     def __init__(
@@ -179,7 +188,10 @@ class Network:
                 self._node.new_sub(topic, type_, sink=self._receive_replies)
 
     def close(self) -> None:
-        """Stop the heartbeat. The node is not closed, because it belongs to the caller."""
+        """Stop the heartbeat and the look-up of publishers.
+
+        The node is not closed, because it belongs to the caller.
+        """
         self._closed.set()
         self._lookup_requested.set()
         self._alive.close()
@@ -187,18 +199,22 @@ class Network:
             self._lookup_thread.join(timeout=3.0)
 
     def update_owners(self, owners: Mapping[str, str]) -> None:
-        """Update the node ids of restarted robots."""
+        """Update the node ids of restarted robots.
+
+        Args:
+            owners: Node ids by robot name.
+        """
         with self._answers_lock:
             self._owners |= owners
 
     # ---- Link
 
     def set_callbacks(self, poke: Callable[[], None], stopped_outside: Callable[[str], None]) -> None:
-        """Set the callbacks for replies and messages, and for stops by other programs."""
+        """Set the callbacks; see `ProgramLink.set_callbacks`."""
         self._poke, self._stopped_outside = poke, stopped_outside
 
     def invoke(self, robot: str, action: str, input: Mapping[str, object]) -> RobotCall:
-        """Send a command; the returned call is updated as replies arrive."""
+        """Send a command to a robot; the returned call is updated as replies arrive."""
         described = self._robots[robot]
         call = RobotCall(new_id("cmd"), robot, action)
         with self._lock:
@@ -211,26 +227,30 @@ class Network:
         return call
 
     def cancel(self, call: RobotCall) -> None:
-        """Cancel a command; not supported by robots of RIZE."""
+        """Cancel a command. Has no effect for robots of RIZE, which don't support it."""
         described = self._robots[call.robot]
         if described.dialect != "rize":
             self._send(described, self._command(call.id, "cancel", call.action))
 
     def sensor(self, robot: str, name: str) -> object:
-        """Return the newest value of a sensor; None until one is received."""
+        """Return the newest value of a sensor; None if no value has been received yet."""
         topic = self._topic(robot, name)
         self._subscribe(topic)
         message = self._newest.get(topic)
         return None if message is None else value_of(payload_of(message))
 
     def newest(self, topic: str) -> object:
-        """Return the newest message of a topic, decoded on demand; None until one is received."""
+        """Return the payload of the newest message of a topic; None if there is none or decoding fails."""
         self._subscribe(topic)
         message = self._newest.get(topic)
         return None if message is None else payload_of(message)
 
     def publish(self, topic: str, payload: object) -> None:
-        """Publish a message as JSON. Raises BehaviourError if that would move a robot without permission."""
+        """Publish a message as JSON.
+
+        Raises:
+            BehaviourError: The message would move a robot that the program is not allowed to move.
+        """
         self.guard.check(topic)
         self._publisher(topic).publish(payload)
 
@@ -239,11 +259,11 @@ class Network:
         self.on_message(self._topic(robot, name), lambda payload: callback(value_of(payload)))
 
     def on_event(self, robot: str, name: str, callback: Callback) -> None:
-        """Call `callback` with the data of each event."""
+        """Call `callback` with the data of each event with this name."""
         self.on_message(self._topic(robot, name), callback)
 
     def on_message(self, topic: str, callback: Callback) -> None:
-        """Call `callback` with each message."""
+        """Call `callback` with the payload of each message of a topic."""
         with self._lock:
             self._callbacks.setdefault(topic, []).append(callback)
         self._subscribe(topic)
@@ -251,15 +271,15 @@ class Network:
     # ---- stopping
 
     def pause_robots(self) -> None:
-        """Stop robots that are in motion (a speed) until `go_on`, because the program is paused."""
+        """Stop motions that continue after their command (such as a speed) until `resume_robots`."""
         self._motions.stop_all()
 
     def resume_robots(self) -> None:
-        """Resume the motions that `hold_robots` stopped."""
+        """Resume the motions that `pause_robots` stopped."""
         self._motions.resume_all()
 
     def suspend_motions(self) -> AbstractContextManager[None]:
-        """Return a context in which the motions of the calling script are stopped, for a delay at a block."""
+        """Return a context manager that stops the motions of the calling script during a delay at a block."""
         return self._motions.suspend()
 
     def _stop_motion(self, robot: Robot) -> None:
@@ -280,11 +300,13 @@ class Network:
         self._send(robot, self._command(id, "stop", robot.safe_stop.action))
 
     def stop_robots(self, timeout_s: float) -> tuple[str, ...]:
-        """Stop all robots and wait.
+        """Stop all robots and wait for their confirmations. Robots of RIZE are skipped.
 
-        Return the names of robots that did not confirm (robots of RIZE never do).
+        Args:
+            timeout_s: Maximum wait in seconds.
 
-        `stop_words` returns the reason for each.
+        Returns:
+            Names of the robots that did not confirm the stop; see `stop_error` for the reasons.
         """
         self._ending = True
         if timeout_s:
@@ -302,7 +324,7 @@ class Network:
             return tuple(dict.fromkeys(name for name, _ in waiting.values()))
 
     def stop_error(self, name: str) -> str:
-        """Return why the stop of a robot is not confirmed, in the robot's own words if it replied.
+        """Return the reason why a robot did not confirm its stop: the error in its reply, or no reply.
 
         The text has no full stop.
         """

@@ -12,24 +12,33 @@ from nep.programs.robots.moving import MovingTopics, RobotControls
 
 
 def robots_moved_by(topic: str, robots: Iterable[Robot]) -> tuple[str, ...]:
-    """Return the names of the robots that a message on this topic may move, or whose world it changes."""
+    """Return the names of the robots that a message on a topic may move, or whose world it may change."""
     return MovingTopics(map(controls_of, robots)).robots_on(topic)
 
 
 def guarded_topics(robots: Iterable[Robot]) -> dict[str, tuple[str, ...]]:
-    """Return the topics that move these robots, each with the names of the robots."""
+    """Return the topics that move robots, with the names of the moved robots."""
     return MovingTopics(map(controls_of, robots)).topics
 
 
 class PublishGuard:
-    """Guard of a running program that prevents publishing from moving a robot without permission."""
+    """Guard that prevents a running program from moving a robot without permission by publishing.
+
+    Args:
+        topics: Names of the moved robots by topic.
+        allowed: Names of the robots that the program may move.
+    """
 
     def __init__(self, topics: Mapping[str, Collection[str]], allowed: Collection[str]) -> None:
         self._allowed = frozenset(allowed)
         self.set_topics(topics)
 
     def set_topics(self, topics: Mapping[str, Collection[str]]) -> None:
-        """Update the topics that move connected robots."""
+        """Replace the topics that move robots.
+
+        Args:
+            topics: Names of the moved robots by topic.
+        """
         moved: dict[str, set[str]] = {}
         for topic, names in topics.items():
             for name in names:
@@ -37,7 +46,7 @@ class PublishGuard:
         self._moving = MovingTopics(RobotControls(name, frozenset(each)) for name, each in moved.items())
 
     def check(self, topic: str) -> None:
-        """Raise BehaviourError if a message on this topic would move a robot that is not allowed to move."""
+        """Raise BehaviourError if a message on a topic would move a robot that the program may not move."""
         names = [name for name in self._moving.robots_on(topic) if name not in self._allowed]
         if names:
             who = format_list(names)

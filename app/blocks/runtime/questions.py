@@ -1,4 +1,4 @@
-"""Questions of a program to the user, shown one at a time in the order in which they are asked."""
+"""Questions of a program to the user, shown one at a time in the order in which scripts ask them."""
 
 from __future__ import annotations
 
@@ -22,21 +22,35 @@ _NUMBER = re.compile(r"-?(?:0|[1-9]\d{0,14})(?:[.,]\d{1,9})?", re.ASCII)
 
 @dataclass
 class ProgramQuestion:
-    """Question to the user; ``answer`` is None until the user has answered."""
+    """Question to the user.
+
+    Attributes:
+        id: Number of the question.
+        text: Text of the question.
+        answer: Answer as text; None until the user has answered.
+    """
 
     id: int
     text: str
     answer: str | None = None
     choices: tuple[str, ...] = ()
-    """Possible answers; if empty, the user types the answer."""
+    """Possible answers, shown as buttons; if empty, the user types the answer."""
 
 
 QuestionCallback = Callable[[ProgramQuestion | None], None]
-"""Called with the question to be shown, or None."""
+"""Callback that receives the question to show, or None to hide it."""
 
 
 class Questions:
-    """Queue of questions. Scripts ask; answers arrive in another thread."""
+    """Queue of questions. Scripts ask questions, another thread passes the answers.
+
+    Attributes:
+        answer: Last answer; "" before the first one.
+
+    Args:
+        scheduler: Scheduler of the program.
+        asked: Called with the question to show, or None; without this callback, questions can't be asked.
+    """
 
     def __init__(self, scheduler: Scheduler, asked: QuestionCallback | None) -> None:
         self._scheduler, self._asked = scheduler, asked
@@ -46,9 +60,10 @@ class Questions:
         self.answer: object = ""
 
     def ask(self, words: object) -> None:
-        """Ask a question and wait for the answer, which is stored in ``answer``.
+        """Ask a question and wait for the answer, which is stored in `answer`.
 
-        Raises BehaviourError outside of Studio.
+        Raises:
+            BehaviourError: The program runs outside of Studio.
         """
         if self._asked is None:
             raise BehaviourError(
@@ -57,10 +72,12 @@ class Questions:
         self.answer = parse_answer(self._wait_for_answer(text(words)))
 
     def ask_with_choices(self, words: object, choices: object) -> None:
-        """Ask a question with a button for each item of a list, and wait for the answer.
+        """Ask a question with a button for each item of a list, and wait until `answer` is the selected item.
 
-        The answer is the selected item, or an empty text after Esc. Raises BehaviourError outside of Studio,
-        and for a list that is empty or too long.
+        The answer is an empty text if the user presses Esc.
+
+        Raises:
+            BehaviourError: The program runs outside of Studio, or the list is empty or too long.
         """
         if self._asked is None:
             raise BehaviourError(
@@ -81,7 +98,12 @@ class Questions:
         return question.answer or ""
 
     def set_answer(self, id: int, words: str) -> None:
-        """Store an answer; ignored if the question is no longer open."""
+        """Store the user's answer to a question; ignored if the question is no longer open.
+
+        Args:
+            id: Number of the question.
+            words: Answer.
+        """
         with self._lock:
             for question in self._waiting:
                 if question.id == id:
@@ -96,7 +118,11 @@ class Questions:
 
 
 def choices_by_label(choices: object) -> dict[str, object]:
-    """Return the items of a list by their texts on the buttons, without empty and duplicate texts."""
+    """Return the items of a list by the texts of their buttons, without empty and duplicate texts.
+
+    Raises:
+        BehaviourError: The value is not a list, or the list is empty or too long.
+    """
     if not isinstance(choices, list):
         raise BehaviourError(
             _("A question with choices needs a list of choices, not {value}.").format(
@@ -119,9 +145,9 @@ def choices_by_label(choices: object) -> dict[str, object]:
 
 
 def parse_answer(words: str) -> str | int | float:
-    """Convert an answer: a typed number becomes a number, so that it can be compared.
+    """Convert an answer to a number if it is one; other texts are returned unchanged.
 
-    "007" remains a text, as does a number with more digits than a float can represent.
+    "007" and numbers with more than 15 digits remain texts.
     """
     plain = words.strip()
     if not _NUMBER.fullmatch(plain):

@@ -1,7 +1,7 @@
-"""Robot as used by a program: actions, sensors and event scripts.
+"""Interface of a program to one robot: actions, sensors and event scripts.
 
 A pause cancels a running action; the remaining part is executed when the program continues. `StatusText`
-describes the current activity: the action of a robot, or else the block.
+describes the current activity in the run bar: the action of a robot, or else the block.
 """
 
 from __future__ import annotations
@@ -29,24 +29,28 @@ FIRST_VALUE_TIMEOUT_S = 2.0
 DEFAULT_TIMEOUT_S = 60.0
 TIMEOUT_MARGIN_S = 2.0
 COMMAND_CHECK_INTERVAL_S = 0.25
-"""Interval of checks of a pending command: is the robot silent, has the action started."""
+"""Interval in seconds at which a pending command is checked for time limits and a silent robot."""
 BEATS_MISSED, MIN_SILENCE_S = 4, 2.0
 PAUSE_TIMEOUT_S = 3.0
-"""Time limit for a robot to end an action cancelled by a pause; robots built with the kit reply within 1 s.
-"""
+"""Timeout in seconds for an action cancelled by a pause; robots built with the kit reply within 1 s."""
 MAX_STORED_COMMANDS = 64
-"""Number of stored commands; a robot reports soon that a command was replaced."""
+"""Maximum number of recent commands in `Replacements`; a robot reports a replaced command at once."""
 REPLACE = "replace"
 _PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_]*)")
 
 Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 
 REMAINING_FIELD = "to_go"
-"""Feedback field with the remaining amount, in the unit of one parameter of the action."""
+"""Name of the feedback field with the remaining amount, in the unit of one parameter of the action."""
 
 
 class StatusText:
-    """Texts about the current activity for the run bar. Written by scripts, read by another thread."""
+    """Texts about the current activity for the run bar. Written by scripts, read by another thread.
+
+    Args:
+        block: Returns the current block of the calling script.
+        readings: Blocks as text by id.
+    """
 
     def __init__(self, block: Callable[[], str | None], readings: Mapping[str, str]) -> None:
         self._block, self._readings = block, readings
@@ -54,23 +58,23 @@ class StatusText:
         self._warned: dict[str | None, str] = {}
 
     def set_text(self, sentence: str) -> None:
-        """Set the activity of a robot for the block of the calling script; "" when it has ended."""
+        """Set the activity of a robot at the current block of the calling script; "" removes it."""
         _set_or_remove(self._told, self._block(), sentence)
 
     def set_warning(self, sentence: str) -> None:
-        """Set a warning while the calling script is paused; "" when the script continues."""
+        """Set a warning at the current block of the calling script; "" removes it."""
         _set_or_remove(self._warned, self._block(), sentence)
 
     def text(self, blocks: Sequence[str]) -> str:
-        """Return the text for the run bar: the activity of a robot, or else the first block."""
+        """Return the text for the run bar: the activity of a robot at these blocks, or the first block."""
         return _first_text(self._told, blocks) or self.block_text(blocks[0] if blocks else None)
 
     def warning(self, blocks: Sequence[str]) -> str:
-        """Return the warning at one of these blocks, or ""."""
+        """Return the warning at one of these blocks; "" if there is none."""
         return _first_text(self._warned, blocks)
 
     def block_text(self, block: str | None) -> str:
-        """Return a block as text; "" for None."""
+        """Return a block as text; "" for None and unknown blocks."""
         return self._readings.get(block or "", "")
 
 
@@ -87,7 +91,13 @@ def _first_text(sentences: Mapping[str | None, str], blocks: Sequence[str]) -> s
 
 @dataclass(frozen=True, slots=True)
 class Replacement:
-    """Command that another script's command replaced; ``count`` is the number of times in this run."""
+    """Command of one script that was replaced by a command of another script.
+
+    Attributes:
+        block: Id of the block whose command was replaced.
+        message: Message for the user.
+        count: Number of times that this happened in this run.
+    """
 
     block: str
     message: str
@@ -103,7 +113,7 @@ class _Command:
 
 
 class Replacements:
-    """Detects scripts that replace each other's actions.
+    """Detector of scripts that replace each other's actions.
 
     The script whose action was replaced continues with its next block (docs/blocks.md), and the user is
     informed. Written by one script at a time, read by another thread.
@@ -116,14 +126,23 @@ class Replacements:
         self._news: dict[tuple[str, str], Replacement] = {}
 
     def record_command(self, call: RobotCall, action: Action, block: str | None) -> None:
-        """Record a command of the calling script at this block."""
+        """Record a command of the calling script.
+
+        Args:
+            call: Command.
+            action: Description of the action.
+            block: Id of the block.
+        """
         self._commands.append(_Command(call, action, block, threading.get_ident()))
 
     def record_early_end(self, call: RobotCall, *, names_robot: bool) -> None:
-        """Record that the robot ended this command early, without a pause or stop.
+        """Record that the robot cancelled a command although there was no pause or stop.
 
-        This is reported only if a later command of another script replaced the command. With ``names_robot``,
-        the message contains the name of the robot, because there are several.
+        Such a command is reported only if a later command of another script replaced it.
+
+        Args:
+            call: Cancelled command.
+            names_robot: True to include the name of the robot in the message.
         """
         loser = next((each for each in self._commands if each.call is call), None)
         if loser is None or loser.block is None:
@@ -157,7 +176,10 @@ def _replaces(winner: _Command, loser: _Command) -> bool:
 
 
 class ProgramContext(Protocol):
-    """Running program as used by `RobotHandle`."""
+    """Interface of the running program that `RobotHandle` uses.
+
+    Implemented by `app.blocks.runtime.runtime.Runtime`.
+    """
 
     scheduler: Scheduler
     status_text: StatusText
@@ -169,11 +191,11 @@ class ProgramContext(Protocol):
         ...
 
     def robot_description(self, name: str) -> Robot:
-        """Return the description of a connected robot."""
+        """Return the description of a robot. Raises BehaviourError if the robot is not connected."""
         ...
 
     def link(self) -> ProgramLink:
-        """Return the network link of the program."""
+        """Return the connection of the program to the network."""
         ...
 
     def write(self, value: object) -> None:
@@ -181,20 +203,23 @@ class ProgramContext(Protocol):
         ...
 
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
-        """Return a decorator for scripts that start at an event of a robot."""
+        """Return a decorator for scripts that run at each event of a robot with this name."""
         ...
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
-        """Return a decorator for scripts that start when the value of a sensor changes."""
+        """Return a decorator for scripts that run each time the value of a sensor changes."""
         ...
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
-        """Return a decorator for scripts that start when a sensor passes a limit."""
+        """Return a decorator for scripts that run each time a sensor passes a limit.
+
+        See `RobotHandle.on_pass` for the arguments.
+        """
         ...
 
 
 class RobotHandle:
-    """Robot in a program, returned by ``robot("Pepper")``."""
+    """Interface of a program to one robot, returned by ``robot("Pepper")``."""
 
     def __init__(self, name: str, runtime: ProgramContext) -> None:
         self._name = name
@@ -208,12 +233,12 @@ class RobotHandle:
             input: Parameters of the action.
 
         Raises:
-            BehaviourError: The robot can't execute the action; contains a message for the user.
+            BehaviourError: The robot can't execute the action; the message is for the user.
         """
         self._invoke(action, input)
 
     def ask(self, action: str, field: str, /, **input: object) -> object:
-        """Run an action that returns a result, and return one field of the result.
+        """Run an action and return one field of its result; None if the result doesn't have the field.
 
         Args:
             action: Name of the action.
@@ -221,18 +246,21 @@ class RobotHandle:
             input: Parameters of the action.
 
         Raises:
-            BehaviourError: The robot can't execute the action; contains a message for the user.
+            BehaviourError: The robot can't execute the action; the message is for the user.
         """
         return self._invoke(action, input).output.get(field)
 
     def get(self, sensor: str, field: str | None = None) -> object:
-        """Return a sensor's newest value, or one field of it; None while it is unknown.
+        """Return the newest value of a sensor, or one field of the value; None if the value is unknown.
 
         Waits up to 2 s for the first value.
 
         Args:
             sensor: Name of the sensor.
-            field: Name of a field of an object sensor.
+            field: Field path in the value; None for the whole value.
+
+        Raises:
+            BehaviourError: The robot is not connected or has no such sensor.
         """
         robot = self._runtime.robot_description(self._name)
         link, scheduler = self._runtime.link(), self._runtime.scheduler
@@ -249,7 +277,7 @@ class RobotHandle:
 
         Args:
             event: Name of the event.
-            filters: Field values that the event must have.
+            filters: Required values of fields, by name.
         """
         return self._runtime.on_event(self._name, event, filters)
 
@@ -258,12 +286,12 @@ class RobotHandle:
         return self._runtime.on_change(self._name, sensor)
 
     def on_pass(self, sensor: str, side: str, limit: float) -> Decorator:
-        """Return a decorator for scripts that run each time the sensor passes the limit.
+        """Return a decorator for scripts that run each time the value of the sensor passes a limit.
 
         Args:
             sensor: Name of the sensor.
-            side: "below" or "above".
-            limit: Limit of the value.
+            side: "below" to run when the value falls below the limit, "above" when it rises above.
+            limit: Limit in the unit of the sensor.
         """
         return self._runtime.on_pass(self._name, sensor, side, limit)
 
@@ -381,7 +409,13 @@ def _waiting_text(robot: Robot, call: RobotCall) -> str:
 
 
 def activity_text(robot: Robot, action: Action, input: Mapping[str, object]) -> str:
-    """Return a sentence about what the robot is doing: "Pepper says “Touch my head.”"."""
+    """Return a sentence that describes a running action, such as ``Pepper says “Touch my head.”``.
+
+    Args:
+        robot: Description of the robot.
+        action: Description of the action.
+        input: Input of the action.
+    """
 
     def replacement(match: re.Match[str]) -> str:
         if match[1] == "robot":
@@ -430,10 +464,16 @@ def _check_hint(robot: Robot) -> str:
 
 
 def remaining_input(action: Action, input: Mapping[str, object], call: RobotCall) -> dict[str, object] | None:
-    """Return the input for the remaining part of a cancelled call; None if nothing is left to do.
+    """Return the input for the remaining part of a cancelled action; None if there is nothing left to do.
 
-    An action that reports the remaining amount continues with that; other actions start again. An action that
-    drives the robot without reporting the amount would go too far, so that its remaining part is skipped.
+    An action that reports the remaining amount continues with that amount; other actions start again. An
+    action that drives the robot without reporting the amount would go too far, so its remaining part is
+    skipped.
+
+    Args:
+        action: Description of the action.
+        input: Input of the cancelled action.
+        call: Cancelled command with the last feedback.
     """
     if not call.has_started:
         return dict(input)
@@ -449,7 +489,7 @@ def remaining_input(action: Action, input: Mapping[str, object], call: RobotCall
 
 
 def is_remainder_unknown(action: Action, input: Mapping[str, object], call: RobotCall) -> bool:
-    """Return True if the robot was driving somewhere without reporting the remaining amount."""
+    """Return True if a cancelled action drove the robot without reporting the remaining amount."""
     name = remainder_parameter(action, input)
     if not call.has_started or name is None:
         return call.has_started and action.risk == "locomotes"
@@ -457,7 +497,10 @@ def is_remainder_unknown(action: Action, input: Mapping[str, object], call: Robo
 
 
 def remainder_parameter(action: Action, input: Mapping[str, object]) -> str | None:
-    """Return the parameter that the remaining amount refers to: the only number with the same unit."""
+    """Return the parameter that the remaining amount refers to: the only number with the same unit.
+
+    Returns None if there is no such parameter or more than one.
+    """
     unit = next((field.unit for field in action.feedback if field.name == REMAINING_FIELD), None)
     same = [
         parameter.name

@@ -1,7 +1,6 @@
-"""Commands of a running program: robots, waiting, topics, functions, and starting its scripts.
+"""Runtime of a program: its commands, and the start and end of its scripts.
 
-Each `Runtime` runs one program. Its methods and the functions of `app.blocks.runtime.values` are the names
-available to the compiled program (`Runtime.namespace`).
+Each `Runtime` runs one program. `Runtime.namespace` returns the names available to the compiled program.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ _VALUE_NAMES = (
     "is_known", "join", "length", "part", "random_number", "repeat", "rounded", "rounded_down", "rounded_up",
 )  # fmt: skip
 _FUNCTION_MODULES: tuple[ModuleType, ...] = (calculation, clock, lists, texts)
-"""Modules whose ``__all__`` contains names available to programs."""
+"""Modules whose names in ``__all__`` are available to programs."""
 
 Script = Callable[..., None]
 Decorator = Callable[[Script], Script]
@@ -43,28 +42,37 @@ Decorator = Callable[[Script], Script]
 MAX_QUEUED_MESSAGES = 16
 MAX_QUEUED_EVENTS = 1
 MAX_CALL_DEPTH = 200
-"""Maximum depth of function calls."""
+"""Maximum nesting depth of function calls."""
 _RECURSION_LIMIT = 6000  # recursion limit: one function call takes up to a dozen Python frames
 
 
 def stop_script() -> None:
-    """End the script, even from within a function."""
+    """End the current run of the calling script, even from within a function."""
     raise EndScript
 
 
 class Calls:
-    """Function calls of one program: their depth, and the block at which the script continues."""
+    """Call stack of user-defined functions: limits the depth, and restores the current block after a call."""
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._local = threading.local()
 
     def raise_recursion_limit(self) -> None:
-        """Raise Python's recursion limit for the process of the program."""
+        """Raise Python's recursion limit in this process, to allow `MAX_CALL_DEPTH` nested calls."""
         sys.setrecursionlimit(max(sys.getrecursionlimit(), _RECURSION_LIMIT))
 
     def run(self, block: str, name: str, call: Callable[[], object]) -> object:
-        """Call a function. Raises BehaviourError if calls are nested too deeply."""
+        """Call a function and return its result.
+
+        Args:
+            block: Id of the calling block.
+            name: Name of the function, for messages.
+            call: Function.
+
+        Raises:
+            BehaviourError: Calls are nested too deeply.
+        """
         depth = int(getattr(self._local, "depth", 0))
         if depth >= MAX_CALL_DEPTH:
             raise BehaviourError(
@@ -84,14 +92,16 @@ class Calls:
 class Runtime:
     """Running program.
 
-    After `start`, `finished` is set when all scripts have ended or one of them failed; then ``error``
-    contains the reason.
+    Attributes:
+        finished: Set when all scripts have ended, or when one of them has failed.
+        error: Error of the script that failed, else None.
 
     Args:
         printed: Called with each line that the program writes.
         labels: Labels of blocks by id.
-        readings: Texts of blocks by id.
-        asked: Called with the question to be shown. Without this callback, questions raise BehaviourError.
+        readings: Blocks as text by id.
+        asked: Called with the question to show, or None; without this callback, questions raise
+            BehaviourError.
     """
 
     def __init__(
@@ -122,7 +132,7 @@ class Runtime:
         self.error: BehaviourError | None = None
 
     def namespace(self) -> dict[str, object]:
-        """Return the names available to the program: methods of this runtime, and pure functions."""
+        """Return the functions available to the program by name: methods of the runtime, pure functions."""
         return (
             {name: getattr(self, name) for name in _METHOD_NAMES}
             | {name: getattr(values, name) for name in _VALUE_NAMES}
@@ -133,7 +143,12 @@ class Runtime:
     # ---- start and end
 
     def start(self, link: ProgramLink, robots: Sequence[Robot]) -> None:
-        """Start all scripts. Call this after the program's code has registered its scripts."""
+        """Start all scripts, after the program's code has registered them.
+
+        Args:
+            link: Connection to the network.
+            robots: Descriptions of the program's robots.
+        """
         self._link = link
         self.reset_timer()
         self._robots = {robot.name: robot for robot in robots}
@@ -222,30 +237,43 @@ class Runtime:
         )
 
     def stop_program(self) -> None:
-        """End all scripts."""
+        """End all scripts, including the calling one."""
         self.scheduler.stop()
         self.finished.set()
         raise StopProgram
 
     def stop_others(self) -> None:
-        """End the current runs of all other scripts. Events can start them again."""
+        """End the current runs of all other scripts, which events can start again."""
         self.scheduler.end_other_runs()
 
     # ---- blocks
 
     def step(self, block: str) -> None:
-        """Record that the script has reached a block."""
+        """Record that the calling script has reached a block; see `Scheduler.step`."""
         self.scheduler.step(block)
 
     def value(self, block: str, work_out: Callable[[], object]) -> object:
-        """Return the result of a value block; errors are attributed to the block."""
+        """Compute and return the result of a value block; exceptions are converted to errors of the block.
+
+        Args:
+            block: Id of the block.
+            work_out: Computes the result.
+
+        Raises:
+            BehaviourError: The computation failed.
+        """
         try:
             return work_out()
         except Exception as error:
             raise explain(error, self._labels.get(block, ""), block) from error
 
     def number(self, block: str, work_out: Callable[[], object]) -> object:
-        """Return the result of a block that must return a number; text joined by "+" is an error."""
+        """Compute and return the result of a block that must return a number; see `value`.
+
+        Raises:
+            BehaviourError: The computation failed, or the result is not a number, such as a text joined by
+                "+".
+        """
         result = self.value(block, work_out)
         if result is None or isinstance(result, (int, float)):
             return result
@@ -255,34 +283,42 @@ class Runtime:
         raise BehaviourError(_("{name} needs numbers, not a text.").format(name=name), block)
 
     def called(self, block: str, call: Callable[[], object]) -> object:
-        """Return the result of a function call; afterwards the script continues in the calling block."""
+        """Call a user-defined function and return its result.
+
+        Args:
+            block: Id of the calling block.
+            call: Function.
+
+        Raises:
+            BehaviourError: The function failed, or calls are nested too deeply.
+        """
         name = self._labels.get(block, "")
         return self.value(block, lambda: self._calls.run(block, name, call))
 
     def fail(self, sentence: str) -> object:
-        """Raise the error of a block that can't run."""
+        """Raise BehaviourError with this message, for a block that can't run."""
         raise BehaviourError(sentence)
 
     def wait(self, seconds: object) -> None:
-        """Wait for a number of seconds; time in which the program is paused doesn't count."""
+        """Wait for a number of seconds, not counting pauses of the program."""
         self.scheduler.wait(float(values.number(seconds, lazy("“wait”"))))
 
     def wait_until(self, condition: Callable[[], object], at_most_s: object = None) -> None:
-        """Wait until a condition is true; unknown values count as false.
+        """Wait until a condition is true; a condition with unknown values counts as false.
 
         Args:
-            condition: Evaluated repeatedly.
-            at_most_s: Maximum wait in seconds; None for no limit.
+            condition: Evaluated 50 times a second.
+            at_most_s: Maximum wait in seconds, not counting pauses; None for no limit.
         """
         limit = None if at_most_s is None else float(values.number(at_most_s, lazy("“wait until”")))
         self.scheduler.wait_until(lambda: _is_true(condition), limit)
 
     def write(self, value: object) -> None:
-        """Write a line to the Console."""
+        """Write a value as a line to the Console."""
         self._printed(values.text(value))
 
     def show(self, value: object) -> None:
-        """Write a tried value in short form; an empty line if the value is unknown."""
+        """Write the value of a tried block as a short line; an empty line if the value is unknown."""
         self._printed("" if value is None else short_text(value))
 
     # ---- questions
@@ -292,7 +328,7 @@ class Runtime:
         self.questions.ask(question)
 
     def ask_with_choices(self, question: object, choices: object) -> None:
-        """Ask the user to select an item of a list, and wait for the answer, which `answer` returns."""
+        """Ask the user to select an item of a list and wait for the selection, which `answer` returns."""
         self.questions.ask_with_choices(question, choices)
 
     def answer(self) -> object:
@@ -302,10 +338,7 @@ class Runtime:
     # ---- time
 
     def timer(self) -> float:
-        """Return the seconds since the start or the last reset.
-
-        Time in which the program is paused doesn't count.
-        """
+        """Return the seconds since the start or the last reset, not counting pauses of the program."""
         return round(self.scheduler.running_time_s() - self._timer_from_s, 3)
 
     def reset_timer(self) -> None:
@@ -318,17 +351,22 @@ class Runtime:
         """Publish a message on a topic.
 
         Raises:
-            BehaviourError: The message would move a robot without permission.
+            BehaviourError: The message would move a robot that the program may not move.
         """
         self._require_link().publish(topic, payload)
 
     def newest(self, topic: str, path: str) -> object:
-        """Return a field of the newest message of a topic; None until a message is received."""
+        """Return a field of the newest message of a topic; None if there is no message yet or no such field.
+
+        Args:
+            topic: Name of the topic.
+            path: Field path; "" for the whole message.
+        """
         message = self._require_link().newest(topic)
         return None if message is None else values.part(message, path)
 
     def broadcast(self, name: str) -> None:
-        """Start the scripts that receive a broadcast."""
+        """Start the scripts that receive a broadcast, and continue without waiting for them."""
         self._broadcasts.send(name)
 
     def broadcast_and_wait(self, name: str) -> None:
@@ -356,7 +394,7 @@ class Runtime:
     def on_broadcast(self, name: str) -> Decorator:
         """Return a decorator for scripts that run at each broadcast with this name.
 
-        A script that is still running is restarted.
+        A script that is still running at the next broadcast is restarted.
         """
 
         def decorate(script: Script) -> Script:
@@ -375,7 +413,13 @@ class Runtime:
         return decorate
 
     def on_event(self, robot: str, event: str, filters: Mapping[str, object]) -> Decorator:
-        """Return a decorator for scripts that run at each event of the robot with this name."""
+        """Return a decorator for scripts that run at each event of a robot with this name.
+
+        Args:
+            robot: Name of the robot.
+            event: Name of the event.
+            filters: Required values of fields, by name.
+        """
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             description = self._robots[robot].event(event)
@@ -392,7 +436,7 @@ class Runtime:
         )
 
     def on_change(self, robot: str, sensor: str) -> Decorator:
-        """Return a decorator for scripts that run each time the value of the sensor changes."""
+        """Return a decorator for scripts that run each time the value of a sensor changes."""
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, change_detector(lambda: hat.enqueue(())))
@@ -402,7 +446,10 @@ class Runtime:
         )
 
     def on_pass(self, robot: str, sensor: str, side: str, limit: float) -> Decorator:
-        """Return a decorator for scripts that run each time the sensor passes the limit to this side."""
+        """Return a decorator for scripts that run each time a sensor passes a limit.
+
+        See `RobotHandle.on_pass` for the arguments.
+        """
 
         def prepare(hat: Hat, link: ProgramLink) -> None:
             link.on_sensor(robot, sensor, ThresholdTrigger(side, limit, lambda: hat.enqueue(())))
@@ -429,11 +476,11 @@ class Runtime:
     # ---- robots
 
     def robot(self, name: str) -> RobotHandle:
-        """Return the handle of a robot."""
+        """Return the interface to a robot; the robot need not be connected."""
         return RobotHandle(name, self)
 
     def robot_description(self, name: str) -> Robot:
-        """Return the description of a robot. Raises BehaviourError if it is not connected."""
+        """Return the description of a robot. Raises BehaviourError if the robot is not connected."""
         if name not in self._robots:
             raise BehaviourError(_("{name} is not connected.").format(name=name))
         return self._robots[name]
@@ -444,7 +491,7 @@ class Runtime:
         return len(self._robots)
 
     def link(self) -> ProgramLink:
-        """Return the network link of the program."""
+        """Return the connection to the network. Raises BehaviourError before `start`."""
         return self._require_link()
 
     def _require_link(self) -> ProgramLink:

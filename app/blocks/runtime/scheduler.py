@@ -1,8 +1,8 @@
-"""Cooperative scheduler of scripts, which are threads that take turns, one block at a time.
+"""Cooperative scheduler of scripts: each script is a thread, and the threads take turns.
 
-Only one script runs at a time; it passes its turn on at each `step` and while it waits. So a block is never
-interrupted by another script, a pause holds every script at the start of a block, and a single step runs
-exactly one block. See ``docs/adr`` on concurrent scripts.
+Only one script runs at a time; it yields to other scripts at each `step` and while it waits. A block is
+therefore never interrupted by another script, a pause suspends every script at the start of a block, and a
+single step runs exactly one block. See ``docs/adr`` on concurrent scripts.
 """
 
 from __future__ import annotations
@@ -20,12 +20,18 @@ POLL_INTERVAL_S = 0.02
 
 
 class StopProgram(BaseException):
-    """Raised in a script when the program ends. Programs never catch it."""
+    """Raised in a script when the program ends. Programs must not catch it."""
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Current blocks of the scripts. ``paused`` is True once every script is held."""
+    """Current state of the scripts.
+
+    Attributes:
+        blocks: Ids of the current blocks.
+        next_block: Id of the block that a single step runs; None if no script is suspended.
+        is_paused: True once every script is suspended by a pause.
+    """
 
     blocks: tuple[str, ...]
     next_block: str | None
@@ -33,11 +39,17 @@ class Snapshot:
 
 
 class EndScript(StopProgram):
-    """Raised in a script whose run ends while the program continues. An event can start the script again."""
+    """Raised in a script to end its current run while the program continues. An event can start it again."""
 
 
 class Script:
-    """Script: its thread, its current block, and the condition on which it wakes up."""
+    """State of a script in the scheduler.
+
+    Attributes:
+        name: Name of the script.
+        wake: Condition that is notified when the script may continue.
+        block: Id of the current block; None while the script is idle.
+    """
 
     def __init__(self, name: str, lock: threading.Lock) -> None:
         self.name = name
@@ -50,7 +62,11 @@ class Script:
 
 
 class Scheduler:
-    """Gives the turn to one script after the other."""
+    """Cooperative scheduler that lets one script run at a time.
+
+    Args:
+        clock: Monotonic clock in seconds.
+    """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -71,9 +87,13 @@ class Scheduler:
     # ---- scripts
 
     def start(self, name: str, body: Callable[[], None], *, idle: bool = True) -> threading.Thread:
-        """Run ``body`` as a script in a new thread, which starts when it gets the turn.
+        """Start a script in a new thread, in which ``body`` is called.
 
-        A script that is not ``idle`` does not wait for an event and counts as running immediately.
+        Args:
+            name: Name of the script.
+            body: Body of the script, which calls `start_run` before it runs blocks.
+            idle: True for a script that first waits for an event; False for one that counts as running at
+                once.
         """
         script = Script(name, self._lock)
         script.idle = idle
@@ -95,7 +115,7 @@ class Scheduler:
 
     @contextmanager
     def defer_turns(self) -> Iterator[None]:
-        """Return a context for starting several scripts: none gets the turn before the context ends."""
+        """Return a context manager for starting several scripts, in which no script runs yet."""
         with self._lock:
             self._opening = True
         yield
@@ -104,16 +124,19 @@ class Scheduler:
             self._grant_turn_locked()
 
     def start_run(self) -> None:
-        """Wait for the turn to start a run of the script. Raises Stopped when the program ends."""
+        """Begin a run of the calling script: wait until it is its turn.
+
+        Raises Stopped when the program ends.
+        """
         script = self._current_script()
         with self._lock:
             script.idle = False
             self._acquire_turn_locked(script)
 
     def acquire_turn(self) -> None:
-        """Wait for the turn to evaluate the condition of an idle script; `rest` gives the turn back.
+        """Wait for the turn of an idle script, to evaluate its condition; call `finish_run` afterwards.
 
-        Waits while the program is paused.
+        Also waits while the program is paused.
         """
         script = self._current_script()
         with self._lock:
@@ -122,17 +145,19 @@ class Scheduler:
             self._acquire_turn_locked(script)
 
     def finish_run(self) -> None:
-        """End the script's run until its next event."""
+        """End the current run of the calling script, which is idle until the next `start_run`."""
         script = self._current_script()
         with self._lock:
             script.idle, script.block, script.ended = True, None, False
             self._release_turn_locked(script)
 
     def step(self, block: str) -> None:
-        """Record that the script has reached a block.
+        """Record that the calling script has reached a block, and let other scripts run.
 
-        Other scripts get the turn, and a pause holds the script here. With a pace, the script first waits for
-        that duration.
+        The script waits here while the program is paused, and for the delay set by `set_pace`.
+
+        Args:
+            block: Id of the block.
         """
         script = self._current_script()
         with self._lock:
@@ -154,9 +179,9 @@ class Scheduler:
         return self._current_script()
 
     def end_run(self, script: Script) -> None:
-        """End the current run of a script: EndScript is raised at its next call.
+        """End the current run of a script by raising EndScript at its next call of the scheduler.
 
-        An idle script is not affected.
+        Has no effect on an idle script.
         """
         with self._lock:
             self._end_run_locked(script)
@@ -177,11 +202,16 @@ class Scheduler:
     # ---- waiting: other scripts run meanwhile
 
     def wait(self, seconds: float) -> None:
-        """Wait; the duration of pauses doesn't count."""
+        """Wait for a number of seconds, not counting pauses, while other scripts run."""
         self.wait_until(None, seconds)
 
     def wait_until(self, condition: Callable[[], bool] | None, at_most_s: float | None) -> bool:
-        """Wait until the condition, evaluated 50 times a second, is true; return False on timeout."""
+        """Wait until a condition is true, while other scripts run; return False on timeout.
+
+        Args:
+            condition: Evaluated 50 times a second; None to wait until the timeout.
+            at_most_s: Timeout in seconds, not counting pauses; None for no limit.
+        """
         script = self._current_script()
         remaining = at_most_s
         while condition is None or not condition():
@@ -201,9 +231,14 @@ class Scheduler:
     def wait_for(
         self, ready: Callable[[], bool], timeout_s: float | None = None, *, idle: bool = False
     ) -> bool:
-        """Wait for another thread, which calls `poke`; return False on timeout. Does not stop while paused.
+        """Wait for a change by another thread, while other scripts run; return False on timeout.
 
-        ``ready`` is called with the lock held and should only read a value.
+        The other thread calls `wake_scripts` after a change. The wait continues while the program is paused.
+
+        Args:
+            ready: Condition, called with the lock held; it should only read a value.
+            timeout_s: Timeout in seconds; None for no limit.
+            idle: True for an idle script that waits for its next event.
         """
         script = self._current_script()
         until = None if timeout_s is None else self._clock() + timeout_s
@@ -222,23 +257,23 @@ class Scheduler:
             return ready()
 
     def is_script_paused(self) -> bool:
-        """Return True if a pause holds the calling script. May be called with the lock held."""
+        """Return True if the calling script is suspended by a pause. Can be called with the lock held."""
         return self._paused and self._stepping is not self._current_script()
 
     def wait_while_paused(self) -> None:
-        """Wait within a block until the pause ends or the script is stepped."""
+        """Wait within a block until the pause ends or a single step is requested."""
         with self._lock:
             self._wait_locked(self._current_script(), lambda: None if self._paused else 0.0, step_ends=True)
 
     def wake_scripts(self) -> None:
-        """Wake waiting scripts so that they check their conditions."""
+        """Wake waiting scripts so that they check their conditions. Thread-safe."""
         with self._lock:
             self._wake_all_locked()
 
     # ---- pause, step, stop: called from other threads
 
     def pause(self) -> None:
-        """Hold every script at its next block."""
+        """Suspend every script at its next block. Thread-safe."""
         with self._lock:
             if not self._paused:
                 self._paused_since_s = self._clock()
@@ -247,11 +282,11 @@ class Scheduler:
 
     @property
     def is_paused(self) -> bool:
-        """True while scripts are paused, even during a single step."""
+        """True between `pause` and `resume`, even during a single step."""
         return self._paused
 
     def resume(self) -> None:
-        """End the pause."""
+        """Resume all scripts after a pause. Thread-safe."""
         with self._lock:
             if self._paused:
                 self._paused_total_s += self._clock() - self._paused_since_s
@@ -260,17 +295,21 @@ class Scheduler:
             self._wake_all_locked()
 
     def running_time_s(self) -> float:
-        """Return the time of a clock in seconds that stops while the program is paused."""
+        """Return the time in seconds of a monotonic clock that stops while the program is paused."""
         with self._lock:
             return (self._paused_since_s if self._paused else self._clock()) - self._paused_total_s
 
     def set_pace(self, seconds: float) -> None:
-        """Set the duration that each script waits at a block, in seconds; 0 for full speed."""
+        """Set the delay of each script at each block.
+
+        Args:
+            seconds: Delay in seconds; 0 for full speed.
+        """
         self.pace_s = max(0.0, seconds)
         self.wake_scripts()
 
     def step_once(self) -> None:
-        """Run one block of the script that has waited longest. Has an effect only while paused."""
+        """Run one block of the script that has waited longest. Has no effect unless the program is paused."""
         with self._lock:
             if not self._paused or self._stepping is not None or self._owner is not None:
                 return
@@ -283,14 +322,14 @@ class Scheduler:
             self._wake_all_locked()
 
     def stop(self) -> None:
-        """End every script at its next call, and waiting scripts immediately."""
+        """Stop the program: end waiting scripts at once, and other scripts at their next call of a method."""
         with self._lock:
             self._stopping = True
             self._wake_all_locked()
 
     @property
     def is_stopping(self) -> bool:
-        """True after `stop`."""
+        """True after `stop` was called."""
         return self._stopping
 
     def restore_block(self, block: str | None) -> None:
@@ -298,11 +337,11 @@ class Scheduler:
         self._current_script().block = block
 
     def block(self) -> str | None:
-        """Return the current block of the calling script."""
+        """Return the id of the current block of the calling script."""
         return self._current_script().block
 
     def snapshot(self) -> Snapshot:
-        """Return the current blocks of the scripts."""
+        """Return the current state of the scripts."""
         with self._lock:
             active = [script for script in self._scripts if not script.idle]
             blocks = tuple(dict.fromkeys(script.block for script in active if script.block))

@@ -1,4 +1,4 @@
-"""Triggers of scripts: queued events, and values monitored for a change."""
+"""Triggers that start scripts: queued events, conditions, and changes of sensor values."""
 
 from __future__ import annotations
 
@@ -10,10 +10,18 @@ from app.robots.description.description import Event
 
 
 class Hat:
-    """Event queue of one script.
+    """Trigger of one script: a bounded queue of events, or a condition that becomes true.
 
-    Events arrive from the network's thread. At most ``most`` events are queued; beyond that, the oldest is
-    dropped and counted. With a ``condition``, the event is that the condition becomes true.
+    Events arrive in the network's thread. If the queue is full, the oldest event is dropped.
+
+    Attributes:
+        title: Title of the event block, for messages.
+        dropped: Number of dropped events (only if the queue can hold more than one).
+
+    Args:
+        title: Title of the event block.
+        most: Maximum number of queued events.
+        condition: Condition; None for a queue of events.
     """
 
     def __init__(self, title: str, *, most: int = 1, condition: Callable[[], bool] | None = None) -> None:
@@ -24,13 +32,17 @@ class Hat:
         self._was_true: bool | None = None
 
     def enqueue(self, arguments: tuple[object, ...]) -> None:
-        """Queue an event. The caller has to poke the scheduler."""
+        """Queue an event; call `Scheduler.wake_scripts` afterwards.
+
+        Args:
+            arguments: Arguments for the script.
+        """
         if len(self._waiting) == self._waiting.maxlen and self._waiting.maxlen > 1:
             self.dropped += 1
         self._waiting.append(arguments)
 
     def next(self, scheduler: Scheduler) -> tuple[object, ...]:
-        """Wait for the next event and return the arguments for the script."""
+        """Wait until an event arrives or the condition becomes true, and return the script's arguments."""
         if self._condition is None:
             scheduler.wait_for(lambda: bool(self._waiting), idle=True)
             return self._waiting.popleft()
@@ -53,9 +65,14 @@ class Hat:
 
 
 class ThresholdTrigger:
-    """Threshold trigger: calls ``passed`` when a number passes a limit to one side.
+    """Threshold trigger that calls ``passed`` when a number passes a limit.
 
-    An initial value beyond the limit doesn't count.
+    A first value beyond the limit doesn't count.
+
+    Args:
+        side: "below" or "above".
+        limit: Limit of the number.
+        passed: Called each time the number gets below or above the limit.
     """
 
     def __init__(self, side: str, limit: float, passed: Callable[[], None]) -> None:
@@ -65,7 +82,7 @@ class ThresholdTrigger:
         self._was_beyond: bool | None = None
 
     def __call__(self, value: object) -> None:
-        """Process a new value."""
+        """Process a new value; values that aren't numbers are ignored."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return
         beyond = value < self._limit if self._side == "below" else value > self._limit
@@ -75,7 +92,7 @@ class ThresholdTrigger:
 
 
 def change_detector(changed: Callable[[], None]) -> Callable[[object], None]:
-    """Return a callback that calls ``changed`` for each value that differs from the previous one."""
+    """Return a function that calls ``changed`` when its argument differs from that of the last call."""
     before: list[object] = []
 
     def on_value(value: object) -> None:
@@ -92,10 +109,16 @@ def event_matches(
     event: Event | None,
     source: Mapping[str, object],
 ) -> bool:
-    """Return True if the data of an event match the filters of a script.
+    """Return True if an event starts a script with these filters.
 
     Texts are compared ignoring case. An event that is also sent when it ends (``rb:level`` with a boolean
     field, such as "down" of a touch) matches only when it starts.
+
+    Args:
+        data: Data of the event.
+        filters: Required values of fields, by name.
+        event: Description of the event, if known.
+        source: Thing Description of the robot.
     """
     fields: Mapping[str, object] = data if isinstance(data, Mapping) else {}
     for name, wanted in filters.items():

@@ -1,4 +1,4 @@
-"""Functions on values, used by blocks of several categories. Without side effects."""
+"""Functions on values that blocks of several categories use. The functions have no side effects."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from nep.i18n import _, lazy
 
 MAX_TEXT_LENGTH = 1_000_000
 MAX_BITS = 14_000
-"""Maximum size of a printed integer: Python rejects more than 4300 digits. Larger ones are shown as
-1.2e+4932.
+"""Maximum size in bits of an integer that is printed with all digits; larger ones are shown as 1.2e+4932.
+
+Python doesn't print integers with more than 4300 digits.
 """
 _MAX_ITERATIONS = 10**9
 _ZERO_WIDTH_JOINER = "\u200d"
 
 
 def text(value: object) -> str:
-    """Convert a value to text for the user: 2 for 2.0, yes or no, "" for an unknown value."""
+    """Convert a value to text for the user: "2" for 2.0, "yes" for True, "" for an unknown value."""
     if value is None:
         return ""
     if isinstance(value, bool):
@@ -53,12 +54,12 @@ def _json_safe(value: object, around: tuple[int, ...]) -> object:
 
 
 def is_known(value: object) -> bool:
-    """Return True if a value is known."""
+    """Return True if a value is not None, which stands for an unknown value."""
     return value is not None
 
 
 def join(first: object, second: object) -> str:
-    """Join two values as text."""
+    """Convert two values to text and concatenate them. Raises BehaviourError if the text is too long."""
     one, other = text(first), text(second)
     if len(one) + len(other) > MAX_TEXT_LENGTH:
         raise BehaviourError(
@@ -75,7 +76,7 @@ def length(value: object) -> int:
 
 
 def grapheme_clusters(words: str) -> Sequence[str]:
-    """Return the grapheme clusters of a text: accents and skin tones belong to the previous character."""
+    """Split a text into grapheme clusters: accents and skin tones belong to the previous character."""
     if words.isascii():
         return words
     found: list[str] = []
@@ -98,7 +99,15 @@ def _is_combining(before: str, character: str) -> bool:
 
 
 def number(value: object, what: str) -> int | float:
-    """Return the value as a finite number. Raises BehaviourError with a message that starts with ``what``."""
+    """Return a value if it is a finite number.
+
+    Args:
+        value: Value to check.
+        what: Start of the error message: name of the block, marked for translation.
+
+    Raises:
+        BehaviourError: The value is unknown or not a finite number.
+    """
     if value is None:
         raise BehaviourError(
             _("{what} needs a value that isn't known yet.").format(what=_(what)), unknown=True
@@ -113,22 +122,22 @@ def number(value: object, what: str) -> int | float:
 
 
 def rounded(value: object) -> int:
-    """Return the nearest whole number; halves are rounded up."""
+    """Return the nearest integer; halves are rounded up."""
     return math.floor(number(value, lazy("“round”")) + 0.5)
 
 
 def rounded_up(value: object) -> int:
-    """Round up to a whole number."""
+    """Return the smallest integer that is not less than a number."""
     return math.ceil(number(value, lazy("“round up”")))
 
 
 def rounded_down(value: object) -> int:
-    """Round down to a whole number."""
+    """Return the largest integer that is not greater than a number."""
     return math.floor(number(value, lazy("“round down”")))
 
 
 def random_number(low: object, high: object) -> int | float:
-    """Return a random number between two limits; a whole number if both limits are."""
+    """Return a random number between two limits, inclusive; an integer if both limits are integers."""
     first, last = number(low, lazy("“random number”")), number(high, lazy("“random number”"))
     first, last = min(first, last), max(first, last)
     if float(first).is_integer() and float(last).is_integer():
@@ -137,15 +146,18 @@ def random_number(low: object, high: object) -> int | float:
 
 
 def repeat(times: object) -> range:
-    """Return the range for a loop: the number is rounded, and at least 0."""
+    """Return the range for a loop; the number of rounds is rounded, and 0 if negative."""
     return range(max(0, min(rounded(number(times, lazy("“repeat”"))), _MAX_ITERATIONS)))
 
 
 def part(message: object, path: str) -> object:
-    """Return the value at a path in a message, such as ``faces.0.name``; None if it is missing.
+    """Return the value at a field path in a message, such as ``faces.0.name``; None if missing.
 
-    An empty path returns the whole message. If the message is a plain value, the path ``value`` returns it. A
-    list is copied, so that changes don't affect the message.
+    A list is copied, so that changes don't affect the message.
+
+    Args:
+        message: Payload of the message.
+        path: Field path; "" for the whole message. The path ``value`` of a plain value is the value itself.
     """
     found = _value_at(message, path)
     return list(found) if isinstance(found, list) else found

@@ -1,4 +1,4 @@
-"""Variables of a running program for display, as short texts even for large values."""
+"""Variables of a running program, formatted for display as short texts even if the values are large."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ MAX_TEXT_LENGTH = 200
 MAX_ITEM_LENGTH = 80
 MAX_ITEMS = 100
 MAX_NESTING_DEPTH = 20
-"""Maximum depth of nested values that are displayed."""
+"""Maximum nesting depth of displayed values."""
 MAX_TOTAL_CHARACTERS = 200_000
-"""Maximum number of characters sent at once. The remaining variables follow with the next read."""
+"""Number of characters after which `VariableWatch.changes` defers further variables to the next call."""
 _MAX_PRINTED_BITS = 600
-"""Maximum size of a printed integer. Larger ones are described by their number of digits, to save time."""
+"""Maximum size in bits of a printed integer.
+
+To save time, larger ones are shown as their number of digits.
+"""
 _ELLIPSIS = "…"
 
 
@@ -30,10 +33,10 @@ class VariableValue:
 
     Attributes:
         id: Id of the variable.
-        kind: Kind of the value.
-        text: Short text.
-        items: First items of a list.
-        length: Length of a list.
+        kind: Kind of value: "number", "text", "boolean", "list", "unknown" or "other".
+        text: Value as text, truncated.
+        items: First items of a list as text, truncated.
+        length: Length of a list, else 0.
     """
 
     id: str
@@ -54,7 +57,10 @@ class VariableValue:
 
     @classmethod
     def from_json(cls, told: object) -> VariableValue | None:
-        """Restore a value from `to_json`; None for invalid data. Texts are truncated to their limits."""
+        """Create a value from the result of `to_json`; return None if the argument is not an object.
+
+        Texts are truncated to their limits.
+        """
         if not isinstance(told, Mapping):
             return None
         items, length = told.get("items"), told.get("length")
@@ -72,7 +78,12 @@ class VariableValue:
 
 
 class VariableWatch:
-    """Detects changes of a program's variables, without slowing down the program."""
+    """Detector of changes in the variables of a program. Works in another thread without locking the program.
+
+    Args:
+        names: Global names of the program.
+        variables: Variables of the behaviour.
+    """
 
     def __init__(self, names: dict[str, object], variables: Sequence[Variable]) -> None:
         self._names = names
@@ -104,7 +115,12 @@ class VariableWatch:
         return found
 
     def set_value(self, python: str, value: str | float | bool) -> None:
-        """Set a variable of the program. Names that aren't variables are ignored."""
+        """Set a variable of the program.
+
+        Args:
+            python: Python name of the variable; names of other objects are ignored.
+            value: New value.
+        """
         if python in self._variables:
             self._names[python] = value
 
@@ -124,7 +140,15 @@ def _is_plain(value: object) -> bool:
 
 
 def display_value(id: str, value: object) -> VariableValue:
-    """Return a value for display. Raises RuntimeError if a script changes the value meanwhile."""
+    """Format the value of a variable for display.
+
+    Args:
+        id: Id of the variable.
+        value: Value.
+
+    Raises:
+        RuntimeError: A script changed the value during the call.
+    """
     if value is None:
         return VariableValue(id, "unknown", _("unknown"))
     if isinstance(value, (list, tuple)):
@@ -141,12 +165,17 @@ def display_value(id: str, value: object) -> VariableValue:
 
 
 def short_text(value: object) -> str:
-    """Return a value as short text."""
+    """Format a value as text of at most `MAX_TEXT_LENGTH` characters."""
     return limited_text(value, MAX_TEXT_LENGTH)
 
 
 def limited_text(value: object, most: int) -> str:
-    """Return a value as text of at most ``most`` characters; parts that aren't shown aren't read."""
+    """Format a value as text of limited length; parts of the value that exceed the length aren't read.
+
+    Args:
+        value: Value.
+        most: Maximum number of characters.
+    """
     if isinstance(value, str):
         return _truncate(value[: most + 1], most)
     if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > _MAX_PRINTED_BITS:

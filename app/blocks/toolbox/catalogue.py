@@ -1,4 +1,4 @@
-"""All blocks: those of the categories, and those of known robots."""
+"""Catalogue of the blocks of all categories and all known robots."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ _PLACEHOLDER = re.compile(r"%[A-Za-z_][A-Za-z0-9_]*")
 
 
 class Catalogue:
-    """Blocks by type.
+    """Block descriptions by type.
 
-    ``connected`` are the robots by name. The blocks of ``absent`` robots are included, but can't run.
+    Attributes:
+        blocks: Descriptions of all blocks by type.
+        connected: Connected robots by name.
+        absent: Disconnected robots by name; `blocks` contains their blocks, which can't run.
     """
 
     def __init__(self, robots: Sequence[Robot], absent: Sequence[Robot] = ()) -> None:
@@ -38,7 +41,7 @@ class Catalogue:
 
 
 def categories() -> tuple[Category, ...]:
-    """Return all categories in toolbox order, in the current language."""
+    """Return all categories in the order of the toolbox, translated to the current language."""
     return english_categories() if language() == ENGLISH else _translated_categories(language())
 
 
@@ -49,13 +52,13 @@ def _translated_categories(_language: str) -> tuple[Category, ...]:
 
 @lru_cache(maxsize=1)
 def english_categories() -> tuple[Category, ...]:
-    """Return all categories in English."""
+    """Return all categories in the order of the toolbox, in English."""
     found = discover("app.blocks.categories", "CATEGORY", Category)
     return tuple(sorted(found.values(), key=lambda category: (category.order, category.name)))
 
 
 def is_translatable(english: str) -> bool:
-    """Return True if a text contains words that can be translated; "%A %SIGN %B" and "+" don't."""
+    """Return True if a text on a block contains words to translate; False for "+" or "%A %SIGN %B"."""
     return any(letter.isalpha() for letter in _PLACEHOLDER.sub("", english))
 
 

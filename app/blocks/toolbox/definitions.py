@@ -1,4 +1,4 @@
-"""Block definitions and toolbox for the editor, in Blockly's JSON."""
+"""Block definitions and toolbox of the editor, in Blockly's JSON format."""
 
 from __future__ import annotations
 
@@ -16,11 +16,15 @@ STYLES = ("events", "control", "values", "variables", "functions", "messages", "
 def editor_definitions(
     robots: Sequence[Robot], absent: Sequence[Robot] = (), topics: Sequence[str] = ()
 ) -> dict[str, object]:
-    """Return the definitions for the editor as a JSON object.
+    """Return everything that the editor needs as a JSON object.
 
-    ``blocks`` are the JSON definitions of all categories and all robots, connected or ``absent``; ``help`` is
-    their help (`app.blocks.toolbox.help`). ``toolbox`` is a toolbox with categories, ``styles`` are the names
-    of the styles, and ``robots`` and ``topics`` are the options of the drop-downs.
+    The members are ``blocks`` (block definitions), ``help`` (see `help_of`) by block type, ``toolbox``,
+    ``styles`` (names of the block styles), and the options of the drop-downs for ``robots`` and ``topics``.
+
+    Args:
+        robots: Connected robots.
+        absent: Disconnected robots, whose blocks are included but can't run.
+        topics: Names of the existing topics.
     """
     catalogue = Catalogue(robots, absent)
     return {

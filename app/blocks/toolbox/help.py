@@ -1,4 +1,4 @@
-"""Help for a block: what it does, what its slots accept, and an example."""
+"""Help for a block: a description, the values that its slots accept, and an example."""
 
 from __future__ import annotations
 
@@ -138,11 +138,11 @@ _MAX_UNIT_LENGTH = 3  # maximum length of a unit
 
 
 def help_of(block: Block) -> dict[str, object]:
-    """Return the help for a block.
+    """Return the help for a block as a JSON object.
 
-    The keys are ``title``, ``name``, ``does``, ``more``, ``gaps`` as (name, text), and ``example``.
-    ``words``, ``english`` and ``choices`` are for search: further search words, and the options of the
-    fields.
+    The members are ``title``, ``name``, ``does`` (short description), ``more`` (long description), ``gaps``
+    (pairs of slot name and accepted values), and ``example``. Only for search: ``words`` and ``english``
+    (search words in both languages) and ``choices`` (options of the drop-downs).
     """
     gaps = [
         [slot_name(block, argument), words]
@@ -168,7 +168,7 @@ def _example(block: Block) -> str:
 
 
 def title(block: Block) -> str:
-    """Return the text on the block with slots in parentheses: "wait (seconds) s"."""
+    """Return the text on a block with the names of slots in parentheses, such as ``wait (seconds) s``."""
 
     def slot_text(hole: re.Match[str]) -> str:
         argument = block.argument(hole[1])
@@ -182,7 +182,7 @@ def title(block: Block) -> str:
 def name(block: Block) -> str:
     """Return the name of a block for use in a sentence, such as "walk" or "repeat … times".
 
-    The name is "" if the block has no words. The robot slot and a unit after the last slot are left out.
+    The robot slot and a unit after the last slot are left out. Returns "" if the block contains no words.
     """
     words = [part.strip() for part in _PLACEHOLDER.split(block.text.removeprefix("%ROBOT "))[::2]]
     if len(words) > 1 and len(words[-1]) <= _MAX_UNIT_LENGTH:
@@ -200,7 +200,7 @@ def slot_name(block: Block, argument: Argument) -> str:
 
 
 def english_slot_name(argument: Argument) -> str:
-    """Return the default name of a slot in English."""
+    """Return the default display name of a slot or field, in English."""
     return _SLOT_NAMES.get(argument.name, argument.name.lower().replace("_", " "))
 
 

@@ -1,5 +1,5 @@
 """Behaviours as documents: tabs, files, journals, versions and problems.
 
-`open_documents` manages the tabs and `document` implements one of them; `journal` saves unsaved work against
-a crash.
+`open_documents` manages the tabs, `document` implements one behaviour, and `journal` protects unsaved
+work against crashes.
 """

@@ -1,4 +1,4 @@
-"""Background worker: a thread that runs only the newest job of each owner."""
+"""Background worker: a thread that runs the newest job of each owner and discards older pending jobs."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from app.core.storage.deep_json import start_deep
 
 T = TypeVar("T")
 JOIN_TIMEOUT_S = 2.0
-"""Maximum time that the window waits for a job, for example on a disk that does not respond."""
+"""Maximum time in seconds to wait for a job, for example if a disk doesn't respond."""
 
 
 class BackgroundWorker(Generic[T]):
-    """Worker with one thread, which the first job starts and `close` stops.
+    """Worker with one thread. The first job starts the thread; `close` stops it.
 
     Only `finish` and `close` block.
     """
@@ -30,7 +30,7 @@ class BackgroundWorker(Generic[T]):
         self._closed = False
 
     def submit(self, owner: str, work: Callable[[], T]) -> None:
-        """Queue a job for an owner, replacing the owner's pending job."""
+        """Queue a job for an owner; a pending job of the same owner is discarded."""
         with self._changed:
             self._pending[owner] = work
             if self._thread is None and not self._closed:
@@ -39,9 +39,9 @@ class BackgroundWorker(Generic[T]):
             self._changed.notify_all()
 
     def pop_result(self, owner: str) -> T | None:
-        """Return and clear the result of the owner's last job; None if there is none.
+        """Return and clear the result of the owner's last job; None if there is no result.
 
-        Raises the exception that the job raised.
+        Raises the exception of a failed job.
         """
         with self._changed:
             failed = self._failed.pop(owner, None)
@@ -50,7 +50,7 @@ class BackgroundWorker(Generic[T]):
             return self._done.pop(owner, None)
 
     def finish(self, owner: str) -> bool:
-        """Wait at most 2 s until the owner has no queued or running job; return True if that was reached."""
+        """Wait at most 2 s until the owner has no pending or running job; return False on timeout."""
         with self._changed:
             return self._changed.wait_for(
                 lambda: self._closed or (owner not in self._pending and self._current_owner != owner),

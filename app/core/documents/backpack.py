@@ -1,7 +1,7 @@
-"""Backpack: blocks that are available in every file, every running Studio and after a restart.
+"""Backpack: blocks that are available in all behaviours, in all Studio instances, and after a restart.
 
-Stored in one JSON file next to the settings and shared by all instances: each change is applied to the
-current content under a lock, so that instances don't overwrite each other's changes. Unknown content is
+All instances share one JSON file next to the settings. Each change is applied to the current content of
+the file under a lock, so that instances don't overwrite each other's changes. Unknown entries are
 preserved.
 """
 
@@ -38,9 +38,12 @@ Stamp = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class BackpackStack:
-    """Stack of blocks as saved by Blockly, with the names of its variables.
+    """Stack of blocks in the backpack.
 
-    ``at`` is the time it was added.
+    Attributes:
+        id: Unique id of the stack.
+        at: Time when the stack was added, in seconds since 1970.
+        block: Blocks in Blockly's JSON format, with the names of their variables.
     """
 
     id: str
@@ -48,14 +51,16 @@ class BackpackStack:
     block: Json
 
     def to_json(self) -> dict[str, object]:
-        """Return the JSON object used in the file and by the editor's page."""
+        """Return the stack as a JSON object, as used in the file and in the editor's page."""
         return {"id": self.id, "at": self.at, "block": self.block}
 
 
 class _Content(NamedTuple):
-    """Content of the file.
+    """Content of the backpack file.
 
-    ``unknown`` are entries that this version can't read. The entries are preserved unchanged.
+    Attributes:
+        items: Stacks that this version can read.
+        unknown: Entries that this version can't read; written back unchanged.
     """
 
     items: tuple[BackpackStack, ...] = ()
@@ -65,7 +70,7 @@ class _Content(NamedTuple):
 class Backpack:
     """Content of the backpack, newest first.
 
-    Changes are written immediately; they raise BackpackError on failure.
+    Changes are written to the file immediately. A failed change raises BackpackError.
     """
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
@@ -86,7 +91,7 @@ class Backpack:
         return self._known.items
 
     def take_problem(self) -> str:
-        """Return and clear the message about a problem with the file; "" if there is none."""
+        """Return and clear the error message about the file; "" if there is no error."""
         trouble, self._problem = self._problem, ""
         return trouble
 
@@ -100,7 +105,10 @@ class Backpack:
             self._report_once(str(error))
 
     def add(self, blocks: Sequence[Json]) -> list[BackpackStack]:
-        """Add stacks of blocks, the first on top. Raises BackpackError when it is full."""
+        """Add stacks of blocks, the first on top, and return the new items.
+
+        Raises BackpackError if the backpack is full or can't be written.
+        """
         # Newer than all existing stacks, even if the clock was set back.
         newest = max([self._clock(), *(item.at + len(blocks) * _MIN_DISTANCE_S for item in self.items[:1])])
         items = [
@@ -111,12 +119,15 @@ class Backpack:
         return items
 
     def restore(self, items: Sequence[BackpackStack]) -> None:
-        """Restore removed stacks at their positions. Raises BackpackError when it is full."""
+        """Add removed stacks again at their previous positions.
+
+        Raises BackpackError if the backpack is full or can't be written.
+        """
         ids = {item.id for item in items}
         self._change(lambda found: (*(item for item in found if item.id not in ids), *items))
 
     def remove(self, ids: Sequence[str]) -> list[BackpackStack]:
-        """Remove stacks; return those that existed. Raises BackpackError."""
+        """Remove the stacks with these ids; return the removed stacks. Raises BackpackError."""
         gone: list[BackpackStack] = []
 
         def filter_stacks(found: tuple[BackpackStack, ...]) -> tuple[BackpackStack, ...]:
@@ -127,7 +138,7 @@ class Backpack:
         return gone
 
     def empty(self) -> list[BackpackStack]:
-        """Remove all known stacks and return them. Raises BackpackError."""
+        """Remove and return all stacks that this version can read. Raises BackpackError."""
         return self.remove([item.id for item in self.items])
 
     # -- file ------------------------------------------------------------------------------------------------

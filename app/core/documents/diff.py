@@ -1,4 +1,4 @@
-"""Summary of the difference between two states of a behaviour: added, removed and changed blocks."""
+"""Difference between two states of a behaviour: numbers of added, removed and changed blocks."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Difference:
 
 
 def difference(then: Workspace, now: Workspace) -> Difference:
-    """Compare two states by block ids.
+    """Return the difference between an earlier and the current state, comparing blocks by id.
 
-    Numbers and texts in the slots of a block count as part of the block.
+    Numbers and texts in the slots of a block count as part of that block.
     """
     old, new = (dict(_blocks(workspace)) for workspace in (then, now))
     stayed = old.keys() & new.keys()

@@ -38,7 +38,7 @@ from nep.i18n import _, lazy
 UNNAMED = lazy("New behaviour")
 
 INLINE_COMPILE_S = 0.02
-"""Compile time below which a behaviour is compiled immediately, in the window's thread."""
+"""Compile time in seconds up to which a behaviour is compiled in the main thread."""
 Key = tuple[int, int, int]
 
 _keys = itertools.count(1)
@@ -46,7 +46,13 @@ _keys = itertools.count(1)
 
 @dataclass(frozen=True)
 class CompiledProgram:
-    """Compiled program, the key of its source, and the compile time."""
+    """Result of a compilation.
+
+    Attributes:
+        key: Key of the source that was compiled.
+        program: Compiled program.
+        compile_s: Compile time.
+    """
 
     key: Key
     program: Program
@@ -57,10 +63,10 @@ class Document:
     """One open behaviour.
 
     Attributes:
-        key: Identifies the behaviour among the open ones.
-        revision: Increases when the behaviour is replaced from outside the editor.
-        fixes: Increases when Studio changes the blocks in a way that can be undone.
-        edits: Increases with every edit.
+        key: Identifier of the behaviour, unique among all open behaviours.
+        revision: Counter that increases when code other than the editor replaces the content.
+        fixes: Counter that increases when Studio changes the blocks in an undoable way.
+        edits: Counter that increases with every edit.
     """
 
     def __init__(
@@ -112,7 +118,7 @@ class Document:
         return self._json.has_blocks
 
     def apply_edit(self, workspace: Workspace | WorkspaceJson) -> None:
-        """Apply an edit from the editor and write it to the journal. Does not block on the disk."""
+        """Apply an edit from the editor and write it to the journal in the background."""
         edited = workspace if isinstance(workspace, WorkspaceJson) else WorkspaceJson.from_blocks(workspace)
         if edited.is_equal_to(self._json):
             return
@@ -123,11 +129,11 @@ class Document:
         self._write_journal()
 
     def new(self, name: str = "") -> None:
-        """Replace the content by an empty behaviour."""
+        """Replace the content with an empty behaviour."""
         self._replace(BehaviourFile(name or _(UNNAMED), {}, {}), None)
 
     def open(self, path: Path) -> None:
-        """Open a file. If DocumentError is raised, the current content stays."""
+        """Open a file. If DocumentError is raised, the current content is unchanged."""
         self._replace(read_file(path), path)
         self.saved_at = path.stat().st_mtime
         self._stamp = stamp_of(path)
@@ -140,7 +146,7 @@ class Document:
         self._replace(translated(read_file(path)), None)
 
     def copy(self, path: Path, name: str) -> None:
-        """Open a file as a new, unsaved behaviour with another name. Raises DocumentError."""
+        """Open a file as a new, unsaved behaviour named ``name``. Raises DocumentError."""
         self._replace(replace(read_file(path), name=name), None)
 
     def duplicate(self, other: Document, name: str) -> None:
@@ -151,7 +157,8 @@ class Document:
     def recover(self, unsaved: UnsavedWork) -> None:
         """Restore the unsaved work of a crashed session.
 
-        The behaviour is unsaved, and is written to a new journal before the old one is deleted.
+        The behaviour stays unsaved: its content is written to a new journal before the old journal is
+        deleted.
         """
         found = BehaviourFile(unsaved.name, unsaved.workspace, unsaved.robots, unsaved.unknown_fields)
         self._replace(found, unsaved.path)
@@ -164,9 +171,12 @@ class Document:
             unsaved.journal.unlink(missing_ok=True)
 
     def save(self, path: Path | None = None) -> None:
-        """Write the file atomically; ``path`` becomes the file of the behaviour. Raises DocumentError.
+        """Write the behaviour to a file atomically. Raises DocumentError.
 
-        The file also contains the name, for programs that need it.
+        The behaviour's name is stored in the file too, for programs that display it.
+
+        Args:
+            path: File, which becomes the file of the behaviour; None for the current file.
         """
         target = path if path is not None else self.path
         if target is None:
@@ -180,9 +190,9 @@ class Document:
         self._discard_journal()
 
     def rename_to(self, name: str) -> None:
-        """Rename the behaviour and its file, if there is one.
+        """Rename the behaviour and its file, if it has one.
 
-        If DocumentError is raised, nothing has changed.
+        If DocumentError is raised, nothing is changed.
         """
         wanted = name.strip()
         problem = name_problem(wanted, self.path)
@@ -203,9 +213,13 @@ class Document:
             self._write_journal()
 
     def fix(self, action: str) -> bool:
-        """Apply the fix of a problem, given as the action of its button, to the blocks.
+        """Apply the fix of a problem to the blocks.
 
-        Returns False if the action does not change blocks.
+        Args:
+            action: Action of the fix's button.
+
+        Returns:
+            False if the action does not change blocks.
         """
         fixed = deep_json.run_deep(lambda: fix(self.workspace, action))
         if fixed is None:
@@ -215,9 +229,10 @@ class Document:
         return True
 
     def use_robot(self, missing: str, robot: Robot) -> bool:
-        """Replace a missing robot in all blocks by another robot.
+        """Replace a missing robot in all blocks with another robot.
 
-        Return False if no block uses the missing one.
+        Returns:
+            False if no block uses the missing robot.
         """
         known = next((each for each in self._known_robots() if each.name == missing), None)
         if known is None or not blocks_of(self.workspace, missing):
@@ -230,7 +245,10 @@ class Document:
         return True
 
     def detach_file(self) -> None:
-        """Detach the file, because another behaviour was saved to it: the blocks become unsaved."""
+        """Detach the behaviour from its file, because another behaviour was saved to that file.
+
+        The behaviour becomes unsaved.
+        """
         self.path, self.dirty = None, True
         self._write_journal()
 
@@ -247,7 +265,7 @@ class Document:
 
     @property
     def is_blank(self) -> bool:
-        """True for a new, unchanged and empty behaviour, whose tab may be used for another one."""
+        """True if the behaviour is new, unchanged and empty, so that its tab can be reused."""
         return self.path is None and not self.dirty and not self.workspace
 
     @property
@@ -257,9 +275,9 @@ class Document:
 
     @property
     def journal_error(self) -> str | None:
-        """Why unsaved work can't be written to the journal; None if there is no such problem.
+        """Reason why unsaved work can't be written to the journal; None if there is no error.
 
-        Also None while a write is in progress.
+        None while a write is in progress.
         """
         if self.journal_writer is not None:
             self._apply_journal_result(partial(self.journal_writer.pop_result, self._journal.name))
@@ -267,12 +285,12 @@ class Document:
 
     @property
     def is_on_disk(self) -> bool:
-        """True if the newest state is on disk. Waits at most 2 s for a write in progress."""
+        """True if the current state is on disk. Waits at most 2 s for a write in progress."""
         finished = self.journal_writer is None or self.journal_writer.finish(self._journal.name)
         return finished and self.journal_error is None
 
     def retry_journal(self) -> bool:
-        """Retry a failed write of the journal; return True if all unsaved work is on disk."""
+        """Retry a failed journal write; return True if all unsaved work is on disk."""
         if self.dirty and not self.is_on_disk:
             self._write_journal()
         return not self.dirty or self.is_on_disk
@@ -290,14 +308,14 @@ class Document:
     # -- robots and the compiler -----------------------------------------------------------------------------
 
     def set_connected(self, robots: Sequence[Robot]) -> None:
-        """Set the connected robots."""
+        """Set the robots that are connected, whose blocks can be used."""
         if tuple(robots) != self._connected:
             self._connected = tuple(robots)
             self.definitions_revision += 1
             self._store_used_robots()
 
     def set_topics(self, topics: Sequence[str]) -> None:
-        """Set the topics that the editor offers."""
+        """Set the names of the topics that the editor suggests."""
         if tuple(topics) != self._topics:
             self._topics = tuple(topics)
             self.definitions_revision += 1
@@ -309,7 +327,7 @@ class Document:
         return tuple(robot for robot in self._known_robots() if robot.name not in there)
 
     def program(self) -> Program:
-        """Return the compiled program for the known robots. The result is cached until the next edit."""
+        """Return the compiled program of the behaviour, cached until the next edit."""
         key = self._key()
         if self._compiled is None or self._compiled[0] != key:
             began = self._timer()
@@ -318,7 +336,7 @@ class Document:
         return self._compiled[1]
 
     def trial_program(self, stack: Stack) -> Program | None:
-        """Compile one stack of blocks as a program; None if the stack no longer exists."""
+        """Compile a single stack of blocks as a program; return None if the stack no longer exists."""
         workspace = deep_json.run_deep(lambda: stack.workspace(self.workspace))
         if workspace is None:
             return None
@@ -328,10 +346,10 @@ class Document:
         return replace(program, shows_value=stack.is_value)
 
     def newest_program(self) -> Program | None:
-        """Return the newest compiled program; long behaviours are compiled in the background.
+        """Return the newest compiled program without blocking.
 
-        The program may be that of an earlier edit; None while a long behaviour is compiled for the first
-        time.
+        Long behaviours are compiled in the background. Until that has finished, the program of an
+        earlier edit is returned, or None if there is none.
         """
         key = self._key()
         if self._compiled is not None and self._compiled[0] == key:
@@ -471,9 +489,9 @@ def _parse_robot(description: Mapping[str, object]) -> Robot | None:
 
 
 def read(path: Path) -> tuple[str, Workspace, Descriptions]:
-    """Return the name, workspace and robots of a behaviour file.
+    """Return the name, the workspace and the robot descriptions in a behaviour file.
 
-    Raises DocumentError with advice what to do.
+    Raises DocumentError with advice for the user.
     """
     found = read_file(path)
     return found.name, found.workspace, found.robots

@@ -1,7 +1,7 @@
 """Translation of examples into the current language.
 
-Example files are in English; an example is translated when it is opened as a new behaviour of the user. Texts
-that programs exchange are not translated: topics, field names of messages, types, choices and robots.
+Example files are in English; an example is translated when the user opens it. Identifiers that programs
+exchange are not translated: topics, field names, message types, choices and robots.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ function, and the comment next to the blocks.
 """
 
 TranslateText = Callable[[str, str], str]
-"""Translates an English text in a context."""
+"""Function that translates an English text, given its context and the text."""
 
 
 def translated(example: BehaviourFile, translate_text: TranslateText = translate) -> BehaviourFile:
-    """Return a translated copy of an example of Studio; don't use it for a file of the user.
+    """Return a translated copy of an example. Not for files of the user.
 
-    Equal English texts get equal translations, so that comparisons still work.
+    Equal English texts get equal translations, so that comparisons between them still work.
     """
     names: dict[str, str] = {}
 
@@ -59,7 +59,7 @@ def translated(example: BehaviourFile, translate_text: TranslateText = translate
 
 @lru_cache(maxsize=1)
 def example_block_ids() -> frozenset[str]:
-    """Return the ids of all blocks in Studio's examples, which differ from those of the user's blocks."""
+    """Return the ids of all blocks in Studio's examples. Blocks created by users have other ids."""
     return frozenset(
         str(block.get("id"))
         for path in sorted(resources.path("examples").glob(f"*{SUFFIX}"))

@@ -1,6 +1,6 @@
-"""Behaviour file: JSON with name, blocks and robots.
+"""Format of behaviour files: JSON with name, blocks and robots.
 
-Fields that this version doesn't know, such as those of a later version, are preserved.
+Unknown fields, such as fields of a later version, are preserved.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ TOO_DEEP_MESSAGE = lazy("one stack has more than 4000 blocks")
 OPEN_EARLIER_ADVICE = lazy("open an earlier copy")
 SPLIT_ADVICE = lazy("split it into several scripts")
 DISK_FULL_ERRNOS = frozenset({errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)})
-"""Error numbers that mean a full disk, a file at its maximum size or an exhausted quota."""
+"""Error numbers of a full disk, an exceeded file size limit, and an exceeded quota."""
 KNOWN_FIELDS = frozenset({"format", "version", "name", "workspace", "robots"})
 
 Workspace = Mapping[str, object]
@@ -31,7 +31,14 @@ Descriptions = Mapping[str, Mapping[str, object]]
 
 @dataclass(frozen=True)
 class BehaviourFile:
-    """Content of a behaviour file; ``others`` are fields that this version doesn't know."""
+    """Content of a behaviour file.
+
+    Attributes:
+        name: Name of the behaviour.
+        workspace: Blocks in Blockly's JSON format.
+        robots: Descriptions of the robots in use, by name.
+        others: Fields that this version doesn't know.
+    """
 
     name: str
     workspace: Workspace
@@ -40,9 +47,10 @@ class BehaviourFile:
 
 
 def read_file(path: Path, name: str = "") -> BehaviourFile:
-    """Read a behaviour file. Raises DocumentError with advice what to do.
+    """Read a behaviour file. Raises DocumentError with advice for the user.
 
-    ``name`` replaces the file name in error messages, if the user knows the file by another name.
+    Args:
+        name: Name used in error messages instead of the file name.
     """
     name = name or path.name
     try:
@@ -57,9 +65,12 @@ def read_file(path: Path, name: str = "") -> BehaviourFile:
 
 
 def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
-    """Parse the bytes of a behaviour file; ``path`` and ``name`` are used in error messages only.
+    """Parse the content of a behaviour file. Raises DocumentError.
 
-    Raises DocumentError.
+    Args:
+        data: Content of the file.
+        path: Path of the file, for error messages.
+        name: Name used in error messages instead of the file name.
     """
     name = name or path.name
     try:
@@ -87,9 +98,9 @@ def parse_file(data: bytes, path: Path, name: str = "") -> BehaviourFile:
 
 
 def file_bytes(behaviour: BehaviourFile) -> bytes:
-    """Return the content of a behaviour file.
+    """Return a behaviour in the file format.
 
-    Raises RecursionError for more than 4000 blocks in one stack.
+    Raises RecursionError if a stack has more than about 4000 blocks.
     """
     content = {
         "format": FORMAT,
@@ -105,7 +116,7 @@ def file_bytes(behaviour: BehaviourFile) -> bytes:
 def write_file(path: Path, behaviour: BehaviourFile) -> None:
     """Write a behaviour file atomically.
 
-    If DocumentError is raised, which says what to do, the old file is unchanged.
+    Raises DocumentError with advice for the user; the existing file is then unchanged.
     """
     try:
         data = file_bytes(behaviour)
@@ -130,5 +141,5 @@ def write_file(path: Path, behaviour: BehaviourFile) -> None:
 
 
 def file_type_hint() -> str:
-    """Return a hint about the file extension of behaviours, for a file that isn't one."""
+    """Return a hint about the file extension of behaviours, for error messages about other files."""
     return _("the file name of a behaviour ends in {suffix}").format(suffix=SUFFIX)

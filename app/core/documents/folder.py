@@ -1,4 +1,4 @@
-"""Content of a folder, and file names that are valid on every system."""
+"""Listing of folders, and file names that are valid on every operating system."""
 
 from __future__ import annotations
 
@@ -14,13 +14,20 @@ from nep.i18n import _
 MAX_ENTRIES = 5000
 INVALID_CHARACTERS = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
 RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-"""File names that Windows reserves. They are rejected everywhere, so that files work on every system."""
+"""File names reserved by Windows, rejected on every system so that files can be copied there."""
 MAX_NAME_LENGTH = 120
 
 
 @dataclass(frozen=True)
 class FolderEntry:
-    """File or folder; ``changed_s`` in seconds since 1970, ``size`` in bytes."""
+    """File or subfolder of a folder.
+
+    Attributes:
+        path: Path of the entry.
+        is_folder: True for a folder.
+        changed_s: Time of the last change in seconds since 1970.
+        size: File size in bytes.
+    """
 
     path: Path
     is_folder: bool
@@ -29,9 +36,9 @@ class FolderEntry:
 
 
 def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[FolderEntry, ...]:
-    """Return the folders, and the files with one of these extensions; hidden ones are omitted.
+    """Return the subfolders of a folder and the files with one of the given extensions.
 
-    Raises OSError.
+    Hidden entries are omitted. Raises OSError.
     """
     entries = []
     with os.scandir(folder) as found:
@@ -51,7 +58,7 @@ def entries_of(folder: Path, endings: tuple[str, ...] = (SUFFIX,)) -> tuple[Fold
 
 
 def name_problem(name: str) -> str:
-    """Return why a name is invalid for a file or folder; "" if it is valid."""
+    """Return the reason why a file or folder can't have this name; "" if the name is valid."""
     bad = INVALID_CHARACTERS.search(name)
     if bad:
         return _("A name can't contain “{sign}”.").format(sign=bad[0])
@@ -65,13 +72,13 @@ def name_problem(name: str) -> str:
 
 
 def parse_absolute_path(typed: str) -> Path | None:
-    """Return the path if the typed text is an absolute path; None if it is a name."""
+    """Return the typed text as a path if it is absolute; None if it is only a name."""
     path = Path(typed).expanduser() if typed.startswith("~") else Path(typed)
     return path if path.is_absolute() and path.name else None
 
 
 def free_name(folder: Path, name: str, ending: str = SUFFIX) -> str:
-    """Return the name, with a number appended if a file has this name: "Greeting 2"."""
+    """Return an unused file name without extension: ``name``, or a numbered name such as "Greeting 2"."""
     number, candidate = 2, name
     while (folder / f"{candidate}{ending}").exists():
         candidate, number = f"{name} {number}", number + 1

@@ -1,7 +1,7 @@
-"""Journal of unsaved work against a crash: every edit is written in the background.
+"""Journals: every edit of unsaved work is written to disk in the background, in case Studio crashes.
 
-Each open behaviour has one file in ``journal/`` of Studio's folder. The file contains the id of the process
-that writes it, so that a second instance doesn't offer the work of the first one.
+Each open behaviour has one file in the ``journal`` folder. The file contains the id of the writing
+process, so that another instance doesn't offer work that is still open.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ else:
 FORMAT = 1
 """Format version; increased when older versions of Studio can't read the new format."""
 MAX_JOURNAL_BYTES = 64_000_000
-"""Maximum journal size. Larger than the limit of behaviour files, so that oversized work can be restored and
-reduced.
+"""Maximum journal size in bytes.
+
+Larger than the limit of behaviour files, so that oversized work can be restored and then reduced.
 """
 
 
@@ -69,11 +70,14 @@ class Journal:
         robots: Mapping[str, Mapping[str, object]],
         others: Mapping[str, object] | None = None,
     ) -> None:
-        """Write the current state to disk, where it survives a crash of this process. Raises OSError.
+        """Write the current state to disk, so that it survives a crash of this process. Raises OSError.
 
         Args:
+            name: Name of the behaviour.
+            path: File of the behaviour, or None.
             text: JSON of the workspace, written unchanged.
-            others: Further fields of the behaviour file.
+            robots: Descriptions of the robots in use, by name.
+            others: Unknown fields of the behaviour file, to be preserved.
         """
         entry = {
             "format": FORMAT,
@@ -90,9 +94,9 @@ class Journal:
         write_atomically(self._file, data, durable=False, private=True)
 
     def discard(self) -> None:
-        """Delete the journal, because the work was saved or discarded.
+        """Delete the journal after the work was saved or discarded.
 
-        Errors are ignored; at worst the work is offered again at the next start.
+        Errors are ignored; at worst, the work is offered again at the next start.
         """
         with contextlib.suppress(OSError):
             self._file.unlink(missing_ok=True)
@@ -107,7 +111,7 @@ def unsaved_work(folder: Path | None = None) -> list[UnsavedWork]:
 
 
 def newer_work_names(folder: Path | None = None) -> list[str]:
-    """Return the names of unsaved work written by a newer Studio; those journals are left unchanged."""
+    """Return the names of unsaved work in journals of a newer Studio, which are left unchanged."""
     folder = folder if folder is not None else home() / "journal"
     found = []
     for file in folder.glob("*.json") if folder.is_dir() else ():

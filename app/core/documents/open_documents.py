@@ -1,6 +1,7 @@
 """Open behaviours as tabs; one of them is current.
 
-The tabs are restored at the next start (`Documents.kept`, `Documents.put_back`); closed tabs can be reopened.
+Tabs are saved and restored at the next start (`Documents.tabs_state`, `Documents.restore_tabs`). Closed
+tabs can be reopened.
 """
 
 from __future__ import annotations
@@ -21,7 +22,11 @@ MAX_CLOSED = 20
 
 
 class Documents:
-    """All open behaviours, at least one. ``revision`` increases when the tabs change."""
+    """Open behaviours; there is always at least one.
+
+    Attributes:
+        revision: Counter that increases when the tabs change.
+    """
 
     def __init__(self, make: Callable[[], Document] = Document) -> None:
         self._make = make
@@ -50,7 +55,7 @@ class Documents:
     # -- opening -----------------------------------------------------------------------------------------
 
     def new(self) -> Document:
-        """Open an empty behaviour in a new tab; if the current tab is empty and unchanged, use that."""
+        """Open an empty behaviour in a new tab, or in the current tab if that is empty and unchanged."""
         if self.current.is_blank:
             return self.current
         document = self._new_document()
@@ -69,7 +74,7 @@ class Documents:
         return self._with_unique_name(self._open_with(lambda document: document.open_example(path)))
 
     def copy(self, path: Path, name: str) -> Document:
-        """Open a file as a new behaviour with another name in a new tab. Raises DocumentError."""
+        """Open a file as a new behaviour named ``name`` in a new tab. Raises DocumentError."""
         return self._with_unique_name(self._open_with(lambda document: document.copy(path, name)))
 
     def duplicate(self, document: Document) -> Document:
@@ -95,7 +100,7 @@ class Documents:
         return self._make_current(there)
 
     def find_by_path(self, path: Path) -> Document | None:
-        """Return the open behaviour of a file, or None."""
+        """Return the open behaviour whose file is ``path``, or None."""
         wanted = path.resolve()
         return next((each for each in self._open if each.path and each.path.resolve() == wanted), None)
 
@@ -104,7 +109,7 @@ class Documents:
         return next((each for each in self._open if each.key == key), None)
 
     def title(self, document: Document) -> str:
-        """Return the title of a behaviour, unique among the open ones."""
+        """Return the title of a behaviour, unique among the open behaviours."""
         opened = [*self._open, *([document] if document not in self._open else [])]
         return unique_titles([(each.name, each.path) for each in opened])[opened.index(document)]
 
@@ -116,20 +121,20 @@ class Documents:
             self._make_current(document)
 
     def neighbour(self, step: int) -> Document:
-        """Return the behaviour ``step`` tabs further to the right, wrapping around."""
+        """Return the behaviour ``step`` tabs to the right of the current one, wrapping around at the ends."""
         return self._open[(self._open.index(self.current) + step) % len(self._open)]
 
     def move(self, document: Document, place: int) -> None:
-        """Move a tab to a position, counted from 0."""
+        """Move a tab to an index, counted from 0."""
         if document in self._open and self._open.index(document) != place:
             self._open.remove(document)
             self._open.insert(max(0, place), document)
             self.revision += 1
 
     def close(self, document: Document) -> None:
-        """Close a tab. Save unsaved work before: it is discarded.
+        """Close a tab and discard unsaved work, which must be saved before.
 
-        The last tab is replaced by an empty behaviour.
+        The last tab is replaced with an empty behaviour.
         """
         if document not in self._open:
             return
@@ -164,34 +169,34 @@ class Documents:
     # -- common input --------------------------------------------------------------------------------------
 
     def set_connected(self, robots: Sequence[Robot]) -> None:
-        """Set the connected robots."""
+        """Set the robots that are connected, whose blocks can be used."""
         self._robots = tuple(robots)
         for document in self._open:
             document.set_connected(robots)
 
     def set_topics(self, topics: Sequence[str]) -> None:
-        """Set the topics that the editor offers."""
+        """Set the names of the topics that the editor suggests."""
         self._topics = tuple(topics)
         for document in self._open:
             document.set_topics(topics)
 
     @property
     def definitions_revision(self) -> object:
-        """Value that changes when `definitions` may change."""
+        """Value that differs from its previous value if `definitions` may have changed."""
         return tuple((each.key, each.definitions_revision, len(each.robots)) for each in self._open)
 
     def definitions(self) -> Mapping[str, object]:
         """Return the block and toolbox definitions for the editor, shared by all tabs.
 
-        They contain the connected robots and all robots used in any open behaviour, so that hidden tabs keep
-        their blocks.
+        The definitions cover the connected robots and the robots used in any open behaviour, so that
+        hidden tabs keep their blocks.
         """
         absent = {robot.name: robot for document in self._open for robot in document.absent_robots}
         return editor_definitions(self._robots, tuple(absent.values()), self._topics)
 
     @property
     def journal_error(self) -> str | None:
-        """Message why unsaved work of a behaviour can't be written; None if there is no such problem."""
+        """Reason why unsaved work of a behaviour can't be written; None if there is no error."""
         return next((each.journal_error for each in self._open if each.journal_error), None)
 
     def retry_journals(self) -> list[Document]:
@@ -229,9 +234,10 @@ class Documents:
         """Restore the tabs of the last session; return the paths of the journals that were restored.
 
         Args:
-            kept: Result of `kept` of the last session.
-            left: Unsaved work that was found.
-            ended_well: True if the last session ended normally; then unsaved work is restored without asking.
+            kept: Result of `kept` in the last session.
+            left: Unsaved work found at the start.
+            ended_well: True if the last session ended normally; then unsaved work is restored without
+                asking.
         """
         tabs, current = kept.get("tabs"), kept.get("current")
         unsaved = {each.journal.name: each for each in left} if ended_well else {}
@@ -253,9 +259,11 @@ class Documents:
     def arrange(self, kept: Mapping[str, object], recovered: Mapping[str, Document]) -> None:
         """Move recovered work to the positions of its tabs, and show the tab that was current.
 
+        Tabs opened since the start are moved to the end.
+
         Args:
-            kept: Result of `kept` of the last session.
-            recovered: Recovered documents by journal name. Tabs opened since then are moved to the end.
+            kept: Result of `kept` in the last session.
+            recovered: Recovered documents by journal name.
         """
         tabs, current = kept.get("tabs"), kept.get("current")
         found: dict[int, Document] = {}

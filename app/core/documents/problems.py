@@ -1,4 +1,4 @@
-"""Problems of a behaviour as lines of the problem list; a missing robot is one line with its fixes."""
+"""Problems of a behaviour as rows of the problem list. A missing robot is one row with its fixes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,12 @@ MAX_FIXES = 2  # more don't fit into a line
 
 @dataclass(frozen=True)
 class Fix:
-    """Fix offered for a problem: the label of the button, and the command that it runs."""
+    """Fix offered for a problem.
+
+    Attributes:
+        label: Label of the button.
+        action: Command that the button runs.
+    """
 
     label: str
     action: str
@@ -29,7 +34,13 @@ class Fix:
 
 @dataclass(frozen=True)
 class ProblemLine:
-    """Line of the problem list: the problem, its fixes (best first), and the number of affected blocks."""
+    """Row of the problem list.
+
+    Attributes:
+        problem: Problem that is shown.
+        fixes: Fixes, best first.
+        blocks: Number of affected blocks.
+    """
 
     problem: Problem
     fixes: tuple[Fix, ...]
@@ -37,7 +48,7 @@ class ProblemLine:
 
     @property
     def severity(self) -> str:
-        """Severity: ``error``, ``warning`` or ``info``."""
+        """Severity of the problem: ``error``, ``warning`` or ``info``."""
         return self.problem.severity
 
 
@@ -49,12 +60,17 @@ def problem_lines(
     virtual_models: Collection[str],
     absent: Collection[str] = (),
 ) -> tuple[ProblemLine, ...]:
-    """Return the lines of the problem list.
+    """Return the rows of the problem list.
 
-    All blocks of a missing robot are one line with the number of disabled blocks. The fixes of that line are
-    connected robots with the same actions, and a virtual robot of the same model.
+    All problems of a missing robot are combined into one row with the number of disabled blocks. Fixes
+    for such a row are connected robots with the same actions, and a virtual robot of the same model.
 
     Args:
+        problems: Problems that the compiler found.
+        workspace: Blocks of the behaviour.
+        missing: Robots that the behaviour uses and that are not connected.
+        connected: Connected robots.
+        virtual_models: Models that are available as virtual robots.
         absent: Ids of the disabled blocks (`Program.absent`).
     """
     found: list[ProblemLine] = []
@@ -90,7 +106,11 @@ def robot_fixes(
 ) -> tuple[Fix, ...]:
     """Return the fixes for a missing robot, best first.
 
-    ``able`` are the robots that have the same actions.
+    Args:
+        name: Name of the missing robot.
+        robot: Missing robot; None if it has no description.
+        able: Connected robots that have the same actions.
+        virtual_models: Models that are available as virtual robots.
     """
     if robot is None:
         return (_show_robots_fix(name),)

@@ -1,4 +1,4 @@
-"""Renaming of behaviour files to names that are valid on every system, without overwriting another file."""
+"""Renaming of behaviour files. Names are valid on every operating system, and no file is overwritten."""
 
 from __future__ import annotations
 
@@ -16,18 +16,27 @@ MAX_NAME_BYTES = 200
 RESERVED_NAMES = frozenset(
     {"con", "prn", "aux", "nul", *(f"{port}{digit}" for port in ("com", "lpt") for digit in range(1, 10))}
 )
-"""Names reserved by Windows, rejected everywhere so that files can be copied there."""
+"""Names reserved by Windows, rejected on every system so that files can be copied there."""
 
 
 def renamed_path(path: Path, name: str) -> Path:
-    """Return the path in the same folder with another name; unchanged for files in Studio's own folder."""
+    """Return ``path`` with another file name.
+
+    Files in Studio's folder of unsaved behaviours have generated names; their path is returned
+    unchanged.
+    """
     if name_of(path, "") != path.stem:
         return path
     return path.with_name(f"{name}{path.suffix or SUFFIX}")
 
 
 def name_problem(name: str, path: Path | None) -> str:
-    """Return why a behaviour can't have this name, or "". ``path`` is the file of the behaviour, if any."""
+    """Return the reason why a behaviour can't have this name, or "".
+
+    Args:
+        name: Proposed name.
+        path: File of the behaviour, or None.
+    """
     wanted = name.strip()
     if not wanted:
         return _("A behaviour needs a name.")
@@ -54,8 +63,9 @@ def name_problem(name: str, path: Path | None) -> str:
 def rename_file(old: Path, new: Path) -> None:
     """Rename a file. If DocumentError is raised, the file keeps its old name.
 
-    An existing file is never overwritten: the new name is reserved first by creating an empty file
-    exclusively. (Hard links are no alternative, because file systems of USB drives don't support them.)
+    An existing file is never overwritten: the new name is first reserved by creating an empty file
+    exclusively. (Hard links are no alternative, because the file systems of USB drives don't support
+    them.)
     """
     try:
         if not old.is_file():

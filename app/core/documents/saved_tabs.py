@@ -14,7 +14,7 @@ KEY = "tabs"
 
 
 class SavedTabs:
-    """Saves the open tabs in the settings and restores them at the next start."""
+    """Storage of the open tabs in the settings, restored at the next start."""
 
     def __init__(self, settings: Settings, documents: Documents, complain: Callable[[str], object]) -> None:
         # `complain` is called with a sentence when they can't be saved.
@@ -25,13 +25,13 @@ class SavedTabs:
         self._kept_revision = -1
 
     def restore(self, left: Sequence[UnsavedWork]) -> list[UnsavedWork]:
-        """Restore the tabs of the last session, and start saving them.
+        """Restore the tabs of the last session, and start saving changes.
 
         Args:
             left: Unsaved work of crashed sessions.
 
         Returns:
-            Entries of ``left`` that were not restored and that the user must be asked about.
+            Unsaved work that was not restored, because the user must be asked first.
         """
         self.active = True
         kept: dict[str, object] = self._settings.get(KEY, {})
@@ -48,7 +48,12 @@ class SavedTabs:
         self.save()
 
     def on_edited(self, document: Document, *, was_blank: bool) -> None:
-        """Save the tabs at the first edit of an empty behaviour."""
+        """Save the tabs after the first edit of an empty behaviour.
+
+        Args:
+            document: Behaviour that was edited.
+            was_blank: True if the behaviour was new and empty before the edit.
+        """
         if was_blank and not document.is_blank:
             self.save()
 
@@ -61,7 +66,11 @@ class SavedTabs:
             self.save()
 
     def save(self, *, ended_well: bool = False) -> None:
-        """Save the open tabs; ``ended_well`` is True when the window closes normally."""
+        """Save the open tabs.
+
+        Args:
+            ended_well: True if the window closes normally.
+        """
         if not self.active:
             return
         self._kept_revision = self._documents.revision

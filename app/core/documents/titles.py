@@ -1,4 +1,4 @@
-"""Titles of behaviours: file names, with parent folders where names are equal."""
+"""Titles of behaviours: file names, preceded by parent folders if several names are equal."""
 
 from __future__ import annotations
 
@@ -11,16 +11,23 @@ from nep.i18n import _
 
 
 def name_of(path: Path, inside: str) -> str:
-    """Return the display name of a behaviour file: its file name, or ``inside``, the name stored in the file.
+    """Return the display name of a behaviour file.
 
-    ``inside`` is used only in Studio's folder of work that was closed unsaved, where file names are
-    generated.
+    This is the file name. In Studio's folder of behaviours that were closed without saving, where file
+    names are generated, it is ``inside``.
+
+    Args:
+        path: Path of the file.
+        inside: Name stored in the file.
     """
     return inside if path.parent == closed_tabs_folder() else path.stem
 
 
 def unique_titles(named: Sequence[tuple[str, Path | None]]) -> list[str]:
-    """Return a unique title for each name and file: the name, with as many parent folders as necessary."""
+    """Return a unique title for each pair of name and file.
+
+    A title is the name, preceded by as many parent folders as necessary.
+    """
     alike: dict[str, set[Path]] = {}
     for name, path in named:
         if path is not None:
@@ -39,7 +46,7 @@ def unique_titles(named: Sequence[tuple[str, Path | None]]) -> list[str]:
 
 
 def recent_titles(files: Sequence[RecentFile]) -> list[RecentFile]:
-    """Return the files with unique titles."""
+    """Return recent files with their names replaced by unique titles."""
     titles = unique_titles([(file.name, file.path) for file in files])
     return [replace(file, name=title) for file, title in zip(files, titles, strict=True)]
 

@@ -1,7 +1,7 @@
 """Earlier versions of behaviour files, copied before Studio overwrites a file.
 
-The file name of a copy consists of the original file name, the time of overwriting, and a hash of the
-original path. The modification time of the copy is that of the original.
+The file name of a version consists of the original file name, the time of overwriting, and a hash of
+the original path. Its modification time is that of the original file.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ MAX_COPIES = 300
 MAX_BYTES = 500_000_000
 MAX_COPIES_PER_FILE = 30
 PROTECTED_COPIES = 10
-"""Number of newest versions of a file that are never removed.
+"""Number of newest versions of a file that are never deleted.
 
-Of older versions, the one that leaves the smallest gap in time is removed first.
+Among older versions, the version whose removal leaves the smallest gap in time is deleted first.
 """
 
 _STAMP = "%Y-%m-%d %H.%M.%S"
@@ -49,13 +49,13 @@ Stamp = tuple[int, int]
 
 @dataclass(frozen=True)
 class SavedVersion:
-    """File together with a copy of its earlier content."""
+    """File and a copy of its previous content, which `restore` restores."""
 
     path: Path
     copy: Path
 
     def restore(self) -> None:
-        """Restore the earlier content. If DocumentError is raised, the file is unchanged."""
+        """Restore the previous content. If DocumentError is raised, the file is unchanged."""
         try:
             write_atomically(self.path, read_regular_file(self.copy))
         except (OSError, ValueError) as error:
@@ -70,11 +70,15 @@ class SavedVersion:
 def save_version(
     path: Path, folder: Path | None = None, clock: Callable[[], float] = time.time
 ) -> SavedVersion | None:
-    """Copy the current content of a file; None if the file is missing or empty.
+    """Copy the current content of a file as a version; return None if the file is missing or empty.
 
-    The copies are in ``folder`` (default: ``earlier`` in Studio's data folder), at most 300 in total and 30
-    for each file. Content that was already copied isn't copied again. Raises DocumentError if the file can't
-    be copied.
+    At most 300 versions are stored in total, and 30 of each file. Content that is already stored isn't
+    copied again. Raises DocumentError if the file can't be copied.
+
+    Args:
+        path: File that will be overwritten.
+        folder: Folder of the versions; default: ``earlier`` in Studio's data folder.
+        clock: Returns the time in seconds since 1970.
     """
     where = _versions_folder(folder)
     if not path.is_file() or not path.stat().st_size:
@@ -103,7 +107,15 @@ def save_version(
 
 @dataclass(frozen=True)
 class Version:
-    """Earlier version of a file: its name, and the times when it was written and overwritten."""
+    """Earlier version of a file.
+
+    Attributes:
+        copy: Path of the version.
+        name: Name of the original file, without extension.
+        written_s: Time when the content was written, in seconds since 1970.
+        replaced_s: Time when the content was overwritten, in seconds since 1970.
+        mark: Hash of the original path.
+    """
 
     copy: Path
     name: str
@@ -119,7 +131,7 @@ def versions_of(path: Path, folder: Path | None = None) -> list[Version]:
 
 
 def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
-    """Return versions of other files with the same name, such as of a moved file, newest first."""
+    """Return versions of other files with the same name, such as those of a moved file, newest first."""
     mark, stem = _path_hash(path), _safe_stem(path.stem)
     return [
         each
@@ -129,7 +141,7 @@ def namesakes_of(path: Path, folder: Path | None = None) -> list[Version]:
 
 
 def rename_versions(old: Path, new: Path, folder: Path | None = None) -> None:
-    """Assign the versions of a renamed file to its new name. Versions that can't be renamed are skipped."""
+    """Assign the versions of a renamed file to its new path. Versions that can't be renamed are skipped."""
     for each in reversed(versions_of(old, folder)):
         copy = free_path(
             _versions_folder(folder), f"{new.stem}, before", each.replaced_s, f" {_path_hash(new)}"
@@ -139,7 +151,14 @@ def rename_versions(old: Path, new: Path, folder: Path | None = None) -> None:
 
 
 def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
-    """Return an unused path in ``folder`` from a name, a time and a mark."""
+    """Return an unused path for a copy.
+
+    Args:
+        folder: Folder of the copy.
+        name: Name of the original file, without extension.
+        now_s: Current time in seconds since 1970.
+        mark: Text appended to the file name, such as a hash of the original path.
+    """
     stamp = time.strftime(_STAMP, time.localtime(now_s))
     stem = f"{_safe_stem(name)} {stamp}{mark}"
     path = folder / f"{stem}{SUFFIX}"
@@ -151,7 +170,7 @@ def free_path(folder: Path, name: str, now_s: float, mark: str = "") -> Path:
 
 
 def stamp_of(path: Path) -> Stamp | None:
-    """Return a value that changes when the file is written; None when it is missing."""
+    """Return a value that changes when the file is written; None if the file is missing."""
     try:
         found = path.stat()
     except OSError:
@@ -164,9 +183,10 @@ def _versions_folder(chosen: Path | None) -> Path:
 
 
 def move_old_versions(old: Path | None = None, new: Path | None = None) -> None:
-    """Move the versions that an earlier Studio stored in the configuration folder to the data folder.
+    """Move versions from the configuration folder, which earlier Studios used, to the data folder.
 
-    Versions that can't be moved are retried at the next start. Only their owner can read them.
+    The moved files are made private to their owner. Files that can't be moved are tried again at the
+    next start.
     """
     old = old if old is not None else home() / FOLDER_NAME
     new = new if new is not None else data_home() / FOLDER_NAME

@@ -1,7 +1,7 @@
-"""JSON of a workspace as passed between the editor's page, a document and its journal.
+"""JSON of a workspace, as passed between the editor's page, a document and its journal.
 
-The JSON is passed as text. Code that needs the blocks (compiler, file) parses it on demand, once and in its
-own thread.
+The JSON is passed as text. Code that needs the blocks (compiler, file) parses the text at the first
+access, in the thread of that code.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from app.core.storage import deep_json
 
 LONG_TEXT_LENGTH = 20_000
-"""Text length above which parsing or compiling is too slow for the window's thread."""
+"""Text length in characters above which parsing or compiling is too slow for the main thread."""
 EMPTY: Mapping[str, object] = {"blocks": {"languageVersion": 0, "blocks": []}}
 
 
 class WorkspaceJson:
-    """JSON of one workspace as text, blocks, or both; each is created from the other on demand.
+    """JSON of one workspace, as text, as blocks, or both. The missing form is created at the first access.
 
     Immutable and thread-safe.
     """
@@ -36,7 +36,7 @@ class WorkspaceJson:
 
     @classmethod
     def from_blocks(cls, blocks: Mapping[str, object]) -> WorkspaceJson:
-        """Wrap parsed blocks, which must not be changed afterwards."""
+        """Wrap parsed blocks. The caller must not change the blocks afterwards."""
         return cls(None, blocks)
 
     @property
@@ -48,7 +48,7 @@ class WorkspaceJson:
 
     @property
     def blocks(self) -> Mapping[str, object]:
-        """Blocks in Blockly's JSON; empty when the text is not an object."""
+        """Blocks in Blockly's JSON format; empty if the text is not a JSON object."""
         if self._blocks is None:
             parsed = deep_json.loads(self._text or "{}")
             self._blocks = parsed if isinstance(parsed, dict) else {}
@@ -56,16 +56,17 @@ class WorkspaceJson:
 
     @property
     def has_blocks(self) -> bool:
-        """True if the workspace contains a block. For a long text that isn't parsed yet, True is assumed."""
+        """True if the workspace contains a block; also True for a long text that isn't parsed yet."""
         if self._blocks is None and self.is_longer_than(LONG_TEXT_LENGTH):
             return True
         inner = self.blocks.get("blocks")
         return isinstance(inner, Mapping) and bool(inner.get("blocks"))
 
     def is_equal_to(self, other: WorkspaceJson) -> bool:
-        """Return True if both are equal. Texts from the page are compared as text.
+        """Return True if both workspaces are equal.
 
-        Too deeply nested ones differ.
+        Two texts from the editor's page are compared as text. Workspaces that are nested too deeply to
+        be compared count as different.
         """
         if self._was_told and other._was_told:
             return self._text == other._text
@@ -75,7 +76,7 @@ class WorkspaceJson:
             return False
 
     def is_longer_than(self, characters: int) -> bool:
-        """Return True if the text is longer than this, or too deeply nested to be written."""
+        """Return True if the text is longer than ``characters``, or nested too deeply to be formatted."""
         try:
             return len(self.text) > characters
         except RecursionError:

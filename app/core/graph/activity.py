@@ -16,10 +16,10 @@ MAX_SAMPLES = 61
 
 
 class QuietNodes:
-    """Finds nodes without traffic by their counters. Not thread-safe: use it from the window's thread.
+    """Detection of nodes without traffic, by their message counters.
 
-    Nodes without counters are never quiet: those of a network without statistics, and original programs that
-    only subscribe.
+    Nodes without counters are never quiet: nodes of a network without statistics, and original programs
+    that only subscribe. Not thread-safe; use it from the main thread.
     """
 
     def __init__(self) -> None:
@@ -48,18 +48,18 @@ class QuietNodes:
                 self._counted[entry] = total, now if moved or had is None else had[1]
 
     def quiet_keys(self, now: float) -> frozenset[str]:
-        """Return the keys of nodes without a message or call for `QUIET_S`."""
+        """Return the keys of the nodes without a message or call in the last `QUIET_S` seconds."""
         return frozenset(entry for entry, (_total, since) in self._counted.items() if now - since >= QUIET_S)
 
 
 class CallRates:
-    """Call rates of services over a minute. Not thread-safe: use it from the window's thread."""
+    """Call rates of services, averaged over a minute. Not thread-safe; use it from the main thread."""
 
     def __init__(self) -> None:
         self._samples: deque[tuple[float, Mapping[str, int]]] = deque(maxlen=MAX_SAMPLES)
 
     def update(self, facts: GraphFacts, now: float) -> None:
-        """Apply call counts; ignored within a second of the last ones."""
+        """Apply the call counts at ``now`` (monotonic seconds); at most one sample per second is stored."""
         if not self._samples or now - self._samples[-1][0] >= 1.0:
             self._samples.append((now, {name: info.calls for name, info in facts.services.items()}))
 

@@ -8,10 +8,11 @@ from app.core.graph.node_graph import GraphLine, NodeGraph
 
 
 def dot_of(graph: NodeGraph, group_names: Mapping[str, str], label: Callable[[GraphLine], str]) -> str:
-    """Return the graph as DOT text.
+    """Return the graph in the DOT language.
 
     Args:
-        group_names: Name of each group by its key.
+        graph: Drawing to export.
+        group_names: Display name of each group, by key.
         label: Returns the label of a line.
     """
     names = {node.key: f"n{number}" for number, node in enumerate(graph.nodes)}

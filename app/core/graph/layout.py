@@ -1,8 +1,8 @@
-"""Layout of the graph in layers; existing nodes keep their positions when others appear.
+"""Layered layout of the graph. Nodes keep their positions when other nodes appear.
 
-The library (graphlay) places nodes in layers with few crossings and routes lines around nodes. Positions are
-computed once; later updates compute routes only. All lengths are pixels at 100 % zoom, x to the right and y
-down; positions are centres of boxes.
+The graphlay library places nodes in layers with few crossings and routes lines around nodes. Positions
+are computed once; later updates compute routes only. All lengths are pixels at 100 % zoom, x to the
+right and y down; positions are the centres of boxes.
 """
 
 from __future__ import annotations
@@ -23,22 +23,21 @@ Position = tuple[float, float]
 Box = tuple[float, float, float, float]
 """Rectangle: left, top, width, height."""
 RouteKey = tuple[tuple[str, tuple[str, ...], tuple[str, ...]], str, str]
-"""Key of a route: line, source node, target node."""
+"""Key of a route: (line, source node, target node)."""
 
 MAX_ROUTES = 6000
-"""Maximum number of routes drawn. Beyond it, routes of the lines with the most ends are omitted and counted.
-"""
+"""Maximum number of routes drawn. If there are more, the lines with the most ends are omitted and counted."""
 MAX_SAVED_POSITIONS = 4000
-"""Maximum number of positions stored for nodes that left and may return."""
+"""Maximum number of stored positions of nodes that left and may return."""
 LAYER_GAP, NODE_GAP, GROUP_GAP, DUMMY_GAP = 150.0, 36.0, 40.0, 10.0
 ISOLATED_COLUMNS = 4
-"""Number of columns for nodes without lines within their group."""
+"""Number of columns for the nodes of a group that have no lines."""
 FAST_LAYOUT_NODES = 60
-"""Number of boxes from which the library runs in its fast mode."""
+"""Number of boxes above which graphlay runs in its fast mode."""
 MAX_AVOIDING_ROUTES = 400
-"""Maximum number of routes led around nodes.
+"""Maximum number of routes that avoid nodes.
 
-With more routes, all are straight, because routing would take many seconds.
+With more routes, all routes are straight lines, because routing would take many seconds.
 """
 WIDEST, ASPECT = 3.0, 1.6
 """Maximum ratio of width to height of a row of groups, and the ratio to which a wider row is broken."""
@@ -46,7 +45,15 @@ WIDEST, ASPECT = 3.0, 1.6
 
 @dataclass(frozen=True, slots=True)
 class LayoutSizes:
-    """Sizes of a node, of a group's header and margins, and of the line about quiet nodes."""
+    """Sizes used by the layout, in pixels.
+
+    Attributes:
+        node: Width and height of a node.
+        header: Height of a group's header.
+        side_margin: Margin between a group's border and its nodes.
+        footer: Height of the text about hidden quiet nodes at the bottom of a group.
+        letter_width: Average width of a character.
+    """
 
     node: Position = (152.0, 48.0)
     header: float = 36.0
@@ -55,7 +62,7 @@ class LayoutSizes:
     letter_width: float = 8.0
 
     def scaled(self, share: float) -> LayoutSizes:
-        """Return the sizes for another text size."""
+        """Return the sizes multiplied by ``share``, for another text size."""
         wide, high = self.node
         return LayoutSizes(
             (wide * share, high * share),
@@ -71,10 +78,12 @@ class GraphLayout:
     """Positions of boxes and groups, and routes of lines.
 
     Attributes:
-        routes: Points of each route, from the edge of one box to the edge of another.
-        kept: Positions of nodes that left, by key, oldest first.
+        places: Centre of each box, by key.
+        groups: Rectangle of each group, by key.
+        routes: Points of each route, from the edge of the source box to the edge of the target box.
+        kept: Last positions of nodes that left, by key, oldest first.
         left_out: Number of omitted routes.
-        is_plain: True if the library failed and the boxes are arranged in rows.
+        is_plain: True if graphlay failed and the boxes are arranged in rows.
     """
 
     positions: Mapping[str, Position] = field(default_factory=dict)
@@ -85,7 +94,7 @@ class GraphLayout:
     is_plain: bool = False
 
     def bounds(self, sizes: LayoutSizes) -> Box:
-        """Return the rectangle around everything; of size 0 if the layout is empty."""
+        """Return the bounding rectangle of the layout; its size is 0 if the layout is empty."""
         boxes = [*self.groups.values(), *(_box_at(place, sizes.node) for place in self.positions.values())]
         boxes += [(x, y, 0.0, 0.0) for way in self.routes.values() for x, y in way]
         return _bounding_box(boxes)
@@ -94,10 +103,15 @@ class GraphLayout:
 def arrange(
     graph: NodeGraph, before: GraphLayout | None = None, sizes: LayoutSizes | None = None
 ) -> GraphLayout:
-    """Compute the layout of ``graph``; nodes with a position in ``before`` keep it.
+    """Compute the layout of a graph.
 
-    Everything is placed again without ``before``, or if more nodes appeared than remained. Takes seconds for
-    hundreds of nodes, so call it in `LayoutThread`.
+    Takes seconds for hundreds of nodes; use `LayoutThread`.
+
+    Args:
+        graph: Drawing to lay out.
+        before: Previous layout. Its nodes keep their positions, unless more nodes appeared than
+            remained.
+        sizes: Sizes of boxes and margins.
     """
     sizes = sizes if sizes is not None else LayoutSizes()
     ways, left_out = _routes_to_draw(graph)
@@ -120,7 +134,7 @@ def arrange(
 
 
 def arrange_in_rows(graph: NodeGraph, sizes: LayoutSizes) -> GraphLayout:
-    """Arrange all boxes in rows without the library, if the library failed or took too long."""
+    """Arrange all boxes in rows without graphlay, for the case that graphlay failed or took too long."""
     places = _row_positions(graph, sizes)
     ways, left_out = _routes_to_draw(graph)
     return GraphLayout(

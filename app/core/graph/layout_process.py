@@ -1,7 +1,7 @@
-"""Layout of large graphs in a child process, because the library holds the GIL while it works.
+"""Layout of large graphs in a child process, because graphlay holds the GIL while it works.
 
-`LayoutThread` starts this module. Standard input contains the pickled arguments of `arrange`, standard output
-its pickled result; pickle is safe here, because parent and child are the same program.
+`LayoutThread` starts this module. Standard input is the pickled arguments of `arrange`, standard output
+the pickled result. Pickle is safe here, because parent and child are the same program.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ class LayoutProcess:
         )
 
     def arrange(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> GraphLayout | None:
-        """Call `arrange` in the child process and return its result.
+        """Call `arrange` in the child process and return the layout.
 
-        Returns None if the call failed, was killed, or took longer than `TIMEOUT_S`.
+        Returns None if the call failed, was killed, or took longer than `TIMEOUT_S` seconds.
         """
         bare = replace(graph, nodes=tuple(replace(node, entry=None) for node in graph.nodes))
         try:

@@ -1,4 +1,4 @@
-"""Layout in a background thread; only the newest graph is processed."""
+"""Background thread that computes the layout of the newest graph."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ Arrange = Callable[[NodeGraph, "GraphLayout | None", LayoutSizes], GraphLayout]
 
 
 class LayoutThread:
-    """Thread that is started by the first graph; a newer graph replaces a pending one.
+    """Background thread that computes layouts. A newer graph replaces a pending one.
 
-    Large graphs are passed to a child process (see `layout_process`).
+    The first graph starts the thread. Large graphs are passed to a child process (see
+    `layout_process`).
     """
 
     def __init__(self, arranged: Arrange | None = None) -> None:
@@ -38,7 +39,13 @@ class LayoutThread:
             return self._is_busy or self._waiting is not None
 
     def submit(self, graph: NodeGraph, before: GraphLayout | None, sizes: LayoutSizes) -> None:
-        """Lay out this graph, replacing a pending one. No effect after `close`."""
+        """Request the layout of a graph, replacing a pending request. Does nothing after `close`.
+
+        Args:
+            graph: Drawing to lay out.
+            before: Previous layout, or None.
+            sizes: Sizes of boxes and margins.
+        """
         with self._changed:
             if self._is_closing:
                 return
@@ -55,7 +62,7 @@ class LayoutThread:
             return layout
 
     def close(self) -> None:
-        """Stop the thread; waits at most `JOIN_TIMEOUT_S`, in case the library hangs."""
+        """Stop the thread. Waits at most `JOIN_TIMEOUT_S` seconds, in case graphlay hangs."""
         with self._changed:
             self._is_closing, self._waiting = True, None
             self._changed.notify()

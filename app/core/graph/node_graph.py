@@ -1,4 +1,4 @@
-"""Graph for drawing: nodes in groups, and lines that stand for one or several topics."""
+"""Node graph as drawn: nodes in groups, and lines that represent one or several topics."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NodeKind = Literal["program", "studio", "behaviour", "robot", "bridge", "origina
 LineKind = Literal["topic", "service"]
 
 INTERNAL_PREFIX = "/nep/"
-"""Prefix of nep's internal topics and services, such as logging, which every node has."""
+"""Name prefix of nep's internal topics and services, such as the log, which every node has."""
 MAX_EXPANDED_NODES = 200
 """Number of nodes above which all groups are collapsed initially."""
 BRIDGE_SEPARATOR = "-to-"
@@ -31,17 +31,23 @@ BRIDGE_SEPARATOR = "-to-"
 
 
 WEB_LANGUAGE = "web"
-"""Language of the nodes of web pages. Copied from `nep.programs.web.server`, whose import is slow."""
+"""Language reported by the nodes of web pages.
+
+A copy, because importing `nep.programs.web.server` is slow.
+"""
 WEB_GROUP = "web:"
 
 
 @dataclass(frozen=True, slots=True)
 class GraphFacts:
-    """Input of the drawing from all networks.
+    """State of all networks from which the drawing is created.
 
     Attributes:
-        services: Services of the native network.
+        nodes: Nodes of all networks.
+        topics: Topics of all networks.
+        services: Services of the native network, by name.
         robots: Names of the robots.
+        pages: Connected web pages, by the name of their node.
     """
 
     nodes: Sequence[NodeEntry] = ()
@@ -49,7 +55,7 @@ class GraphFacts:
     services: Mapping[str, ServiceInfo] = field(default_factory=dict)
     robots: Sequence[str] = ()
     host: str = field(default_factory=platform.node)
-    """This computer's name."""
+    """Name of this computer."""
     pages: Mapping[str, PageNode] = field(default_factory=dict)
 
 
@@ -59,8 +65,9 @@ class GraphOptions:
 
     Attributes:
         quiet: Keys of the nodes without traffic.
-        hides_quiet: True if quiet nodes are hidden, except in the groups of `quiet_shown`.
-        starts_closed: True if all groups are collapsed except those in `toggled`; if False, only those are.
+        hides_quiet: True if quiet nodes are hidden, except in the groups of `quiet_visible_groups`.
+        starts_collapsed: True if all groups are collapsed except the groups in `toggled`; False if only
+            the groups in `toggled` are collapsed.
     """
 
     group_by: GroupBy = "computer"
@@ -82,10 +89,10 @@ class DrawnNode:
     """Box of the drawing: a node, a web page or a collapsed group.
 
     Attributes:
-        key: Remains the same when a program is restarted.
+        key: Identifier of the box, which stays the same when a program is restarted.
         entry: Current state of the node; None for a collapsed group.
         members: Number of nodes in a collapsed group.
-        joins: Name of the network that a bridge connects to.
+        bridged_network: Name of the network to which a bridge connects, or "".
         has_pictures: True if the node publishes images.
     """
 
@@ -106,10 +113,11 @@ class DrawnNode:
 
 @dataclass(frozen=True, slots=True)
 class GraphLine:
-    """Line from each of the ``sources`` to each of the ``targets``, for the same topics.
+    """Line from each source to each target that share the same topics or the same service.
 
     Attributes:
         sources: Keys of the publishing nodes; for a service, of the clients.
+        targets: Keys of the subscribing nodes; for a service, of the servers.
         topics: Topic keys, unique among all networks (`key_of`).
     """
 
@@ -120,17 +128,23 @@ class GraphLine:
 
     @property
     def key(self) -> tuple[LineKind, tuple[str, ...], tuple[str, ...]]:
-        """Key of the line, which stays the same while its ends are the same."""
+        """Identifier of the line, which stays the same while the line has the same ends."""
         return self.kind, self.sources, self.targets
 
     def pairs(self) -> Iterator[tuple[str, str]]:
-        """Return the pairs of source and target; a node is not paired with itself."""
+        """Return an iterator over the (source, target) pairs; a node is not paired with itself."""
         return ((source, target) for source in self.sources for target in self.targets if source != target)
 
 
 @dataclass(frozen=True, slots=True)
 class GraphGroup:
-    """Nodes of one computer, robot or network. ``quiet`` is how many of the ``members`` are hidden."""
+    """Group of nodes on one computer, of one robot, or in one network.
+
+    Attributes:
+        members: Number of nodes.
+        quiet: Number of nodes that are hidden because they are quiet.
+        is_collapsed: True if the group is collapsed.
+    """
 
     key: str
     name: str
@@ -143,7 +157,15 @@ class GraphGroup:
 
 @dataclass(frozen=True, slots=True)
 class NodeGraph:
-    """Drawing of a graph, in a stable order. ``nodes_there`` counts all nodes, including hidden ones."""
+    """Drawing of a graph. Boxes, lines and groups are in a stable order.
+
+    Attributes:
+        node_count: Number of all nodes, including hidden ones.
+        topic_count: Number of all topics.
+        service_count: Number of all services.
+        hidden_quiet_count: Number of nodes that are hidden because they are quiet.
+        page_count: Number of web pages.
+    """
 
     nodes: tuple[DrawnNode, ...] = ()
     lines: tuple[GraphLine, ...] = ()
@@ -164,9 +186,9 @@ class NodeGraph:
 
 
 def node_graph(facts: GraphFacts, choices: GraphOptions) -> NodeGraph:
-    """Return the drawing for these facts and options.
+    """Create the drawing from the state of the networks and the options of the user.
 
-    Takes time proportional to the number of nodes and topics.
+    The run time is proportional to the number of nodes and topics.
     """
     boxes = _boxes(facts, choices)
     groups = _groups(facts, choices, boxes)
@@ -359,7 +381,7 @@ _Ends = tuple[tuple[str, ...], tuple[str, ...]]
 
 
 def is_drawn(topic: str, choices: GraphOptions) -> bool:
-    """Return True if topics with this name are drawn; internal topics only on request."""
+    """Return True if the topic or service is drawn. Internal ones are drawn only if the options say so."""
     return choices.shows_internal or not topic.startswith(INTERNAL_PREFIX)
 
 

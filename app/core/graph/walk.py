@@ -1,4 +1,4 @@
-"""Navigation with arrow keys: along the lines from node to node, and up and down."""
+"""Navigation in the graph with arrow keys: left and right along the lines, up and down between neighbours."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ Arrow = Literal["left", "right", "up", "down"]
 
 @dataclass(frozen=True, slots=True)
 class GraphSelection:
-    """Selection in the graph: the node or topic with this ``key``.
+    """Selected node or topic of the graph.
 
     Attributes:
-        origin: Node from which a topic was selected.
-        is_outward: True if the topic leads away from `origin`.
+        key: Key of the node or topic.
+        origin: Key of the node from which a topic was selected.
+        is_outward: True if the line of the topic leads away from `origin`.
     """
 
     kind: Literal["node", "topic"]
@@ -31,9 +32,9 @@ def move_selection(
 ) -> GraphSelection | None:
     """Return the selection after an arrow key was pressed.
 
-    Right goes from a node to an outgoing line and on to its target; left goes against the direction of the
-    lines. Up and down go to the next line of the same node, or to the next node above or below. The selection
-    is unchanged if nothing follows, and None in an empty graph.
+    Right moves from a node to an outgoing line and on to its target; left moves against the direction
+    of the lines. Up and down move to the next line of the same node, or to the node above or below. The
+    selection is unchanged if there is nothing in that direction, and None in an empty graph.
     """
     if chosen is None or not _exists(graph, layout, chosen):
         first = min(layout.positions, key=lambda key: (layout.positions[key], key), default=None)

@@ -1,4 +1,4 @@
-"""Content of messages: images and large JSON, decoded in the background only as far as they are shown.
+"""Content of messages: images and large JSON. Only visible parts are decoded, in the background.
 
 The codecs are in `nep.messages`.
 """

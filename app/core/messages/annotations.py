@@ -1,6 +1,6 @@
-"""Annotations of images in JSON messages: `foxglove.ImageAnnotations`, and RIZE's `face_positions`.
+"""Image annotations in JSON messages: `foxglove.ImageAnnotations`, and RIZE's `face_positions`.
 
-Positions are fractions of the image's width and height, independent of its size on the screen.
+Positions are fractions of the image's width and height, independent of the displayed size.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ MAX_SHAPES = 2000
 MAX_POINTS = 20_000
 MAX_TEXT_LENGTH = 200
 MAX_PIXELS = 1e6
-"""Maximum coordinates and sizes. Larger shapes are not drawn, because graphics libraries don't support them.
+"""Maximum coordinate and size in pixels.
+
+Larger shapes are skipped, because graphics libraries don't support them.
 """
 FACE_FRAME = (640, 480)
-"""Image size that RIZE's face detection uses."""
+"""Width and height of the images in which RIZE detects faces."""
 POINTS, LINE_LOOP, LINE_STRIP, LINE_LIST = 1, 2, 3, 4
 
 Colour = tuple[float, float, float, float]
@@ -30,13 +32,13 @@ YELLOW: Colour = (1.0, 0.77, 0.24, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One shape to draw; its points are fractions of the image.
+    """Shape to draw. Positions are fractions of the image's width and height.
 
     Attributes:
         kind: "points", "line", "area" (closed), "circle" or "text".
         points: Vertices; the centre of a circle, the lower left corner of a text.
         outline: Colour of the outline; None for no outline.
-        fill: Colour inside; None for no fill.
+        fill: Fill colour; None for no fill.
         thickness: Width of the outline in pixels of the image.
         size: Radius of a circle as fractions of width and height; height of a text as a fraction.
         words: Text to draw.
@@ -60,7 +62,13 @@ def is_annotation(payload: object) -> bool:
 
 
 def shapes_in(payload: object, width: int, height: int) -> tuple[Shape, ...]:
-    """Return the shapes in a decoded message for an image of this size; invalid shapes are skipped."""
+    """Return the shapes in a decoded message; invalid shapes are skipped.
+
+    Args:
+        payload: Decoded message.
+        width: Width of the image in pixels.
+        height: Height of the image in pixels.
+    """
     if not isinstance(payload, Mapping) or width <= 0 or height <= 0:
         return ()
     frame = _Frame(width, height)
@@ -68,7 +76,7 @@ def shapes_in(payload: object, width: int, height: int) -> tuple[Shape, ...]:
 
 
 class _Frame:
-    """Converter from pixels to fractions, which also limits the total number of points."""
+    """Conversion from pixels to fractions of the image, with a limit on the total number of points."""
 
     def __init__(self, width: float, height: float) -> None:
         self.width, self.height = width, height

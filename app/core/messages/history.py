@@ -1,4 +1,4 @@
-"""Recent messages of one topic, limited in number and bytes; evicted ones are counted."""
+"""Recent messages of one topic, limited in number and bytes. Evicted messages are counted."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ MAX_MESSAGES = 2000
 
 
 class MessageHistory:
-    """Recent messages, numbered from 0, oldest first. The number of a message never changes.
+    """Recent messages of one topic, oldest first. Messages are numbered from 0; numbers never change.
 
-    The newest message is stored whatever its size. Messages are stored encoded, as copies that no publisher
-    can modify.
+    The newest message is stored regardless of its size. Messages are stored encoded, as copies that no
+    publisher can modify.
     """
 
     def __init__(self, most_bytes: int = MAX_BYTES, most_messages: int = MAX_MESSAGES) -> None:
@@ -42,7 +42,7 @@ class MessageHistory:
         return self.first + len(self._kept)
 
     def at(self, number: int) -> Message | None:
-        """Return a copy of the message with this number for display; None if it is not stored."""
+        """Return a copy of the message with this number; None if the message is not stored."""
         if not self.first <= number < self.end:
             return None
         return copy(self._kept[number - self.first])
@@ -52,7 +52,7 @@ class MessageHistory:
         return min(max(number, self.first), self.end - 1)
 
     def add(self, message: Message) -> None:
-        """Append a message; evict the oldest ones beyond the limits."""
+        """Append a message; evict the oldest messages beyond the limits."""
         message.latency_s  # noqa: B018  caches the latency at arrival
         kept = copy(message)
         kept.decoded = UNDECODED
@@ -67,12 +67,12 @@ class MessageHistory:
             self.first += 1
 
     def process(self, batch: Batch, _now_ns: int) -> None:
-        """Append the messages of a tick (see `SeriesTaker`)."""
+        """Append the messages received since the last tick. Implements `SeriesReceiver`."""
         self.missed += batch.dropped
         for message in batch.messages:
             self.add(message)
 
     def rewind(self) -> None:
-        """Remove all messages, because the source jumped to another time."""
+        """Remove all messages. Called when the source seeks to another time."""
         self._kept.clear()
         self.size_bytes = self.first = self.missed = 0

@@ -1,7 +1,7 @@
 """Image streams: one thread decodes the newest image of each visible topic.
 
-Older pending images are never decoded, so that under overload an image is late by one decoding and not by a
-queue. Images are decoded no larger than they are shown (`ImageStream.want`).
+Older pending images are skipped, so that the delay under overload is one decoding at most. Images are
+decoded no larger than they are displayed (`ImageStream.set_size`).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ RATE_DELAY_S = 0.25
 
 
 class Rate:
-    """Image rate by arrival time over the last two seconds.
+    """Image rate over the last two seconds, by arrival time.
 
-    The window ends slightly before the current time, so that images that arrived but are not painted yet are
-    not counted: the rates of arriving and shown images then refer to the same images.
+    The interval ends slightly before the current time, so that images that arrived but are not painted
+    yet are not counted: the rates of arriving and painted images then refer to the same images.
     """
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class Rate:
         self._times.append(arrived_s)
 
     def per_second(self, now: float) -> float | None:
-        """Return the rate in images per second; None with fewer than two images in the window."""
+        """Return the rate in images per second; None if fewer than two images arrived in the interval."""
         end = now - RATE_DELAY_S
         while self._times and self._times[0] <= end - RATE_WINDOW_S:
             self._times.popleft()
@@ -49,11 +49,13 @@ class Rate:
 
 @dataclass(eq=False)
 class ImageStream:
-    """Images of one topic for one panel. Unknown values are None.
+    """Images of one topic for one panel.
 
     Attributes:
+        picture: Newest decoded image; None before the first image.
+        error: Reason why the newest message can't be decoded, or None.
         held: True if the image is frozen; arriving images are counted but not decoded.
-        awaits_picture: True from opening or `rest` until the next image arrives.
+        is_awaiting_picture: True from opening or `suspend` until the next image arrives.
     """
 
     topic: str
@@ -64,38 +66,41 @@ class ImageStream:
     is_frozen: bool = False
     is_awaiting_picture: bool = True
     requested_size: Size | None = None
-    """Requested size. This and the next three attributes are used by `Images` under its lock."""
+    """Requested size in screen pixels; None for full resolution.
+
+    This and the next three attributes are used by `Images` under its lock.
+    """
     look: PictureLook = PLAIN
     """Requested display style."""
     pending: tuple[Message, float] | None = None
-    """Newest message that is not decoded yet, and its arrival time."""
+    """Newest message that is not decoded yet, and its arrival time (monotonic seconds)."""
     arrival_rate: Rate = field(default_factory=Rate)
     """Rate of arriving images."""
     _display_rate: Rate = field(default_factory=Rate)
     silence_start_s: float = 0.0
-    """Time from which the silence of the topic is measured. Used by `Images`."""
+    """Time from which the silence of the topic is measured (monotonic seconds). Used by `Images`."""
     _is_suspended: bool = False
     is_closed: bool = False
 
     @property
     def is_suspended(self) -> bool:
-        """True if the stream is suspended because it can't be seen."""
+        """True if the stream is suspended because its panel isn't visible."""
         return self._is_suspended
 
     @property
     def arriving_hz(self) -> float | None:
-        """Rate of arriving images per second."""
+        """Number of images that arrive per second; None if unknown."""
         with self._images.lock:
             return self.arrival_rate.per_second(self._images.clock())
 
     @property
     def displayed_hz(self) -> float | None:
-        """Rate of painted images per second."""
+        """Number of images that are painted per second; None if unknown."""
         return self._display_rate.per_second(self._images.clock())
 
     @property
     def silent_s(self) -> float | None:
-        """Seconds without an image while the stream was not suspended; None before the first image."""
+        """Seconds since the last image, not counting time while suspended; None before the first image."""
         picture = self.picture
         if picture is None:
             return None
@@ -108,39 +113,46 @@ class ImageStream:
 
     @property
     def stamp_age_s(self) -> float | None:
-        """Seconds since the image's own time stamp; None without one."""
+        """Seconds since the time stamp of the current image; None if the image has no time stamp."""
         stamp_ns = self.picture.stamp_ns if self.picture is not None else None
         return None if stamp_ns is None else (self._images.now_ns() - stamp_ns) / 1e9
 
     def set_size(self, size: Size | None) -> None:
         """Set the displayed size in screen pixels; None for full resolution.
 
-        The current image is decoded again if it was decoded at a smaller size.
+        If the current image was decoded at a smaller size, it is decoded again.
         """
         self._images.set_size(self, size)
 
     def set_look(self, look: PictureLook) -> None:
-        """Set the display style; the current image is decoded again, even while it is frozen."""
+        """Set the display style, and decode the current image again, even while it is frozen."""
         self._images.set_look(self, look)
 
     def set_frozen(self, held: bool) -> None:
-        """Freeze the current image, or resume showing the newest one."""
+        """Freeze the current image, or show the newest image again.
+
+        Args:
+            held: True to freeze the image.
+        """
         self._images.set_frozen(self, held)
 
     def count_painted(self) -> None:
-        """Count that the panel painted `picture`; call it once for each image."""
+        """Count a painted image for `displayed_hz`. The panel calls this once for each image."""
         if self.picture is not None:
             self._display_rate.add(self.picture.received_s)
 
     def suspend(self) -> None:
-        """Suspend the stream: nothing is received or decoded until `wake`; the last image remains."""
+        """Suspend the stream: no images are received or decoded until `resume`.
+
+        The last image remains visible.
+        """
         if not self._is_suspended:
             self._is_suspended = self.is_awaiting_picture = True
             self._images.unregister(self)
             self._watch.suspend()
 
     def resume(self) -> None:
-        """Resume after a `rest`."""
+        """Resume the stream after `suspend`."""
         if self._is_suspended and not self.is_closed:
             self._is_suspended = False
             self.silence_start_s = self._images.clock()
@@ -155,7 +167,7 @@ class ImageStream:
 
 
 class Images:
-    """All open streams, and the thread that decodes their images."""
+    """Open image streams, and the thread that decodes their images."""
 
     def __init__(
         self, watch: Callable[[str], WatchHandle], clock: Callable[[], float] = time.monotonic
@@ -187,7 +199,10 @@ class Images:
                 self._thread = self._start_decoding()
 
     def restart_silence(self) -> None:
-        """Restart the measurement of silence, because no images can arrive (the replay is paused)."""
+        """Restart the measurement of silence.
+
+        Called while a replay is paused, because no images can arrive then.
+        """
         now = self.clock()
         with self.lock:
             for streams in self._streams.values():
@@ -195,9 +210,11 @@ class Images:
                     stream.silence_start_s = now
 
     def offer(self, messages: Sequence[Message], key: str = "") -> None:
-        """Store the newest message of each visible topic. Called in nep's thread.
+        """Store the newest message of each visible topic for decoding. Called in nep's receiving thread.
 
-        ``key`` is the key of the topic among those of all networks, if it differs from the name.
+        Args:
+            messages: Received messages of one network.
+            key: Key of the topic among all networks; default: the name of the topic.
         """
         if not self._streams:
             return
@@ -211,7 +228,10 @@ class Images:
             self._arrived.notify()
 
     def rewind(self, topics: Collection[str] = ()) -> None:
-        """Discard all images except those of these topics, because the source jumped to another time."""
+        """Discard all images except images of the given topics.
+
+        Called when the source seeks to another time.
+        """
         with self.lock:
             self._times += 1
             for topic, streams in self._streams.items():
@@ -236,7 +256,7 @@ class Images:
                 self._streams.pop(stream.topic, None)
 
     def set_size(self, stream: ImageStream, size: Size | None) -> None:
-        """Set a stream's displayed size; see `ImageStream.want`."""
+        """Set a stream's displayed size; see `ImageStream.set_size`."""
         with self.lock:
             if stream.requested_size == size:
                 return
@@ -254,7 +274,7 @@ class Images:
                 self._arrived.notify()
 
     def set_look(self, stream: ImageStream, look: PictureLook) -> None:
-        """Set a stream's style; see `ImageStream.show_as`."""
+        """Set a stream's style; see `ImageStream.set_look`."""
         with self.lock:
             if stream.look == look:
                 return
@@ -265,7 +285,7 @@ class Images:
                 self._arrived.notify()
 
     def set_frozen(self, stream: ImageStream, held: bool) -> None:
-        """Hold or release a stream; see `ImageStream.hold`."""
+        """Freeze a stream or show its newest image again; see `ImageStream.set_frozen`."""
         with self.lock:
             stream.is_frozen = held
             if held:
@@ -280,7 +300,7 @@ class Images:
             self._thread.join(timeout=2)
 
     def _start_decoding(self) -> threading.Thread | None:
-        # Overridden in tests to return None: they call `decode_waiting`.
+        # Overridden in tests to return None: they call `decode_pending`.
         thread = threading.Thread(target=self._decode_all, name="studio-images", daemon=True)
         thread.start()
         return thread
@@ -295,7 +315,7 @@ class Images:
             self.decode_pending()
 
     def decode_pending(self) -> None:
-        """Decode the newest pending image of each stream. Called by the decoding thread."""
+        """Decode the newest pending image of each stream. Called in the decoding thread."""
         with self.lock:
             work, times = self._take_pending(), self._times
         for streams, message, arrived_s, size, look in work:

@@ -1,8 +1,8 @@
-"""Large JSON, decoded only where it is opened.
+"""Large JSON texts that are decoded only where a value is accessed.
 
-A text of 10 MB is scanned once for brackets, commas and colons (with numpy, which releases the GIL). Objects
-and arrays then are `LazyObject` and `LazyList`, whose values are decoded at each access. Decoding everything
-at once would block all threads of the program for a tenth of a second.
+A text of 10 MB is scanned once for brackets, commas and colons (with numpy, which releases the GIL).
+Objects and arrays are then represented by `LazyObject` and `LazyList`, whose values are decoded at each
+access. Decoding the whole text at once would block all threads of the program for a tenth of a second.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ WHITESPACE = b" \t\r\n"
 
 
 class Unreadable:
-    """Value whose text is not valid JSON."""
+    """Placeholder for a value whose text is not valid JSON."""
 
     def __init__(self, text: bytes) -> None:
         self.text = text
@@ -77,11 +77,19 @@ class JsonIndex:
 
     @cached_property
     def root(self) -> object:
-        """Value of the whole text."""
+        """Top-level value of the text."""
         return self.value(0, len(self.data), 0)
 
     def value(self, start: int, end: int, level: int) -> object:
-        """Return the value between two positions, decoded; a lazy one for an object or array."""
+        """Return the value between two positions of the text.
+
+        Objects and arrays are returned as `LazyObject` and `LazyList`, invalid JSON as `Unreadable`.
+
+        Args:
+            start: Position of the first character.
+            end: Position after the last character.
+            level: Nesting level of the value.
+        """
         while start < end and self.data[start] in WHITESPACE:
             start += 1
         first = self.data[start] if start < end else 0
@@ -95,7 +103,7 @@ class JsonIndex:
         return found
 
     def _container(self, start: int, level: int, first: int) -> _Lazy:
-        # Cached, so that it is the same object each time, up to `KEPT` containers.
+        # Cached, so that it is the same object each time, up to `MAX_CACHED_CONTAINERS` containers.
         found = self._kept.get(start)
         if found is None:
             found = (LazyObject if first == OPEN[0] else LazyList)(self, start, level)
@@ -104,7 +112,12 @@ class JsonIndex:
         return found
 
     def separators(self, start: int, level: int) -> tuple[int, Positions, Positions]:
-        """Return end, comma positions and colon positions of the container that starts at ``start``."""
+        """Return the end, the comma positions and the colon positions of an object or array.
+
+        Args:
+            start: Position of the opening bracket.
+            level: Nesting level of the object or array.
+        """
         import numpy as np  # noqa: PLC0415
 
         if start in self._many:
@@ -120,7 +133,7 @@ class JsonIndex:
         return found
 
     def path_to(self, place: int) -> tuple[str | int, ...]:
-        """Return the keys that lead to the value at a position of the text."""
+        """Return the keys and indices that lead to the value at a position of the text."""
         path: list[str | int] = []
         here = self.root
         while isinstance(here, _Lazy):
@@ -133,7 +146,7 @@ class JsonIndex:
 
 
 class _Lazy:
-    """Base of lazy objects and arrays: the positions of their elements."""
+    """Base class of lazy objects and arrays, with the positions of their elements."""
 
     def __init__(self, index: JsonIndex, start: int, level: int) -> None:
         self._index, self._start, self._level = index, start, level
@@ -189,7 +202,7 @@ class _Lazy:
 
 
 class LazyList(_Lazy, Sequence[object]):
-    """Array whose elements are decoded at each access."""
+    """JSON array whose elements are decoded at each access."""
 
     def __len__(self) -> int:
         return self._count
@@ -210,7 +223,7 @@ class LazyList(_Lazy, Sequence[object]):
 
 
 class LazyObject(_Lazy, Mapping[str, object]):
-    """Object whose values are decoded at each access. The last of duplicate keys is used."""
+    """JSON object whose values are decoded at each access. For duplicate keys, the last value is used."""
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -222,7 +235,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
         return self.value_at(self._rows[key])
 
     def key_at(self, row: int) -> str:
-        """Return the key of the element at an index."""
+        """Return the key of the entry at an index."""
         start, _end = self._bounds(row)
         text = bytes(self._index.data[start : self._colon(row)])
         try:
@@ -231,7 +244,7 @@ class LazyObject(_Lazy, Mapping[str, object]):
             return text.decode("utf-8", "replace").strip()
 
     def value_at(self, row: int) -> object:
-        """Return the value of the element at an index."""
+        """Return the value of the entry at an index."""
         _start, end = self._bounds(row)
         colon = self._colon(row)
         if colon == end:

@@ -1,4 +1,4 @@
-"""Background thread that processes only the newest job."""
+"""Background thread that processes the newest job and discards older pending ones."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ Result = TypeVar("Result")
 
 
 class NewestOnly(Generic[Job, Result]):
-    """Thread that is started by the first job; a newer job replaces a pending one. Thread-safe."""
+    """Background thread that processes one job at a time. A newer job replaces a pending one. Thread-safe.
+
+    The first job starts the thread.
+    """
 
     def __init__(self, work: Callable[[Job], Result], name: str) -> None:
         # `work` is called in the thread and must not raise.
@@ -45,7 +48,7 @@ class NewestOnly(Generic[Job, Result]):
         return done[0] if done else None
 
     def clear(self) -> None:
-        """Discard pending and finished jobs, and the result of a running one."""
+        """Discard the pending job, the finished result, and the result of a running job."""
         with self._wake:
             self._waiting, self._working, self._done = [], [], []
 

@@ -1,6 +1,6 @@
-"""Arrays of objects as tables: search in a message, columns, sorting, and CSV.
+"""Arrays of objects as tables: search in a message, columns, sorting, and CSV export.
 
-Rows are decoded on demand, so that a large message is not decoded completely.
+Rows are decoded on demand, so that a large message is never decoded as a whole.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ Steps: TypeAlias = tuple[str | int, ...]
 MAX_ROWS = 2000
 MAX_COLUMNS = 40
 MAX_ROWS_CHECKED = 50
-"""Number of rows in which columns are searched."""
+"""Number of rows that are searched for columns."""
 MAX_LISTS = 20
 _MAX_SEARCHED_VALUES = 2000
-"""Maximum number of values in a message that are searched for arrays of objects."""
+"""Maximum number of values of a message that are searched for arrays of objects."""
 _MAX_FLATTENED_KEYS = 8
-"""Maximum number of keys of a nested object for which each key becomes a column."""
+"""Maximum number of keys in a nested object whose keys become separate columns."""
 MISSING = object()
 
 
@@ -66,9 +66,9 @@ def is_list_of_objects(value: object) -> bool:
 
 
 def lists_of_objects(value: object, most: int = MAX_LISTS) -> list[Steps]:
-    """Return the paths to arrays of objects in a message, upper levels first.
+    """Return the paths of the arrays of objects in a message, outermost first.
 
-    ``()`` is the message itself.
+    The path ``()`` is the message itself. At most ``most`` paths are returned.
     """
     found: list[Steps] = []
     waiting: deque[tuple[Steps, object]] = deque([((), value)])
@@ -110,9 +110,13 @@ def rows_of(value: object, most: int = MAX_ROWS) -> list[ObjectRow]:
 
 
 def rows_found(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> list[ObjectRow]:
-    """Return the objects in a query result as rows, named by path.
+    """Return the objects in a query result as rows, named by their paths.
 
-    A single array of objects gives its elements.
+    If the result is a single array of objects, the rows are its elements.
+
+    Args:
+        found: Pairs of path and value.
+        most: Maximum number of rows.
     """
     pairs = list(found)
     if len(pairs) == 1 and is_list_of_objects(pairs[0][1]):
@@ -126,7 +130,7 @@ def rows_found(found: Iterable[tuple[str, object]], most: int = MAX_ROWS) -> lis
 
 
 def columns_of(rows: Sequence[ObjectRow], most: int = MAX_COLUMNS) -> tuple[Steps, ...]:
-    """Return the keys of the first rows in order.
+    """Return the columns for some rows: the keys of the first rows, in order of appearance.
 
     The keys of small nested objects become separate columns.
     """
@@ -149,7 +153,7 @@ def column_name(column: Steps) -> str:
 
 
 def sort_key(value: object) -> tuple[int, float, str] | None:
-    """Return the sort key of a value of any type; None for values that can't be ordered, such as NaN.
+    """Return the sort key of a value; None for a value that can't be ordered, such as NaN.
 
     Numbers and booleans come first, then strings, then objects and arrays by length.
     """
@@ -180,7 +184,13 @@ def cell_text(value: object) -> str:
 
 
 def table_csv(first: str, columns: Sequence[Steps], rows: Iterable[ObjectRow]) -> str:
-    """Return the table as CSV; ``first`` is the title of the column with the row names."""
+    """Return a table as CSV.
+
+    Args:
+        first: Title of the column with the row names.
+        columns: Further columns.
+        rows: Rows in order.
+    """
     head = [first, *(escape_formula(column_name(column)) for column in columns)]
     lines = ([escape_formula(row.name), *(cell_text(row.at(column)) for column in columns)] for row in rows)
     return csv_text([head, *lines])

@@ -1,4 +1,4 @@
-"""Decoded images; messages are decoded to images no larger than they are shown."""
+"""Decoded images. Messages are decoded to images no larger than they are displayed."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ REDUCTION_FACTORS = (8, 4, 2)
 PNG_DTYPES = ("uint8", "uint16")
 COMPARED_SAMPLES = 4096
 AVERAGED_DTYPES = ("uint8", "uint16")
-"""Types that are reduced in size by averaging. Other types may contain NaN and are reduced by taking every
-nth pixel.
+"""Data types that are downscaled by averaging.
+
+Other types may contain NaN and are downscaled by taking every nth pixel.
 """
 
 
@@ -39,8 +40,8 @@ class Picture:
     """Decoded image of ``width`` x ``height`` pixels.
 
     Attributes:
-        bgra: Contiguous uint8 array (rows, columns, 4) in the layout of QImage.Format_RGB32. Smaller than the
-            image if decoded for a small view; then `whole` is False.
+        bgra: Contiguous uint8 array (rows, columns, 4) in the layout of QImage.Format_RGB32. Has fewer
+            rows and columns than the image if the image was decoded for a small view.
         numbers: Values of an image with one channel (grey, depth), else None.
         message: Message that was decoded.
     """
@@ -56,7 +57,7 @@ class Picture:
     look: PictureLook = PLAIN
     """Display style with which the image was decoded."""
     scale: ColourScale | None = None
-    """Colour scale, if the colours represent numbers."""
+    """Colour scale of an image that shows numbers as colours, else None."""
     has_one_channel: bool = False
     """True if the image has one channel, even if `numbers` is None."""
 
@@ -66,7 +67,10 @@ class Picture:
         return self.bgra.shape[:2] == (self.height, self.width)
 
     def pixel(self, x: int, y: int) -> Pixel | None:
-        """Return red, green and blue, or the number of an image with one channel; None if it is unknown."""
+        """Return the value of a pixel: (red, green, blue), or a number for an image with one channel.
+
+        Returns None outside the image, or if the image was not decoded in full resolution.
+        """
         if not (self.is_full_resolution and 0 <= x < self.width and 0 <= y < self.height):
             return None
         if self.numbers is not None:
@@ -79,13 +83,17 @@ class Picture:
 def decode(
     message: Message, received_s: float, fit: Size | None = None, look: PictureLook = PLAIN
 ) -> tuple[Picture | None, str | None]:
-    """Decode a message to an image; return the image and None, or None and an error message.
+    """Decode a message to an image.
 
     Args:
-        received_s: Arrival time of the message.
-        fit: Displayed width and height in screen pixels. An image at least twice as large is decoded at a
-            reduced size. None means full resolution.
+        message: Message with an image.
+        received_s: Arrival time of the message (monotonic seconds).
+        fit: Displayed width and height in screen pixels. An image at least twice as large is decoded at
+            a reduced size. None means full resolution.
         look: Display style.
+
+    Returns:
+        The image and None, or None and an error message.
     """
     import cv2  # noqa: PLC0415  150 MB: loaded with the first image, not at the start
 
@@ -115,10 +123,9 @@ def decode(
 def reuse_picture(
     shown: Picture | None, message: Message, received_s: float, fit: Size | None, look: PictureLook = PLAIN
 ) -> Picture | None:
-    """Return the shown image with the data of a new message, if both messages have equal bytes.
+    """Return the shown image for a new message without decoding, if both messages contain equal bytes.
 
-    Avoids decoding. Returns None if the bytes differ, or if another size or style is requested (see
-    `decode`).
+    Returns None if the bytes differ, or if another size or style is requested (see `decode`).
     """
     if shown is None or shown.message is None or shown.message is message or shown.look != look:
         return None
@@ -148,9 +155,10 @@ def _short_message(error: BaseException) -> str:
 
 
 def png_of(message: Message) -> bytes:
-    """Return the image in full resolution as a PNG file. Raises NepError, or OSError if encoding fails.
+    """Return the image of a message in full resolution as the content of a PNG file.
 
-    A message that already is a PNG is returned unchanged, except for trailing data.
+    A message in PNG format is returned unchanged, without trailing data. Raises NepError if the message
+    is not an image, OSError if encoding fails.
     """
     import cv2  # noqa: PLC0415  slow import
 

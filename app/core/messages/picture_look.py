@@ -1,4 +1,4 @@
-"""Display style of images: brightness, contrast, and colour map for numbers."""
+"""Display style of images: brightness, contrast, and the colour map for numbers."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class PictureLook:
     high: float | None = None
 
     def to_json(self) -> dict[str, object]:
-        """Return the style as JSON data for a layout; `restored` parses it."""
+        """Return the style as JSON data for a layout; `parse_look` parses it."""
         return {
             "brightness": self.brightness,
             "contrast": self.contrast,
@@ -52,7 +52,7 @@ PLAIN = PictureLook()
 
 
 def parse_look(saved: object) -> PictureLook:
-    """Parse the result of `PictureLook.saved`; invalid values become defaults."""
+    """Parse the result of `PictureLook.to_json`; invalid values become defaults."""
     if not isinstance(saved, Mapping):
         return PLAIN
     found = {name: _number(saved.get(name)) for name in ("brightness", "contrast", "low", "high")}
@@ -92,7 +92,7 @@ class ColourScale:
 
 
 def apply_tones(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Apply brightness and contrast to 8-bit values."""
+    """Return 8-bit values with the brightness and the contrast of a display style applied."""
     if (look.brightness, look.contrast) == (0.0, 1.0):
         return picture
     import cv2  # noqa: PLC0415  slow import
@@ -102,9 +102,14 @@ def apply_tones(look: PictureLook, picture: NDArray[np.uint8]) -> NDArray[np.uin
 
 
 def apply_colour_map(look: PictureLook, numbers: NDArray[Any]) -> tuple[NDArray[np.uint8], ColourScale]:
-    """Apply the colour map to an image with one channel (rows, columns).
+    """Apply the colour map to an image with one channel.
 
-    Returns an array of blue, green, red and 255 for each pixel, black for NaN, and the colour scale.
+    Args:
+        look: Display style.
+        numbers: Array (rows, columns).
+
+    Returns:
+        Array (rows, columns, 4) of blue, green, red and 255, black for NaN; and the colour scale.
     """
     import cv2  # noqa: PLC0415
     import numpy as np  # noqa: PLC0415
@@ -136,9 +141,13 @@ def _value_range(look: PictureLook, values: NDArray[Any], *, is_bytes: bool) -> 
 
 
 def scaled(frame: NDArray[Any], known: NDArray[np.bool_], low: float, high: float) -> NDArray[np.uint8]:
-    """Scale values linearly to 0 (``low`` and below) ... 255 (``high`` and above).
+    """Scale values linearly to the range 0 (``low`` and below) to 255 (``high`` and above).
 
-    0 where ``known`` is False.
+    Args:
+        frame: Values.
+        known: False where a value is invalid; the result is 0 there.
+        low: Value that becomes 0.
+        high: Value that becomes 255.
     """
     import numpy as np  # noqa: PLC0415
 

@@ -1,7 +1,7 @@
 """JSONPath queries (RFC 9535) on decoded messages, with bounded run time.
 
-Each visited value is counted, so that an expensive query (``$..*..*..*``) stops and returns the values found
-so far. Regular expressions are disabled, because their run time can't be bounded.
+Every visited value is counted, so that an expensive query (``$..*..*..*``) stops and returns the values
+found up to then. Regular expressions are disabled, because their run time can't be bounded.
 """
 
 from __future__ import annotations
@@ -31,7 +31,11 @@ Steps = tuple[str | int, ...]
 
 
 class FoundPath(str):
-    """Path of a found value as text; ``steps`` are the keys and indices from the message to the value."""
+    """Path of a value as text.
+
+    Attributes:
+        steps: Keys and indices that lead from the message to the value.
+    """
 
     __slots__ = ("steps",)
     steps: Steps
@@ -46,14 +50,19 @@ class FoundPath(str):
 
 @dataclass(frozen=True, slots=True)
 class QueryResult:
-    """Result of a query: values by path. ``cut`` is the reason why the result is incomplete, or ""."""
+    """Result of a query.
+
+    Attributes:
+        found: Found values, by path.
+        cut: Reason why the result is incomplete, or "".
+    """
 
     found: Mapping[FoundPath, object]
     cut: str = ""
 
 
 class JsonQuery:
-    """Parsed query. Can be used from any thread, but for one message at a time."""
+    """Parsed query. Usable in any thread, but not in several threads at the same time."""
 
     def __init__(self, text: str) -> None:
         # Raises `QueryError` with the reason and its position.
@@ -72,9 +81,10 @@ class JsonQuery:
     def evaluate(
         self, value: object, most_steps: int = MAX_STEPS, most_found: int = MAX_RESULTS
     ) -> QueryResult:
-        """Return the values found in a decoded message.
+        """Run the query on a decoded message.
 
         Args:
+            value: Decoded message.
             most_steps: Maximum number of visited values.
             most_found: Maximum number of returned values.
         """
@@ -154,7 +164,7 @@ def _are_equal(one: object, other: object) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Bytes:
-    """Wrapper of bytes from msgpack, which count as one value and not as an array."""
+    """Wrapper of msgpack bytes, so that they count as one value and not as an array."""
 
     raw: object
 

@@ -1,4 +1,4 @@
-"""Reading of messages for display: small ones immediately, large ones in a background thread."""
+"""Decoding of messages for display: small ones immediately, large ones in a background thread."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 LARGE_BYTES = 1_000_000
-"""Size above which JSON is indexed instead of decoded, and messages are read in a background thread."""
+"""Message size in bytes above which JSON is indexed instead of decoded, in a background thread."""
 READ_INTERVAL_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reading:
-    """Result of reading a message: the ``value``, or an error message.
+    """Result of reading a message.
 
-    ``index`` belongs to a large JSON text; None for other messages.
+    Attributes:
+        message: Message that was read.
+        value: Decoded value.
+        error: Error message, or None.
+        index: Index of a large JSON text; None for other messages.
     """
 
     message: Message
@@ -45,7 +49,7 @@ def read(message: Message) -> Reading:
 
 
 class Reader(NewestOnly[Message, Reading]):
-    """Background thread that reads the messages of one panel; started by the first message."""
+    """Background thread that reads the messages of one panel. The first message starts the thread."""
 
     def __init__(self) -> None:
         super().__init__(self._read, "studio-reader")
@@ -56,10 +60,16 @@ class Reader(NewestOnly[Message, Reading]):
         return read(message)
 
     def submit_throttled(self, message: Message, now: float) -> bool:
-        """Read a message unless another one is being read or a read started less than a second ago.
+        """Read a message, unless a read is running or the last read started less than a second ago.
 
-        Limits the load by large messages. ``now`` is monotonic seconds. Returns True if the message will be
-        read.
+        Limits the CPU load of large messages.
+
+        Args:
+            message: Message to read.
+            now: Monotonic seconds.
+
+        Returns:
+            True if the message will be read.
         """
         if self.is_busy or (self._asked_at is not None and now - self._asked_at < READ_INTERVAL_S):
             return False

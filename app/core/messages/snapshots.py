@@ -21,9 +21,10 @@ FOLDER_SETTING = "pictures_folder"
 
 
 def folder(settings: Settings | None = None) -> Path:
-    """Return the folder of snapshots: the chosen one, or ``NEP Studio`` in the system's picture folder.
+    """Return the folder for snapshots.
 
-    If ``$NEP_STUDIO_HOME`` is set, the default is ``Pictures`` in that folder.
+    This is the folder chosen in the settings. The default is ``NEP Studio`` in the system's picture
+    folder, or ``Pictures`` in ``$NEP_STUDIO_HOME`` if that is set.
     """
     chosen = settings.get(FOLDER_SETTING, "") if settings is not None else ""
     if chosen:
@@ -36,8 +37,12 @@ def folder(settings: Settings | None = None) -> Path:
 def save(message: Message, into: Path | None = None) -> Path:
     """Save the image of a message to a new file, named by topic and time; return its path.
 
-    Never overwrites a file. Raises NepError if the message is not an image, OSError if the file can't be
-    written.
+    Never overwrites a file. Raises NepError if the message is not an image, OSError if the file can't
+    be written.
+
+    Args:
+        message: Message with an image.
+        into: Folder; default: `folder`.
     """
     data = png_of(message)
     place = into if into is not None else folder()
@@ -60,7 +65,10 @@ def save(message: Message, into: Path | None = None) -> Path:
 
 
 def file_stem(message: Message) -> str:
-    """Return a file stem valid on every system, such as ``Pepper camera 2026-11-20 12.48.20.123``."""
+    """Return a file name without extension, such as ``Pepper camera 2026-11-20 12.48.20.123``.
+
+    The name is valid on every operating system.
+    """
     stamp_ns = message.stamp_ns if message.stamp_ns is not None else time.time_ns()
     when = time.strftime("%Y-%m-%d %H.%M.%S", time.localtime(stamp_ns // 1_000_000_000))
     topic = re.sub(r"[^\w\-]+", " ", message.topic).strip()[:80] or "picture"

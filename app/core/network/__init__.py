@@ -1,4 +1,5 @@
-"""Live network of the window: threads receive messages and pass them on through the mailbox.
+"""Live network of the window: threads receive messages and pass them to the window through the mailbox.
 
-Contains topics, nodes, watches and their statistics, the master, and remote access to it.
+The package contains topics, nodes, watches and their statistics, the master, and remote access to the
+master.
 """

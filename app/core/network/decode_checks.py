@@ -1,8 +1,8 @@
 """Check in the receiving thread whether messages can be decoded.
 
-Every message of a watched topic is decoded as long as that takes at most 7 % of the time; up to 1 s of unused
-time is saved for bursts. Half of the time is reserved for topics with earlier errors, so that their error
-count is exact. Messages beyond these limits are counted as unchecked.
+Every message of a watched topic is decoded while that takes at most 7 % of the time; up to 1 s of
+unused time is saved for bursts. Half of the time is reserved for topics with earlier errors, so that
+their errors are counted exactly. Messages beyond these limits are counted as unchecked.
 """
 
 from __future__ import annotations
@@ -22,20 +22,23 @@ MAX_BUDGET_S = 1.0
 RESERVE_S = 0.5
 SUSPECT_S = 30.0
 CLOCK_READ_INTERVAL_S = 0.0002
-"""Minimum decoding time between two readings of the clock, which take as long as decoding a small message."""
+"""Minimum decoding time in seconds between two readings of the clock.
+
+Reading the clock takes as long as decoding a small message.
+"""
 SOME, SOME_BYTES = 256, 64_000
 
 
 @dataclass(slots=True)
 class CheckResult:
-    """Result of one topic since the last `Checks.pop_results`.
+    """Result of the checks of one topic since the last call of `Checks.pop_results`.
 
     Attributes:
         checked: Number of checked messages.
         bad: Number of checked messages that can't be decoded.
         unchecked: Number of messages that were not checked for lack of time.
-        sentence: Description of the newest error.
-        last_good: True if the newest message can be decoded.
+        error: Description of the newest error, or "".
+        is_last_good: True if the newest message can be decoded.
     """
 
     checked: int = 0
@@ -46,7 +49,7 @@ class CheckResult:
 
 
 class Checks:
-    """Checks received messages. `check` runs in the source's thread, `pop_results` in the window's."""
+    """Check of received messages. `check` runs in the receiving thread, `pop_results` in the main thread."""
 
     def __init__(
         self,

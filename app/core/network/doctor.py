@@ -1,4 +1,4 @@
-"""Connection doctor of the window, which runs the checks in a thread and stores the findings."""
+"""Connection doctor of the window: runs the checks in a thread and stores the findings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ JOIN_TIMEOUT_S = 4.0
 
 
 class Doctor:
-    """Runs the connection checks in a background thread. Not thread-safe: use it from the window's thread."""
+    """Connection checks that run in a background thread. Not thread-safe; use it from the main thread."""
 
     def __init__(
         self,
@@ -51,26 +51,26 @@ class Doctor:
 
     @property
     def partial_findings(self) -> Sequence[doctor.Finding] | None:
-        """Findings of the current run so far, worst first; None when it isn't running."""
+        """Findings of the current run up to now, worst first; None if no run is in progress."""
         return self._so_far
 
     @property
     def finished_s(self) -> float | None:
-        """Time of the last completed run in seconds since 1970; None before the first."""
+        """Time of the last completed run in seconds since 1970; None before the first run."""
         return self._looked_s
 
     @property
     def expected_topic(self) -> str:
-        """Topic that the user expects messages from; "" if none was selected."""
+        """Topic on which the user misses messages; "" if none is selected."""
         return self._missed
 
     @property
     def checked_topic(self) -> str:
-        """Value of `missed` in the run that produced `findings`."""
+        """Topic on which the user missed messages in the run that produced `findings`; "" if none."""
         return self._told_of
 
     def expect_topic(self, topic: str) -> None:
-        """Set the topic that the user expects messages from ("" for none) and run the checks."""
+        """Set the topic on which the user misses messages ("" for none), and run the checks."""
         self._missed = topic
         self.start()
 
@@ -83,7 +83,11 @@ class Doctor:
         self.revision += 1
 
     def report(self, within_s: float) -> str:
-        """Return the findings as text for a report; waits for a run in progress. Thread-safe."""
+        """Return the findings as text for a report. Thread-safe.
+
+        Args:
+            within_s: Maximum time in seconds to wait for a run in progress.
+        """
         thread = self._thread
         if thread is not None:
             thread.join(within_s)
@@ -121,9 +125,13 @@ class Doctor:
 
 
 def doctor_of(address: str, folder: Path) -> Doctor:
-    """Return a doctor for the master at this address, which also checks Studio's folder.
+    """Return a doctor for a master, which also checks Studio's folder.
 
-    A topic of another network is not checked, because the doctor knows only Studio's own network.
+    Topics of other networks are not checked, because the doctor supports only the native network.
+
+    Args:
+        address: Address of the master.
+        folder: Studio's folder.
     """
     folders = [(_("Settings and unsaved work"), folder)]
     return Doctor(lambda key, tell: doctor.diagnose(address, "" if split_key(key)[0] else key, folders, tell))

@@ -14,12 +14,19 @@ UNNAMED_PREFIX = "program "
 INTERNAL_PREFIX = "/nep/"
 MAX_LISTED_TOPICS = 2
 MAX_LINES = 8
-"""Number of changes above which one line with their count is written; a bridge can add a thousand topics."""
+"""Maximum number of lines for one comparison.
+
+If there are more changes, one line with their number is written; a bridge can add a thousand topics.
+"""
 NAMED = 3
 
 
 def change_messages(before: GraphView, after: GraphView) -> list[str]:
-    """Return sentences about new nodes with their topics, new topics of known nodes, and nodes that left."""
+    """Return sentences about the differences between two graphs.
+
+    There is one sentence for each new node with its topics, each new topic of a known node, and each
+    node that left.
+    """
     here: list[tuple[str, str]] = []
     more: list[tuple[str, str]] = []
     came = [id for id, node in after.nodes.items() if id not in before.nodes and _is_reported(node)]

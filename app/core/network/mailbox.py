@@ -1,8 +1,8 @@
 """Bounded mailbox from background threads to the window.
 
-Threads post; the window drains once per tick. Each topic has a ring buffer that holds the newest messages and
-counts dropped ones. Events (a new graph, a robot's reply, the end of a program) are rare and must not be
-lost, so their queue is long; events beyond its limit are counted.
+Threads post; the window drains the mailbox once per tick. Each topic has a ring buffer for the newest
+messages and counts dropped ones. Events (a new graph, a robot's reply, the end of a program) are rare
+and must not be lost, so their queue is long; events beyond its limit are counted.
 """
 
 from __future__ import annotations
@@ -21,7 +21,11 @@ MAX_EVENTS = 20_000
 
 @dataclass(slots=True)
 class Batch:
-    """Newest messages of one topic since the last drain; ``dropped`` counts older ones."""
+    """Newest messages of one topic since the last drain.
+
+    Attributes:
+        dropped: Number of older messages that were dropped.
+    """
 
     messages: list[Message] = field(default_factory=list)
     dropped: int = 0
@@ -34,7 +38,13 @@ class Batch:
 
 @dataclass(slots=True)
 class Drained:
-    """Result of a drain: batches by topic, events in order, and the number of lost events."""
+    """Result of a drain.
+
+    Attributes:
+        batches: New messages by topic.
+        events: New events, oldest first.
+        lost_events: Number of events that were lost because the queue was full.
+    """
 
     batches: dict[str, Batch]
     events: list[object]
@@ -69,9 +79,11 @@ class Mailbox:
         self._ring_sizes: dict[str, int] = {}
 
     def set_capacity(self, topic: str, messages: int | None) -> None:
-        """Set the ring size of a topic in messages (at least 1). The byte limit still applies.
+        """Set the capacity of a topic's ring buffer. The byte limit still applies.
 
-        None restores the default.
+        Args:
+            topic: Key of the topic.
+            messages: Maximum number of messages, at least 1; None restores the default.
         """
         with self._lock:
             if messages is None:

@@ -1,4 +1,4 @@
-"""State of the master, and starting one when none is running."""
+"""State of the connection to the master, and start of a master if none is running."""
 
 from __future__ import annotations
 
@@ -24,14 +24,17 @@ else:
     doctor = lazy_module("nep.programs.doctor")
 
 DISCOVERY_S = 1.5
-"""Time during which a newly started master may not know all nodes yet (it collects them for one second)."""
+"""Time in seconds after a master's start during which it may not know all nodes yet.
+
+A master waits one second for nodes to register again.
+"""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """Initial and maximum pause before another attempt to start a master; the pause doubles with each failure."""
 START_TIMEOUT_S = 50.0
-"""Time limit for a started master to reply while its process is alive.
+"""Time limit in seconds for a started master to reply while its process is alive.
 
-The first start after an installation, from a slow disk and with a virus scanner, takes longer than the usual
-ten seconds.
+The first start after an installation, from a slow disk and with a virus scanner, takes longer than the
+usual ten seconds.
 """
 END_TIMEOUT_S = 2.0
 
@@ -44,7 +47,7 @@ class MasterState:
 
     Attributes:
         kind: ``searching``, ``connected`` or ``none``.
-        sentence: Explanation for the user.
+        message: Explanation for the user; may be empty.
     """
 
     kind: str
@@ -53,16 +56,22 @@ class MasterState:
 
 
 class MasterChange:
-    """Detects that another master has replaced the known one.
+    """Detector of a change to another master, such as after a restart.
 
-    Not thread-safe: use it from the window's thread.
+    Not thread-safe; use it from the main thread.
     """
 
     def __init__(self) -> None:
         self._new_epoch = (0, 0.0)
 
     def is_incomplete(self, known: GraphView | None, view: GraphView, now: float) -> bool:
-        """Return True if ``view`` is of another master than ``known`` and may not contain all nodes yet."""
+        """Return True if another master has just replaced the known one and may not know all nodes yet.
+
+        Args:
+            known: Last applied graph, or None.
+            view: New graph.
+            now: Monotonic seconds.
+        """
         if known is None or view.epoch == known.epoch:
             return False
         if self._new_epoch[0] != view.epoch:
@@ -71,7 +80,10 @@ class MasterChange:
 
 
 class MasterStart:
-    """Uses the running master or starts one. Each reason for a failure is reported once."""
+    """Start of a master, unless one is running.
+
+    Consecutive failures with the same reason are reported once.
+    """
 
     def __init__(
         self,
@@ -102,7 +114,7 @@ class MasterStart:
         self._thread.start()
 
     def ensure_running(self) -> None:
-        """Call `ensure`, unless the back-off after a failure has not elapsed yet. Call it repeatedly."""
+        """Call `ensure`, unless a failed start was too recent. Call this method repeatedly."""
         if self._clock() >= self._retry_at:
             self.ensure()
 

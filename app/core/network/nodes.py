@@ -16,18 +16,18 @@ NATIVE = frozenset({"native", GATEWAY})
 
 @dataclass(slots=True, eq=False)
 class NodeEntry:
-    """One node. Unknown values are None or empty; panels leave them blank.
+    """One node of a network. Unknown values are None or empty.
 
     Attributes:
         publishes: Names of published topics, sorted and unique.
         subscribes: Names of subscribed topics and patterns, sorted and unique.
-        cpu_ratio: Share of one core that the process uses.
-        gone_s: Seconds since the node left; None while it is registered. The topics of a node that left
-            remain.
+        cpu_ratio: CPU time of the process as a share of one core.
+        gone_s: Seconds since the node left; None while the node is registered. Its topics are still
+            listed.
         network: Kind of network; "" for the native one.
         stale: True if the network can't be queried at the moment.
         has_parameters: True if the node declares parameters.
-        may_set: True if other nodes can set the parameters, which requires services.
+        can_set_parameters: True if other nodes can set the parameters, which requires services.
     """
 
     id: str
@@ -60,12 +60,12 @@ class NodeEntry:
 
     @property
     def is_bridge(self) -> bool:
-        """True if the node bridges this network with another one (see `nep.programs.bridges`)."""
+        """True if the node connects this network to another one (see `nep.programs.bridges`)."""
         return BRIDGES_TOPIC in self.publishes
 
 
 class Nodes:
-    """All nodes in the order of their first appearance. Not thread-safe: use it from the window's thread.
+    """All nodes, in order of their first appearance. Not thread-safe; use it from the main thread.
 
     The gateway's node is omitted; programs of the original NEP have separate entries.
     """
@@ -89,7 +89,11 @@ class Nodes:
         return self._nodes.get(id)
 
     def set_stale(self, stale: bool) -> None:
-        """Set ``stale`` of all nodes: True while the network can't be queried."""
+        """Set ``stale`` of all nodes.
+
+        Args:
+            stale: True while the network can't be queried.
+        """
         for node in self._nodes.values():
             if node.is_stale is not stale:
                 node.is_stale, node.cpu_ratio = stale, None
@@ -114,7 +118,10 @@ class Nodes:
         self.values_revision += 1
 
     def update_ages(self, now: float) -> None:
-        """Update the ages, and remove nodes that left more than `GONE_SHOWN_S` ago."""
+        """Update the ages at ``now`` (monotonic seconds).
+
+        Nodes that left more than `GONE_DISPLAY_S` seconds ago are removed.
+        """
         for node in list(self._nodes.values()):
             if node.gone_since is None:
                 continue

@@ -1,4 +1,4 @@
-"""Remote access: lets programs on other computers reach the master on this one."""
+"""Remote access: permission for programs on other computers to reach the master on this computer."""
 
 from __future__ import annotations
 
@@ -21,9 +21,11 @@ ALERT, NOT_KEPT = "reach", "reach:kept"
 
 @dataclass(frozen=True, slots=True)
 class RemoteAccessChanged:
-    """Reply of the master to the request to listen on ``hosts``.
+    """Event: the master has replied to the request to listen on some addresses.
 
-    ``sentence`` is the reason of a failure, or "".
+    Attributes:
+        hosts: Requested addresses.
+        message: Reason for a failure, or "".
     """
 
     hosts: tuple[str, ...]
@@ -31,9 +33,9 @@ class RemoteAccessChanged:
 
 
 class RemoteAccess:
-    """Switch for remote access. Not thread-safe: use it from the window's thread.
+    """Control of remote access. Not thread-safe; use it from the main thread.
 
-    Requests run in another thread.
+    Requests to the master run in a background thread.
     """
 
     def __init__(
@@ -56,24 +58,32 @@ class RemoteAccess:
 
     @property
     def is_local(self) -> bool:
-        """True if the master is on this computer. Only then can the addresses be changed."""
+        """True if the master runs on this computer. Otherwise its addresses can't be changed."""
         return is_loopback(self._address)
 
     @property
     def master_host(self) -> str:
-        """Host of the master."""
+        """Host name or IP address of the master."""
         return host_of(self._address)
 
     def addresses(self) -> tuple[OwnAddress, ...]:
-        """Return the addresses of this computer that others can reach."""
+        """Return the addresses of this computer that other computers can reach."""
         return self._here()
 
     def environment_variable(self, host: str) -> str:
-        """Return the environment variable that programs on other computers have to set."""
+        """Return the environment variable to set on other computers: ``NEP_MASTER=HOST:PORT``.
+
+        Args:
+            host: Address of this computer.
+        """
         return f"NEP_MASTER={host}:{self._address.rpartition(':')[2]}"
 
     def listen_on(self, hosts: Sequence[str]) -> None:
-        """Make the master listen on these addresses, or on none; saved for the next start."""
+        """Request that the master listens on these addresses, and save them for the next start.
+
+        Args:
+            hosts: Addresses of this computer; empty to allow no other computers.
+        """
         self._request(tuple(hosts))  # first, because shutting others out must not wait for a disk
         try:
             self._settings.set(SETTING_KEY, list(hosts))
@@ -96,7 +106,7 @@ class RemoteAccess:
             self._alerts.resolve(NOT_KEPT)
 
     def update_graph(self, view: GraphView) -> None:
-        """Apply a new graph. If the master is new, send the saved addresses to it."""
+        """Apply a new graph. The saved addresses are sent to a new master."""
         self.hosts = view.listens
         if view.epoch != self._epoch:
             self._epoch = view.epoch
@@ -143,7 +153,7 @@ class RemoteAccess:
 
 
 def access_status(reach: RemoteAccess) -> tuple[str, str, str | None]:
-    """Return icon, text and status that the status bar shows for remote access."""
+    """Return the icon, the text and the status that the status bar shows for remote access."""
     if reach.hosts:
         return (
             "wifi",

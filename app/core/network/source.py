@@ -25,22 +25,30 @@ from nep.protocol.graph_view import GraphView
 
 POLL_S = 0.4
 POLL_PAUSE_FACTOR = 5.0
-"""Minimum pause between queries of the graph, as a multiple of their duration (10 000 topics: 0.4 s)."""
+"""Minimum pause between two queries of the graph, as a multiple of the duration of the last query.
+
+A query takes 0.4 s for 10 000 topics.
+"""
 MAX_POLL_INTERVAL_S = 3.0
 NODE_NAME = "studio"
 
 _log = logging.getLogger("studio")
 
 Sink = Callable[[str, Sequence[Message]], None]
-"""Receives a batch of messages of one topic, oldest first, in a thread of nep."""
+"""Callback for a batch of messages of one topic, oldest first. Called in a thread of nep."""
 NodeSink = Callable[[Sequence[Message]], None]
-"""Receives a batch of messages of one subscriber."""
+"""Callback for a batch of messages of one subscriber."""
 Job = Callable[[Node], None]
 
 
 @dataclass(frozen=True, slots=True)
 class GraphReceived:
-    """Event: a new graph was received; ``asked_s`` is the duration of the query."""
+    """Event: a new graph was received.
+
+    Attributes:
+        view: New graph.
+        asked_s: Duration of the query in seconds.
+    """
 
     view: GraphView
     query_s: float
@@ -55,7 +63,12 @@ class MasterFound:
 
 @dataclass(frozen=True, slots=True)
 class MasterLost:
-    """Event: no master replies at ``address``; ``sentence`` explains this."""
+    """Event: the master at ``address`` does not reply.
+
+    Attributes:
+        address: Address of the master.
+        sentence: Explanation for the user.
+    """
 
     address: str
     message: str
@@ -63,7 +76,7 @@ class MasterLost:
 
 @dataclass(frozen=True, slots=True)
 class WatchFailed:
-    """Event: subscribing to a topic failed; ``sentence`` is the reason."""
+    """Event: subscribing to a topic failed. ``sentence`` contains the reason."""
 
     topic: str
     message: str
@@ -71,19 +84,24 @@ class WatchFailed:
 
 @dataclass(frozen=True, slots=True)
 class JobFailed:
-    """Event: a job on the network failed; ``what`` is as in `Source.submit`, ``sentence`` the reason."""
+    """Event: a job on the network failed.
+
+    Attributes:
+        what: Sentence for the report, see `Source.submit`.
+        sentence: Reason for the failure.
+    """
 
     what: str
     message: str
 
 
 class Source(Protocol):
-    """Source of messages by topic, live or recorded. Only watched topics are received."""
+    """Source of messages, live or recorded. Only messages of watched topics are received."""
 
     address: str
 
     def start(self) -> None:
-        """Start to deliver events and messages to the sinks."""
+        """Start to deliver messages to the sinks, and events to the callback."""
 
     def watch(self, topic: str) -> None:
         """Subscribe to ``topic`` as soon as it exists."""
@@ -92,20 +110,23 @@ class Source(Protocol):
         """Unsubscribe from ``topic``."""
 
     def submit(self, what: str, job: Job) -> None:
-        """Run a job with the node in the source's thread; a failure is reported as `JobFailed`.
+        """Run a job with Studio's node in the source's thread. A failure is reported as `JobFailed`.
 
-        ``what`` is the `lazy` sentence for the report, with the placeholder ``error``; "" reports nothing.
+        Args:
+            what: Sentence for the report (a `lazy` text) with the placeholder ``error``; "" to report
+                nothing.
+            job: Function that receives the node.
         """
 
     def lost_counts(self) -> Mapping[str, int]:
-        """Return the number of lost messages of each topic since it is watched."""
+        """Return the number of messages lost on each topic since its watch began."""
 
     def close(self) -> None:
         """Stop the source and wait for its thread."""
 
 
 MakeSource = Callable[[str, Sequence[Sink], Callable[[object], None]], Source]
-"""Creates a source from the address of a master, the message sinks, and the event callback."""
+"""Factory of a source, given the address of a master, the message sinks, and the event callback."""
 
 
 class LiveSource:
@@ -159,11 +180,16 @@ class LiveSource:
         self.submit("", _wake)
 
     def submit(self, what: str, job: Job) -> None:
-        """Queue a job. Jobs run in order, and wait until a master replies."""
+        """Queue a job. Jobs run in order and wait until a master replies.
+
+        Args:
+            what: Sentence for the report, see `Source.submit`.
+            job: Function that receives the node.
+        """
         self._jobs.put((what, job))
 
     def lost_counts(self) -> Mapping[str, int]:
-        """Return the number of lost messages by topic."""
+        """Return the number of messages lost on each topic since its watch began."""
         with self._lock:
             held = {topic: subscriber for topic, (_, subscriber) in self._subscribers.items()}
             before = dict(self._missed_before)
@@ -188,7 +214,7 @@ class LiveSource:
     # -- overridden for other networks (see `app.core.networks`); called in its thread -------------
 
     poll_s = POLL_S
-    """Interval of the graph queries."""
+    """Interval between queries of the graph in seconds."""
 
     def join(self) -> Node:
         """Create Studio's node. Raises `NepError` if no master replies."""
@@ -202,7 +228,17 @@ class LiveSource:
         return node.graph(timeout_s=1.0)
 
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
-        """Subscribe to a topic of this type. Raises `NepError`."""
+        """Subscribe to a topic.
+
+        Args:
+            node: Studio's node.
+            topic: Name of the topic.
+            msg_type: Message type of the subscription.
+            sink: Callback for received messages.
+
+        Raises:
+            NepError: The subscription failed.
+        """
         return node.new_sub(topic, msg_type, sink=sink, wildcards=False)
 
     # -- its thread ------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Tree of topics by the slashes in their names: folders with sums of the statistics below them."""
+"""Tree of topics by the slashes in their names. Folders show the totals of their topics."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from app.core.network.topics import Topic, key_of
 
 Number = TypeVar("Number", int, float)
 MAX_DEPTH = 12
-"""Maximum depth of folders. Deeper levels remain part of the name, because no window is wide enough for them.
+"""Maximum depth of folders.
+
+Deeper levels remain part of the topic's name, because no window is wide enough.
 """
 
 
 def parts_of_name(name: str) -> tuple[str, ...]:
-    """Split a topic's name at its slashes into at most `MAX_DEPTH` folders and a name; never empty."""
+    """Split the name of a topic at its slashes into at most `MAX_DEPTH` folders and a non-empty rest."""
     parts = [part for part in name.split("/") if part]
     if not parts:
         return (name,)
@@ -27,20 +29,20 @@ def parts_of_name(name: str) -> tuple[str, ...]:
 def folder_key(network: str, path: str) -> str:
     """Return the key of the folder with this path.
 
-    As a pattern, the key matches every topic in the folder.
+    The key is a pattern that matches every topic in the folder.
     """
     return key_of(network, f"{path}*")
 
 
 @dataclass(frozen=True, slots=True)
 class FolderStats:
-    """Statistics of all existing topics below a folder; None if no topic has a value.
+    """Statistics of all existing topics in a folder. Each value is None if no topic reports it.
 
     Attributes:
-        rate_hz: Sum of the rates.
-        bandwidth_Bps: Sum of the bandwidths.
-        age_s: Age of the newest message.
-        lost: Sum of the lost messages.
+        rate_hz: Total message rate.
+        bandwidth_Bps: Total bandwidth in bytes per second.
+        age_s: Age of the newest message in seconds.
+        lost: Total number of lost messages.
     """
 
     rate_hz: float | None = None
@@ -56,10 +58,10 @@ class TopicFolder:
     Attributes:
         name: Last part of the path.
         path: Whole path, such as "/robot/arm/".
-        deep: Depth in the tree.
+        deep: Depth in the tree, 0 for a top-level folder.
         is_open: True if the folder is expanded.
-        topics: All topics below the folder, including those in subfolders.
-        inside: Direct content of the folder.
+        topics: All topics in the folder and its subfolders.
+        inside: Topics and subfolders directly in the folder.
     """
 
     name: str
@@ -73,12 +75,12 @@ class TopicFolder:
 
     @property
     def key(self) -> str:
-        """Key among the folders and topics of all networks: "/robot/*", which is no valid topic name."""
+        """Key that is unique among the folders and topics of all networks, such as "/robot/*"."""
         return folder_key(self.network, self.path)
 
     @property
     def stats(self) -> FolderStats:
-        """Statistics, computed at the first access after `renew`."""
+        """Statistics, computed at the first access after `invalidate_stats`."""
         if self._stats is None:
             there = [topic for topic in self.topics if topic.gone_s is None]
             self._stats = FolderStats(
@@ -103,7 +105,7 @@ def _sum(values: Iterable[Number | None]) -> Number | None:
 
 
 class TopicTree:
-    """Topics in folders, as given by their names. A topic may have the same name as a folder."""
+    """Topics arranged in folders by their names. A topic and a folder may have the same name."""
 
     def __init__(self, topics: Iterable[Topic], closed: Collection[str] = ()) -> None:
         # `closed` are the keys of collapsed folders.
@@ -123,7 +125,11 @@ class TopicTree:
         return iter(self._folders.values())
 
     def rows(self, ordered: Callable[[list[TreeRow]], list[TreeRow]]) -> list[TreeRow]:
-        """Return the visible rows from top to bottom; ``ordered`` sorts the rows of one folder."""
+        """Return the visible rows from top to bottom.
+
+        Args:
+            ordered: Sorts the rows of one folder.
+        """
         rows: list[TreeRow] = []
         waiting = ordered(self._top)[::-1]
         while waiting:
@@ -160,11 +166,11 @@ def folders_above(topic: str, network: str = "") -> list[str]:
 
 
 def topic_filter(words: Iterable[str]) -> Callable[[str, str], bool]:
-    """Return a predicate (name, details) that is True for topics that match every word, ignoring case.
+    """Return a predicate (name, details) that is True for topics that match all words, ignoring case.
 
     A word with ``*`` or ``?`` is a pattern for the whole name (``*`` also matches slashes). A word that
-    starts with ``!`` excludes the topics that match the rest. Any other word may occur anywhere in the
-    details.
+    starts with ``!`` excludes the topics that match the rest of the word. Any other word may occur
+    anywhere in the details.
     """
     wanted: list[tuple[bool, re.Pattern[str] | str]] = []
     for word in words:

@@ -17,9 +17,14 @@ GONE_DISPLAY_S = 10.0
 MAX_RATES = 60
 BATCH_SIZE = 1500
 START_GRACE_S = 5.0
-"""Time that a publisher has for its first message after a subscription; some cameras start only then."""
+"""Time in seconds that a publisher may need for its first message after a subscription.
+
+Some cameras start only when the topic is subscribed to.
+"""
 MIN_REPORTED_SILENCE_S = 6.0
-"""Minimum silence of topics whose counts are only reported by nodes, which report every 5 s in large graphs.
+"""Minimum silence in seconds of topics whose message counts are known only from reports of nodes.
+
+In large graphs, nodes report every 5 s.
 """
 
 
@@ -27,17 +32,16 @@ _SEPARATOR = " "
 
 
 def key_of(network: str, topic: str) -> str:
-    """Return the name of a topic among those of all networks: "ros2 /camera".
+    """Return the key of a topic, unique among all networks, such as "ros2 /camera".
 
-    Unchanged for the native network ("").
-
-    Names of native topics contain no blank, so keys can't be ambiguous.
+    For the native network (""), the key is the name of the topic. Names of native topics contain no
+    space, so keys are unambiguous.
     """
     return f"{network}{_SEPARATOR}{topic}" if network else topic
 
 
 def split_key(key: str) -> tuple[str, str]:
-    """Split a key made by `key_of` into network and topic."""
+    """Split a topic key (see `key_of`) into the network and the name of the topic."""
     network, blank, topic = key.partition(_SEPARATOR)
     return (network, topic) if blank else ("", key)
 
@@ -50,19 +54,19 @@ class Topic:
         rate_hz: Messages per second, as reported by the publishers.
         bandwidth_Bps: Bytes per second, as reported by the publishers.
         age_s: Seconds since the time stamp of the newest message.
-        silent_s: Seconds without a message although the topic has subscribers; None without subscribers,
-            because some publishers send only to subscribers.
+        silent_s: Seconds without a message although the topic has subscribers; None without
+            subscribers, because some publishers send only to subscribers.
         lost: Number of lost messages.
-        loss_ratio: Share of lost messages among all that subscribers should have received.
+        loss_ratio: Lost messages as a share of all messages that the subscribers should have received.
         gone_s: Seconds since the topic vanished; None while it exists.
-        newest: Newest message, as `previous` only while the topic is watched.
-        received: Number of messages received while the topic is watched.
-        dropped: Number of messages discarded before a panel read them, while the topic is watched.
-        missed: Number of messages sent but not received here, while the topic is watched.
+        newest: Newest message; like `previous`, only while the topic is watched.
+        received: Number of messages received since the watch began.
+        dropped: Number of messages discarded before a panel read them, since the watch began.
+        missed: Number of messages sent but not received here, since the watch began.
         network: Kind of network; "" for the native one.
         stale: True if the network can't be queried at the moment.
-        counted: Rate measured here (messages and bytes per second), for watched topics whose publishers
-            report none.
+        measured_rates: Measured rate (messages and bytes per second) of a watched topic whose publishers
+            report no rate.
     """
 
     name: str
@@ -104,17 +108,17 @@ class Topic:
 
     @property
     def displayed_and_sent(self) -> tuple[int, int]:
-        """Number of messages shown by panels, and number of messages sent, since the topic is watched."""
+        """Number of messages passed to panels, and number of messages sent, since the watch began."""
         return self.received - self.dropped, self.received + self.missed
 
     def static_values(self) -> tuple[object, ...]:
-        """Return the values that rarely change; panels rebuild their rows when one of them changes."""
+        """Return the values that change rarely. Panels rebuild their rows if one of these values changes."""
         gone = self.gone_since is not None
         return (self.msg_type, self.codec, self.publisher_nodes, self.is_new, gone, self.is_stale)
 
 
 class Topics:
-    """All topics in the order of their first appearance. Not thread-safe: use it from the window's thread."""
+    """All topics, in order of their first appearance. Not thread-safe; use it from the main thread."""
 
     def __init__(self, own: tuple[str, int] | None = None, network: str = "") -> None:
         # `own` is (host, process id) of the watching process: a topic with no other subscriber counts as
@@ -154,7 +158,7 @@ class Topics:
         return [topic for topic in self._topics.values() if topic.gone_since is None]
 
     def of_type(self, *msg_types: str) -> list[Topic]:
-        """Return the existing topics of one of these types."""
+        """Return the existing topics that have one of these message types."""
         return [topic for topic in self.existing_topics() if topic.msg_type in msg_types]
 
     def mark_seen(self, name: str) -> None:
@@ -165,10 +169,10 @@ class Topics:
             self.revision += 1
 
     def update(self, view: GraphView, now: float) -> None:
-        """Apply a new graph; ``now`` is monotonic seconds.
+        """Apply a new graph at ``now`` (monotonic seconds).
 
-        If no node or topic changed, only the statistics are updated; those of more than `AT_ONCE` topics in
-        parts, by `age`.
+        If no node or topic has changed, only the statistics are updated. The statistics of more than
+        `BATCH_SIZE` topics are updated in parts, by `update_ages`.
         """
         seen = (view.epoch, view.revision)
         self._clocks = self._clock_offsets(view)
@@ -210,13 +214,17 @@ class Topics:
         self._first_graph = False
 
     def mark_all_vanished(self, now: float) -> None:
-        """Mark all topics as vanished, because the connection to the master was lost."""
+        """Set all topics to vanished, because the connection to the master was lost."""
         for topic in self._topics.values():
             if topic.gone_since is None:
                 self._vanish(topic, now)
 
     def set_stale(self, stale: bool) -> None:
-        """Set ``stale`` of all topics: True while the network can't be queried."""
+        """Set ``stale`` of all topics.
+
+        Args:
+            stale: True while the network can't be queried.
+        """
         for topic in self._topics.values():
             if topic.is_stale is not stale:
                 topic.is_stale = stale
@@ -225,9 +233,14 @@ class Topics:
                 self.revision += 1
 
     def count(self, passed_s: float, before: Mapping[str, tuple[int, int]]) -> dict[str, tuple[int, int]]:
-        """Measure the rates of watched topics whose publishers report none, over ``passed_s`` seconds.
+        """Measure the rates of watched topics whose publishers report no rate.
 
-        ``before`` is the previous return value: the total number of messages and bytes received, by topic.
+        Args:
+            passed_s: Seconds since the previous call.
+            before: Return value of the previous call.
+
+        Returns:
+            Total number of received messages and bytes, by topic.
         """
         arrived = {
             topic.name: (topic.received, topic.received_bytes)
@@ -246,10 +259,13 @@ class Topics:
         return arrived
 
     def update_ages(self, now: float, now_ns: int) -> None:
-        """Update the ages, and remove topics that vanished more than `GONE_SHOWN_S` ago.
+        """Update the ages of topics, and remove topics that vanished more than `GONE_DISPLAY_S` seconds ago.
 
-        With more than `AT_ONCE` topics, each call processes the next `AT_ONCE` topics and updates their
-        statistics.
+        Each call processes at most `BATCH_SIZE` topics and updates their statistics.
+
+        Args:
+            now: Monotonic seconds.
+            now_ns: Current time in ns since 1970.
         """
         if self._next_index >= len(self._topics):
             self._next_index = 0
@@ -277,7 +293,7 @@ class Topics:
         self.revision += listed
 
     def add(self, name: str, batch: Batch, now: float) -> None:
-        """Add messages that arrived on a watched topic."""
+        """Add messages received on a watched topic."""
         if not batch.messages:  # a watched topic without messages; it may never have existed
             return
         topic = self._topics.get(name)
@@ -305,7 +321,11 @@ class Topics:
             topic.is_watched = False
 
     def set_stats(self, figures: Mapping[str, tuple[float | None, int | None]]) -> None:
-        """Set the reported rate (messages per second) and the time of the newest message (ns) by topic."""
+        """Set the statistics reported for each topic.
+
+        Args:
+            figures: Messages per second and time of the newest message (ns since 1970), by topic.
+        """
         for name, (rate_hz, newest_ns) in figures.items():
             topic = self._topics.get(name)
             if topic is not None:
@@ -315,7 +335,7 @@ class Topics:
         self.values_revision += 1
 
     def rewind(self) -> None:
-        """Discard the newest messages and their times, because the replay jumped to another time."""
+        """Discard the newest messages and their times. Called when a replay seeks."""
         for topic in self._topics.values():
             topic.newest = topic.previous = None
             topic.last_stamp_ns = topic.last_received = topic.age_s = None

@@ -1,4 +1,4 @@
-"""Statistics of the whole network: message rate, losses, and the share of watched messages that is shown."""
+"""Statistics of all networks: message rate, losses, and the share of watched messages that panels show."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from nep.protocol.graph_view import GraphView
 WINDOW_S = 30.0
 
 SUM_INTERVAL_S = 0.5
-"""Interval at which the statistics of more than `AT_ONCE` topics are summed."""
+"""Interval in seconds at which the statistics of more than `AT_ONCE` topics are summed."""
 
 
 class RecentLosses:
-    """Counter of the losses within the last 30 s."""
+    """Counter of the messages lost in the last 30 s."""
 
     def __init__(self) -> None:
         # The first total is the baseline.
@@ -24,10 +24,10 @@ class RecentLosses:
         self._before: int | None = None
 
     def count(self, total: int, now: float) -> int:
-        """Return the number of losses within the last 30 s.
+        """Return the number of messages lost in the last 30 s.
 
         Args:
-            total: Total number of losses so far.
+            total: Total number of lost messages.
             now: Monotonic seconds.
         """
         if self._before is not None and total > self._before:
@@ -39,14 +39,14 @@ class RecentLosses:
 
 
 class Traffic:
-    """Statistics of the network and of the watched topics. Not thread-safe: use it from the window's thread.
+    """Statistics of the network and of the watched topics. Not thread-safe; use it from the main thread.
 
     Attributes:
-        messages_per_s: Rate of all topics as reported by publishers, or None.
-        lost_30s: Messages that any subscriber lost within the last 30 s.
-        sent_30s: Messages sent on watched topics within the last 30 s.
-        shown_30s: Those of `sent_30s` that were passed to panels. The others were dropped, because they
-            arrived faster than the window can show them.
+        messages_per_s: Message rate of all topics as reported by publishers, or None.
+        lost_30s: Number of messages lost by any subscriber in the last 30 s.
+        sent_30s: Number of messages sent on watched topics in the last 30 s.
+        shown_30s: Number of these messages that were passed to panels. The others were dropped, because
+            the window can't show them fast enough.
     """
 
     def __init__(self, topics: Topics) -> None:
@@ -61,7 +61,7 @@ class Traffic:
         self.sent_30s = 0
 
     def update_graph(self, view: GraphView, now: float) -> None:
-        """Apply a new graph; ``now`` is monotonic seconds. Large graphs are evaluated less often."""
+        """Apply a new graph at ``now`` (monotonic seconds). Large graphs are evaluated less often."""
         self._pending_view = view
         if len(view.topics) <= BATCH_SIZE:
             self._sum(view, now)
@@ -69,7 +69,7 @@ class Traffic:
             self._sum_if_due(now)
 
     def add(self, batches: Mapping[str, Batch], now: float) -> None:
-        """Count the messages of a tick. Called at every tick."""
+        """Count the messages received since the last tick."""
         shown = sum(len(batch.messages) for batch in batches.values())
         self._count(shown, sum(batch.arrived_count for batch in batches.values()), now)
         self._sum_if_due(now)
@@ -84,9 +84,11 @@ class Traffic:
         self.messages_per_s = total_rate_hz(view.topics.values())
 
     def count_lost(self, missed: Mapping[str, int], now: float) -> None:
-        """Count messages that were lost before they arrived.
+        """Count messages that were sent but not received.
 
-        ``missed`` is the total number for each topic since it is watched.
+        Args:
+            missed: Number of messages lost on each topic since its watch began.
+            now: Monotonic seconds.
         """
         grown = 0
         for name, total in missed.items():

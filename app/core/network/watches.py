@@ -1,4 +1,4 @@
-"""Watches of topics. A topic is subscribed to while at least one open watch is not suspended."""
+"""Watches of topics. A topic is subscribed to while at least one open watch of it is not suspended."""
 
 from __future__ import annotations
 
@@ -9,25 +9,28 @@ from typing import Protocol, final
 
 
 class Suspendable(Protocol):
-    """Resource that uses CPU time only while it is visible: a watch or a stream of images."""
+    """Resource that needs CPU time only while it is visible, such as a watch or an image stream."""
 
     def suspend(self) -> None:
-        """Suspend the resource while it isn't visible. Idempotent."""
+        """Suspend the resource while it is not visible. Idempotent."""
 
     def resume(self) -> None:
-        """Resume after `rest`. Idempotent."""
+        """Resume the resource after `suspend`. Idempotent."""
 
 
 class WatchHandle(Suspendable, Protocol):
-    """Interface of a `Watch` for code that only holds and releases it."""
+    """Interface of a `Watch` for code that does not open watches."""
 
     def close(self) -> None:
-        """Close permanently. Idempotent."""
+        """Close the watch permanently. Idempotent."""
 
 
 @final
 class Watch:
-    """Watch of some topics until `close`. Usable as a context manager."""
+    """Watch of one or several topics.
+
+    The topics are subscribed to until `close`. Usable as a context manager.
+    """
 
     def __init__(self, topics: Iterable[str], watches: Watches) -> None:
         self.topics = tuple(topics)
@@ -40,13 +43,13 @@ class Watch:
         return self._resting
 
     def suspend(self) -> None:
-        """Suspend the watch until `wake`."""
+        """Suspend the watch until `resume`."""
         if self._watches is not None and not self._resting:
             self._resting = True
             self._watches.deactivate(self.topics)
 
     def resume(self) -> None:
-        """Resume the watch after `rest`."""
+        """Resume the watch after `suspend`."""
         if self._watches is not None and self._resting:
             self._resting = False
             self._watches.activate(self.topics)
@@ -69,7 +72,7 @@ class Watch:
 
 
 class Watches:
-    """Counts the watches of each topic. Not thread-safe: use it from the window's thread."""
+    """Open watches, counted by topic. Not thread-safe; use it from the main thread."""
 
     def __init__(
         self,
@@ -95,14 +98,14 @@ class Watches:
         return self._active_counts[topic] > 0
 
     def activate(self, topics: Iterable[str]) -> None:
-        """Add one to the number of active watches. Called by `Watch`."""
+        """Increment the number of active watches of each topic. Called by `Watch`."""
         for topic in topics:
             self._active_counts[topic] += 1
             if self._active_counts[topic] == 1:
                 self._begin(topic)
 
     def deactivate(self, topics: Iterable[str]) -> None:
-        """Subtract one from the number of active watches. Called by `Watch`."""
+        """Decrement the number of active watches of each topic. Called by `Watch`."""
         for topic in topics:
             self._active_counts[topic] -= 1
             if self._active_counts[topic] == 0:
@@ -110,7 +113,7 @@ class Watches:
                 self._end(topic)
 
     def release(self, topics: Iterable[str]) -> None:
-        """Release a watch that is closed while suspended. Called by `Watch`."""
+        """Release the topics of a watch that was closed while suspended. Called by `Watch`."""
         for topic in topics:
             self._open_counts[topic] -= 1
             if self._open_counts[topic] == 0:

@@ -1,4 +1,4 @@
-"""Pages connected to the web server, pages that left recently, and pages that are too slow."""
+"""Pages connected to the web server, pages that left recently, and topics that pages read too slowly."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ SLOW_DISPLAY_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class ListedPage:
-    """Web page in the list; ``gone_s`` is the time since it left, None while it is connected."""
+    """Web page in the list of pages.
+
+    Attributes:
+        gone_s: Seconds since the page left; None while it is connected.
+    """
 
     page: ConnectedPage
     gone_s: float | None = None
@@ -23,7 +27,11 @@ class ListedPage:
 
 @dataclass(frozen=True, slots=True)
 class SlowTopic:
-    """Topic of which a page has recently dropped messages; ``share`` is the dropped part of all messages."""
+    """Topic that a page reads too slowly, so that messages are dropped.
+
+    Attributes:
+        dropped_share: Dropped messages as a share of all messages, 0 to 1.
+    """
 
     page: ConnectedPage
     topic: str
@@ -49,7 +57,7 @@ class PageList:
 
     @property
     def listed(self) -> tuple[ListedPage, ...]:
-        """Pages in order of arrival, including those that left in the last `GONE_SHOWN_S` seconds."""
+        """Pages in order of arrival, including pages that left in the last `GONE_DISPLAY_S` seconds."""
         return tuple(
             ListedPage(page, self._now - self._left_at[id_] if id_ in self._left_at else None)
             for id_, page in self._pages.items()
@@ -57,11 +65,11 @@ class PageList:
 
     @property
     def bytes_per_s(self) -> float:
-        """Total bandwidth of all connected pages."""
+        """Total bandwidth of all connected pages in bytes per second."""
         return sum(topic.bytes_per_s for page in self.connected for topic in page.topics)
 
     def update(self, pages: Sequence[ConnectedPage], now: float) -> None:
-        """Apply a snapshot of connected pages; ``now`` is a monotonic time."""
+        """Apply a snapshot of the connected pages at ``now`` (monotonic seconds)."""
         self._now = now
         there = {page.id for page in pages}
         if there != self._pages.keys() - self._left_at.keys():
@@ -79,11 +87,11 @@ class PageList:
         self._record_drops(pages, now)
 
     def clear(self, now: float) -> None:
-        """Remove all pages, because the server stopped."""
+        """Remove all pages at ``now`` (monotonic seconds), because the server stopped."""
         self.update((), now)
 
     def slow_topics(self) -> Iterator[SlowTopic]:
-        """Yield the topics of which a connected page dropped messages in the last `SLOW_SHOWN_S` seconds."""
+        """Yield the topics on which messages to a connected page were dropped recently (`SLOW_DISPLAY_S`)."""
         for page in self.connected:
             for topic in page.topics:
                 at = self._drops_at.get((page.id, topic.topic))

@@ -1,4 +1,4 @@
-"""Web server of Studio (`nep web`). It is off at each start; the user switches it on in its sheet."""
+"""Web server of Studio (`nep web`). The server is off at each start until the user switches it on."""
 
 from __future__ import annotations
 
@@ -46,24 +46,32 @@ class RunningServer(Protocol):
 
     @property
     def refusals(self) -> tuple[context.Refusal, ...]:
-        """Rejected connections, the newest last."""
+        """Rejected connections, oldest first."""
 
     def set_access(self, access: access.Access) -> int:
-        """Replace the allowed origins and the token; return the number of pages that this disconnects."""
+        """Set the allowed origins and the token; return the number of pages that this disconnects."""
 
     def set_allow_moving(self, names: Collection[str]) -> None:
-        """Replace the names of robots that pages may move."""
+        """Set the names of the robots that pages may move."""
 
     def set_foxglove(self, channels: channels.LiveChannels | None) -> int:
-        """Accept clients of the Foxglove protocol; None disconnects them and rejects new ones.
+        """Switch the Foxglove protocol on or off.
 
-        Returns the number of disconnected pages.
+        Args:
+            channels: Channels for Foxglove clients; None disconnects all clients and rejects new ones.
+
+        Returns:
+            Number of disconnected clients.
         """
 
     def set_rosbridge(self, on: bool) -> int:
-        """Accept clients of rosbridge, or disconnect them and reject new ones.
+        """Switch the rosbridge protocol on or off.
 
-        Returns the number of disconnected pages.
+        Args:
+            on: True to accept clients; False to disconnect all clients and reject new ones.
+
+        Returns:
+            Number of disconnected clients.
         """
 
     def block_page(self, page_id: int) -> None:
@@ -73,25 +81,31 @@ class RunningServer(Protocol):
         """Accept connections of a page again that `block_page` blocked."""
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until the server has stopped; return False after ``timeout_s`` seconds."""
+        """Wait until the server has stopped; return False on timeout (in seconds)."""
 
     def close(self) -> None:
         """Disconnect all pages and stop the server."""
 
 
 StartServer = Callable[["server.WebSettings"], RunningServer]
-"""Starts a server in a background thread; may block and raises `NepError` on failure."""
+"""Function that starts a server. Runs in a background thread, may block, and raises `NepError` on failure."""
 
 
 @dataclass(frozen=True, slots=True)
 class WebServerStarted:
-    """Event: a server was started, or ``sentence`` explains why that failed."""
+    """Event: a start of the server has succeeded or failed.
+
+    Attributes:
+        number: Number of the start, which identifies results of outdated starts.
+        server: Running server; None if the start failed.
+        sentence: Reason for the failure, or "".
+    """
 
     number: int
     server: RunningServer | None
     message: str = ""
     free_port: int = 0
-    """Free port to use instead of one that is in use; 0 if the start failed for another reason."""
+    """Unused port to offer if the port is in use; 0 if the start failed for another reason."""
 
 
 def start_server(settings: server.WebSettings) -> RunningServer:
@@ -100,17 +114,18 @@ def start_server(settings: server.WebSettings) -> RunningServer:
 
 
 class WebPages:
-    """Web server of Studio and its settings. Not thread-safe: use it from the window's thread.
+    """Web server of Studio and its settings. Not thread-safe; use it from the main thread.
 
-    A running server applies changes immediately; only a change of `host` or `port` restarts it. The settings
-    are not saved.
+    Changed settings are applied to a running server immediately; only a change of `host` or `port`
+    restarts it. The settings are not saved.
 
     Attributes:
-        host: Address of this computer to which other computers connect, or "".
+        host: Address of this computer at which other computers can connect; "" for none.
         origins: Allowed origins of pages from other computers.
         robots: Names of the robots that pages may move.
         protocols: Protocols that are switched on. All share the port, the origins and the token.
-        kept_out: Pages that the user disconnected, by id. Their further connections are rejected.
+        kept_out: Blocked pages, by id. The user disconnected them, and their further connections are
+            rejected.
     """
 
     def __init__(
@@ -122,7 +137,15 @@ class WebPages:
         addresses: Callable[[], tuple[OwnAddress, ...]] = own_addresses,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Create the web server, switched off. ``master`` is the address of the master."""
+        """Create the web server, switched off.
+
+        Args:
+            master: Address of the master.
+            post_event: Thread-safe callback that receives `WebServerStarted` events.
+            start: Starts a server.
+            addresses: Returns the addresses of this computer.
+            clock: Returns monotonic seconds.
+        """
         self.master, self._post_event, self._start = master, post_event, start
         self.addresses, self._clock = addresses, clock
         self._server: RunningServer | None = None
@@ -143,7 +166,7 @@ class WebPages:
 
     @property
     def host_and_port(self) -> str:
-        """Address and port that pages connect to."""
+        """Host and port to which pages connect, such as "192.168.1.20:9090"."""
         port = self.port if self._server is None else self._server.port
         return f"{self.host or LOOPBACK}:{port}"
 
@@ -154,17 +177,17 @@ class WebPages:
 
     @property
     def full_url(self) -> str:
-        """WebSocket address of the server, with the token if it requires one."""
+        """WebSocket address of the server, including the token if one is required."""
         return f"{self.url}/?token={self.token}" if self.token else self.url
 
     @property
     def page_url(self) -> str:
-        """Address of the test page on the server, with the token if one is required."""
+        """Address of the server's test page, including the token if one is required."""
         return f"http{self.full_url.removeprefix('ws')}" if self.token else f"http://{self.host_and_port}/"
 
     @property
     def local_page_url(self) -> str:
-        """Address of the test page for a browser on this computer, which is allowed from any origin."""
+        """Address of the server's test page for browsers on this computer, which need no allowed origin."""
         return self.page_url.replace(f"//{self.host}:", f"//{LOOPBACK}:") if self.host else self.page_url
 
     @property
@@ -179,7 +202,7 @@ class WebPages:
 
     @property
     def revision(self) -> int:
-        """Number of changes of `connected`."""
+        """Counter that increases when `connected` changes."""
         return self._list.revision
 
     @property
@@ -189,17 +212,17 @@ class WebPages:
 
     @property
     def slow_topics(self) -> tuple[SlowTopic, ...]:
-        """Topics that pages read too slowly."""
+        """Topics that pages read too slowly, so that messages are dropped."""
         return tuple(self._list.slow_topics())
 
     @property
     def bytes_per_s(self) -> float:
-        """Total bandwidth of all connected pages."""
+        """Total bandwidth of all connected pages in bytes per second."""
         return self._list.bytes_per_s
 
     @property
     def refusals(self) -> tuple[context.Refusal, ...]:
-        """Rejected connections and commands, the newest last."""
+        """Rejected connections and commands, oldest first."""
         return () if self._server is None else self._server.refusals
 
     @property
@@ -212,7 +235,8 @@ class WebPages:
     def set_protocol_enabled(self, protocol: WebProtocol, *, on: bool) -> None:
         """Switch a protocol on or off.
 
-        The server starts in the background when the first one is switched on.
+        The first protocol that is switched on starts the server in the background; when all are off, it
+        stops.
         """
         self.protocols = self.protocols | {protocol} if on else self.protocols - {protocol}
         if not self.protocols:
@@ -233,7 +257,7 @@ class WebPages:
         self._run_in_thread(lambda: ended.close() if ended is not None else None)
 
     def use_free_port(self) -> None:
-        """Retry a start that failed because the port was in use, on a free port."""
+        """Start the server on an unused port, after a start failed because the port was in use."""
         if self.free_port:
             self.port, self.protocols = self.free_port, self._failed
             self._start_server()
@@ -241,9 +265,12 @@ class WebPages:
     # ---- settings
 
     def listen_on(self, host: str) -> None:
-        """Accept connections of other computers on an address of this computer; "" accepts none.
+        """Set the address at which other computers can connect.
 
-        A running server restarts, which disconnects all pages.
+        A running server restarts and disconnects all pages.
+
+        Args:
+            host: Address of this computer; "" to reject other computers.
         """
         if host == self.host:
             return
@@ -256,11 +283,11 @@ class WebPages:
             self._start_server()
 
     def new_token(self) -> int:
-        """Generate a new token; return the number of pages that this disconnects."""
+        """Generate a new token; return the number of pages that are disconnected by the change."""
         return self.set_token(access.new_token())
 
     def set_token(self, token: str) -> int:
-        """Set the required token; return the number of pages that this disconnects."""
+        """Set the required token; return the number of pages that are disconnected by the change."""
         self.token = token
         return self._apply_settings()
 
@@ -269,29 +296,32 @@ class WebPages:
         self.set_origins((*self.origins, access.checked_origin(text)))
 
     def set_origins(self, origins: Sequence[str]) -> None:
-        """Replace the allowed origins, which must be well-formed; duplicates are removed."""
+        """Set the allowed origins, which must be well-formed; duplicates are removed."""
         self.origins = tuple(dict.fromkeys(origins))
         self._apply_settings()
 
     def set_robots(self, names: Sequence[str]) -> None:
-        """Replace the names of the robots that pages may move; duplicates are removed."""
+        """Set the names of the robots that pages may move; duplicates are removed."""
         self.robots = tuple(dict.fromkeys(names))
         self._apply_settings()
 
     def block_page(self, page: context.ConnectedPage) -> None:
-        """Disconnect a page; reject its connections until `unblock_page` or the end of the server."""
+        """Disconnect a page and block further connections of the page.
+
+        The page is blocked until `unblock_page` is called or the server stops.
+        """
         if self._server is not None:
             self._server.block_page(page.id)
             self.kept_out[page.id] = page
 
     def unblock_page(self, page_id: int) -> None:
-        """Accept connections of a page again that `block_page` blocked."""
+        """Unblock a page that was blocked with `block_page`."""
         self.kept_out.pop(page_id, None)
         if self._server is not None:
             self._server.unblock_page(page_id)
 
     def template_page(self) -> str:
-        """Return the HTML of a template page that connects to this server."""
+        """Return the HTML of a minimal page that connects to this server, as a template for the user."""
         return served_pages.starter_page(self.full_url)
 
     def _apply_settings(self) -> int:
@@ -306,7 +336,7 @@ class WebPages:
     # ---- following the server
 
     def started(self, event: WebServerStarted) -> None:
-        """Apply the result of a start. Closes the server if it was switched off or restarted meanwhile."""
+        """Apply the result of a start. An outdated server (switched off or restarted meanwhile) is closed."""
         if event.number != self._number:
             if event.server is not None:
                 self._run_in_thread(event.server.close)
@@ -319,7 +349,7 @@ class WebPages:
             self._apply_settings()  # apply changes made during the start
 
     def refresh(self) -> None:
-        """Update `connected` and `listed` from the server."""
+        """Update `connected` and `listed` from the running server."""
         self._list.update(self.pages, self._clock())
 
     def check(self) -> None:
@@ -331,7 +361,7 @@ class WebPages:
         self.refresh()
 
     def close(self) -> None:
-        """Stop the server and its threads; waits at most `END_WAIT_S` seconds."""
+        """Stop the server and its threads. Waits at most `STOP_TIMEOUT_S` seconds."""
         self.switch_off()
         if self._thread is not None:
             self._thread.join(STOP_TIMEOUT_S)
@@ -386,7 +416,7 @@ class WebPages:
 
 
 def _port_conflict(port: int) -> tuple[str, int]:
-    """Return a sentence about the program that uses the port, and the next free port."""
+    """Return an error message that names the program using the port, and the next unused port."""
     holder = processes.process_fact(processes.listening_ports().get(port))
     if holder is None:
         sentence = _("Port {port} is in use by another program, perhaps rosbridge.").format(port=port)

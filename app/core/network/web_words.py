@@ -1,4 +1,4 @@
-"""Texts about the web server: status bar, addresses, rejected connections, and the command for a terminal."""
+"""Texts about the web server: status bar, addresses, rejected connections, and the terminal command."""
 
 from __future__ import annotations
 
@@ -24,7 +24,13 @@ NextStep = Literal["", "allow origin", "choose robots", "let in"]
 
 @dataclass(frozen=True, slots=True)
 class PageNode:
-    """Description of a page in the graph: its title, its address and browser, and its icon."""
+    """Web page as shown in the graph.
+
+    Attributes:
+        title: Title of the page.
+        location: Address and browser.
+        icon: Name of the icon.
+    """
 
     title: str
     location: str
@@ -33,12 +39,12 @@ class PageNode:
 
 @dataclass(frozen=True, slots=True)
 class WebNotice:
-    """Message about a rejected connection or a slow page, with a button.
+    """Notice about a rejected connection or a slow page, with a button.
 
     Attributes:
-        key: Equal for messages about the same problem.
+        key: Identifier of the problem, equal for all notices about the same problem.
         next_step: Action of the button.
-        value: Argument of the action: the origin, robot or page concerned.
+        value: Argument of the action: an origin, a robot or a page.
     """
 
     key: tuple[str, ...]
@@ -49,19 +55,19 @@ class WebNotice:
 
 
 def is_wireless(own: OwnAddress) -> bool:
-    """Return True if an address belongs to a Wi-Fi interface, judging by the name of the interface."""
+    """Return True if an address belongs to a Wi-Fi interface, judged by the name of the interface."""
     return own.interface.casefold().startswith(_WIRELESS)
 
 
 def address_text(own: OwnAddress) -> str:
-    """Format an address of this computer: "Wi-Fi 192.168.1.20" or "192.168.1.20 (eth0)"."""
+    """Format an address of this computer, such as "Wi-Fi 192.168.1.20" or "192.168.1.20 (eth0)"."""
     if is_wireless(own):
         return _("Wi-Fi {address}").format(address=own.host)
     return f"{own.host} ({own.interface})" if own.interface else own.host
 
 
 def host_text(web: WebPages) -> str:
-    """Format the address to which other computers connect; "" if only this computer can connect."""
+    """Format the address at which other computers connect; "" if other computers can't connect."""
     if not web.host:
         return ""
     own = next((each for each in web.addresses() if each.host == web.host), OwnAddress(web.host, ""))
@@ -69,9 +75,11 @@ def host_text(web: WebPages) -> str:
 
 
 def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
-    """Return icon, text and status for the status bar; the text is empty while the server is off.
+    """Return the icon, the text and the status for the status bar; the text is "" while the server is off.
 
-    ``network`` is the result of `host_words` from the time when the server was opened to other computers.
+    Args:
+        web: Web server of Studio.
+        network: Cached result of `host_text` for the current address.
     """
     if web.state != "on":
         return "", "", None
@@ -85,33 +93,33 @@ def web_status(web: WebPages, network: str) -> tuple[str, str, str | None]:
 
 
 def page_name(page: ConnectedPage) -> str:
-    """Return the display name of a page: its title; for a program without title, the library that it uses."""
+    """Return the display name of a page: its title, or for a program without a title, the library in use."""
     is_named = page.title and page.title != page.name
     return page.title if is_named else page.client or page.origin or page.name
 
 
 def location_text(page: ConnectedPage) -> str:
-    """Format address and browser of a page: "192.168.1.30, Chrome"."""
+    """Format the address and the browser of a page, such as "192.168.1.30, Chrome"."""
     client = page.client if page.client != page_name(page) else ""
     return ", ".join(filter(None, (page.address, client)))
 
 
 def page_icon(page: ConnectedPage) -> str:
-    """Return the icon of a page: a tablet, phone, browser or program."""
+    """Return the name of the icon for a page: tablet, phone, browser or program."""
     if page.device:
         return "smartphone" if page.device == "phone" else "tablet"
     return "monitor" if page.origin else "terminal"
 
 
 def page_nodes(web: WebPages) -> dict[str, PageNode]:
-    """Return the description of each connected page in the graph, by the name of its node."""
+    """Return the connected pages as shown in the graph, by the name of their node."""
     return {
         page.name: PageNode(page_name(page), location_text(page), page_icon(page)) for page in web.connected
     }
 
 
 def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
-    """Return the terminal command that starts the same server without Studio."""
+    """Return the terminal command that starts a server with the same settings without Studio."""
     words = ["nep", "web"]
     if web.port != DEFAULT_PORT:
         words += ["--port", str(web.port)]
@@ -129,9 +137,13 @@ def terminal_command(web: WebPages, platform: str = sys.platform) -> str:
 
 
 def notices(web: WebPages, dismissed: Collection[tuple[str, ...]] = ()) -> tuple[WebNotice, ...]:
-    """Return the messages to show, newest first.
+    """Return the notices to show, newest first.
 
-    The messages are about slow pages, and about rejected connections that are still not allowed.
+    Notices are about slow pages, and about rejected connections that are still not allowed.
+
+    Args:
+        web: Web server of Studio.
+        dismissed: Keys of notices that the user closed.
     """
     found: dict[tuple[str, ...], WebNotice] = {}
     for notice in (*_rejection_notices(web), *_slow_notices(web)):
@@ -187,7 +199,7 @@ def _slow_notices(web: WebPages) -> Iterator[WebNotice]:
 
 
 def share_text(share: float) -> str:
-    """Format a share in percent: "0.3 %"; a very small one as "under 0.1 %"."""
+    """Format a share as a percentage, such as "0.3 %", or "under 0.1 %" for a smaller share above zero."""
     if 0 < share < 0.0005:
         return _("under {share}").format(share=number(0.001, ".1%").replace("%", " %"))
     return number(share, ".1%").replace("%", " %")

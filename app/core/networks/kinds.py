@@ -1,4 +1,4 @@
-"""Kinds of networks that Studio can show in addition to its own: names, addresses, available statistics."""
+"""Kinds of networks that Studio can show in addition to the native one."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class NetworkKind:
 
     Attributes:
         name: Name of nep's back end.
-        words: Product name.
-        place: Label of the address field (a `lazy` text).
+        product_name: Product name.
+        address_label: Label of the address field (a `lazy` text).
         example: Default address.
         hint: Advice for the user (a `lazy` text).
-        tells_figures: True if the nodes report rates, losses and CPU use.
-        codec: Returns the codec of a topic, where that of the graph is too general.
-        reads: Returns the message type to subscribe with.
+        reports_stats: True if the nodes report rates, losses and CPU use.
+        codec: Returns the codec of a topic, if the codec in the graph is too general.
+        readable_type_of: Returns the message type for a subscription.
         qos: Quality of service that is compatible with most publishers.
     """
 
@@ -40,12 +40,15 @@ class NetworkKind:
     qos: str = ""
 
     def checked(self, address: str) -> str:
-        """Return the address in the form of the back end. Raises `NepError` if the address is invalid."""
+        """Validate an address and return it in the form that the back end expects.
+
+        Raises `NepError` if it is invalid.
+        """
         return find_backend(self.name).master(address.strip() or self.example)
 
     @property
     def unknown_text(self) -> str:
-        """Explanation of a missing value, such as "unknown on ROS 2"."""
+        """Text in place of a value that this kind of network doesn't report, such as "unknown on ROS 2"."""
         return _("unknown on {network}").format(network=self.product_name)
 
 

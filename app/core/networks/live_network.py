@@ -1,4 +1,4 @@
-"""Part of `app.core.session.Session` that represents the live network."""
+"""Live network: the part of `app.core.session.Session` that holds its state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Networks shown in addition to the native one, and their state."""
+"""State of the networks that are shown in addition to the native one."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from nep.errors import NepError
 from nep.i18n import _
 
 SETTING_KEY = "networks"
-"""Setting that stores the address of each shown network."""
+"""Name of the setting that stores the address of each shown network."""
 BROWSE_COMMAND = "network.look"
-"""Window command that opens the choice of networks."""
+"""Name of the window command that opens the selection of networks."""
 COUNT_INTERVAL_S = 1.0
 
 NetworkState = Literal["off", "looking", "there", "lost"]
@@ -51,14 +51,17 @@ class NetworkSource(Protocol):
 
 
 MakeNetwork = Callable[[NetworkKind, str, Sequence[Sink], Callable[[object], None]], NetworkSource]
-"""Creates the source of a network from its kind, address, sinks and event callback."""
+"""Factory of a network's source, given the kind, the address, the message sinks, and the event callback."""
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkEvent:
-    """Event of a network's source.
+    """Event of the source of a network.
 
-    ``number`` identifies the source, because a stopped source may still send events.
+    Attributes:
+        kind: Name of the kind of network.
+        number: Number of the source; events of a source that was replaced are ignored.
+        event: Event of the source.
     """
 
     kind: str
@@ -67,12 +70,12 @@ class NetworkEvent:
 
 
 class OtherNetwork:
-    """State of one network.
+    """State of one network that is not the native one.
 
     Attributes:
-        state: "off" while the network isn't shown.
-        sentence: Reason if `state` is "lost".
-        unread: Reason for each watched topic that can't be read.
+        state: State of the connection; "off" while the network isn't shown.
+        sentence: Reason for the state "lost", or "".
+        unread: Reason why a watched topic can't be read, by topic.
     """
 
     def __init__(self, kind: NetworkKind) -> None:
@@ -83,7 +86,7 @@ class OtherNetwork:
         self.reset()
 
     def reset(self) -> None:
-        """Reset the state to that of a network that isn't shown."""
+        """Reset the state to "off", without topics and nodes."""
         self.state: NetworkState = "off"
         self.sentence = ""
         self.topics, self.nodes = Topics(network=self.kind.name), Nodes(self.kind.name)
@@ -117,7 +120,12 @@ class OtherNetwork:
                 pass
 
     def update_ages(self, now: float, now_ns: int) -> None:
-        """Update the ages. Once a second, also measure the rates that publishers don't report."""
+        """Update the ages. Once a second, also measure rates that publishers don't report.
+
+        Args:
+            now: Monotonic seconds.
+            now_ns: Current time in ns since 1970.
+        """
         self.topics.update_ages(now, now_ns)
         self.nodes.update_ages(now)
         if self._counted_at is None or now - self._counted_at >= COUNT_INTERVAL_S:
@@ -126,9 +134,9 @@ class OtherNetwork:
 
 
 class Networks:
-    """All kinds of networks, shown or not. Not thread-safe: use it from the window's thread.
+    """All kinds of networks that can be shown. Not thread-safe; use it from the main thread.
 
-    Each shown network has its own thread.
+    Each shown network has its own background thread.
     """
 
     def __init__(
@@ -162,7 +170,7 @@ class Networks:
 
     @property
     def revision(self) -> int:
-        """Counter that increases with every change except statistics."""
+        """Counter that increases with every change, except changes of statistics."""
         return self._changes + sum(each.topics.revision + each.nodes.revision for each in self)
 
     @property
@@ -187,7 +195,7 @@ class Networks:
         return network.topics.get(topic) if network is not None else None
 
     def read_problem(self, key: str) -> str:
-        """Return why a watched topic can't be read; "" if it can."""
+        """Return the reason why a watched topic can't be read, or ""."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         return network.unread.get(topic, "") if network is not None else ""
@@ -205,7 +213,7 @@ class Networks:
                     continue
 
     def select(self, name: str, address: str) -> None:
-        """Show the network of this kind at this address, also after the next start.
+        """Show the network of this kind, and save this for the next start.
 
         Raises:
             NepError: The address is invalid.
@@ -280,7 +288,7 @@ class Networks:
         )
 
     def add(self, key: str, batch: Batch, now: float) -> None:
-        """Add messages that arrived on a watched topic."""
+        """Add messages received on a watched topic."""
         name, topic = split_key(key)
         network = self._networks.get(name)
         if network is None or not network.is_selected or topic not in self._watched[name]:
@@ -315,7 +323,12 @@ class Networks:
             network.source.unwatch(topic)
 
     def update_ages(self, now: float, now_ns: int) -> None:
-        """Update the ages of nodes and topics."""
+        """Update the ages of nodes and topics.
+
+        Args:
+            now: Monotonic seconds.
+            now_ns: Current time in ns since 1970.
+        """
         for network in self.selected:
             network.update_ages(now, now_ns)
 
@@ -332,7 +345,10 @@ class Networks:
 
 
 def lost_message(network: OtherNetwork) -> str:
-    """Return why the connection to a network was lost ("ROS 1: no ROS master answers at ..."), or ""."""
+    """Return the reason why the connection to a network was lost, or "".
+
+    Example: "ROS 1: no ROS master answers at ...".
+    """
     if network.state != "lost":
         return ""
     return _("{network}: {reason}.").format(network=network.kind.product_name, reason=network.sentence)
@@ -351,7 +367,7 @@ def topic_label(key: str) -> str:
 
 
 def split_by_network(batches: Mapping[str, Batch]) -> tuple[dict[str, Batch], dict[str, Batch]]:
-    """Split batches into those of the native network and those of all others."""
+    """Split batches by topic key into batches of the native network and batches of all other networks."""
     native: dict[str, Batch] = {}
     others: dict[str, Batch] = {}
     for key, batch in batches.items():

@@ -1,6 +1,7 @@
-"""Parameters of the selected node: current values, recent changes, and setting a value.
+"""Parameters of the selected node: current values, recent changes, and setting of values.
 
-Values are received on the parameter topic of the node, and set by a service call in a background thread.
+Values are received on the node's parameter topic. A value is set by a service call in a background
+thread.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ from nep.patterns.parameters.remote import RemoteParameters
 from nep.text import bounded_str
 
 REPLY_TIMEOUT_S = 3.0
-"""Timeout of the call that sets a parameter."""
+"""Timeout in seconds of the call that sets a parameter."""
 MAX_MESSAGE_BYTES = 4 * 2**20
-"""Maximum size of a message that is decoded in the window's thread."""
+"""Maximum size in bytes of a message that is decoded in the main thread."""
 MAX_TEXT_LENGTH = 20_000
 MAX_PARAMETERS = 1000
 """Maximum number of parameters of a node; further ones are not shown."""
 _MAX_DESCRIPTION_LENGTH = 2_000
-"""Maximum number of characters shown of a description."""
+"""Maximum number of characters of a description that are shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ class ShownParameter:
         maximum: Upper limit of a number, or None.
         choices: Allowed values; empty if any value is allowed.
         read_only: True if only the node itself can set the parameter.
-        text: The value in editable form.
+        text: Value as editable text.
     """
 
     name: str
@@ -62,7 +63,7 @@ class ShownParameter:
 
 
 class ParameterSetter:
-    """Sets parameters of nodes of the native network. Not thread-safe: use it from the window's thread."""
+    """Client that sets parameters of native nodes. Not thread-safe; use it from the main thread."""
 
     def __init__(self, submit: Callable[[str, Job], None]) -> None:
         # `submit` runs a job with Studio's node (`app.core.network.source.Source.submit`).
@@ -70,14 +71,14 @@ class ParameterSetter:
         self._worker: BackgroundWorker[bool] = BackgroundWorker("studio-parameters")
 
     def set(self, node_id: str, name: str, value: object) -> None:
-        """Call the node to set a parameter. `has_been_set` returns the result."""
+        """Start to set a parameter; `has_been_set` returns the result."""
         owner = f"{node_id} {name}"
         self._submit("", lambda node: self._worker.submit(owner, partial(_set, node, node_id, name, value)))
 
     def has_been_set(self, node_id: str, name: str) -> bool:
-        """Return True once after the parameter has been set; False before.
+        """Return True if the parameter was set since the last call, else False.
 
-        Raises `NepError` with the reason if setting the parameter failed.
+        Raises `NepError` with the reason if the parameter could not be set.
         """
         return self._worker.pop_result(f"{node_id} {name}") is True
 
@@ -100,7 +101,7 @@ def _set(node: Node, node_id: str, name: str, value: object) -> bool:
 
 
 class NodeParameters:
-    """Parameters of the shown node. Not thread-safe: use it from the window's thread.
+    """Parameters of the selected node. Not thread-safe; use it from the main thread.
 
     Attributes:
         changed: Time of the last change of each parameter, by name (monotonic seconds).
@@ -133,7 +134,7 @@ class NodeParameters:
         self._applied_message: Message | None = None
 
     def show(self, node: NodeEntry | None) -> None:
-        """Show the parameters of a node; None shows no node."""
+        """Show the parameters of a node; None to show no node."""
         wanted = node if node is not None and node.has_parameters else None
         if wanted is self.node:
             return
@@ -200,9 +201,9 @@ class NodeParameters:
                 self.revision += 1
 
     def set(self, name: str, text: str) -> None:
-        """Parse a text and call the node to set the parameter to this value.
+        """Parse a text and start to set the parameter to the resulting value.
 
-        If the value can't be set, `refusal` is the reason.
+        If that fails, `refusal` contains the reason.
         """
         node, parameter = self.node, self.find(name)
         self.revision += 1
@@ -224,7 +225,7 @@ class NodeParameters:
 
 
 def read_only_reason(node: NodeEntry, parameter: ShownParameter) -> str:
-    """Return why a parameter can't be set from here; "" if it can."""
+    """Return the reason why a parameter can't be set from Studio, or ""."""
     if node.gone_s is not None:
         return _("its node has disappeared")
     if len(parameter.text) > MAX_TEXT_LENGTH:
@@ -235,9 +236,9 @@ def read_only_reason(node: NodeEntry, parameter: ShownParameter) -> str:
 
 
 def parse_parameters(state: object) -> tuple[ShownParameter, ...]:
-    """Parse the parameter message of a node. Raises `NepError` if the message is malformed.
+    """Parse and validate a parameter message. Raises `NepError` if the message is malformed.
 
-    Any node can publish on that topic.
+    Validation is necessary, because any node can publish on a parameter topic.
     """
     listed = state.get("parameters") if isinstance(state, Mapping) else None
     if not isinstance(listed, list):
@@ -281,7 +282,12 @@ def text_of(value: object) -> str:
 
 
 def value_of(text: str, kind: str) -> object:
-    """Parse the text of a parameter of this kind. Raises `ValueError` with a message for the user."""
+    """Parse the text of a value. Raises `ValueError` with a message for the user.
+
+    Args:
+        text: Text that the user entered.
+        kind: Kind of the parameter, see `ShownParameter`.
+    """
     if kind == "str":
         return text
     stripped = text.strip()

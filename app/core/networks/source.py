@@ -22,7 +22,7 @@ POLL_S = 2.0
 
 
 class OtherSource(LiveSource):
-    """Source of another network. Its sinks receive topics by their keys (`key_of`)."""
+    """Source of another network. Messages are passed to the sinks by topic key (`key_of`)."""
 
     poll_s = REQUEST_TIMEOUT_S
 
@@ -44,15 +44,15 @@ class OtherSource(LiveSource):
         self._revision = 0
 
     def join(self) -> Node:
-        """Join the network. Raises `NepError` while the network does not respond."""
+        """Join the network and return the node. Raises `NepError` if the network does not respond."""
         with _convert_errors():
             return nep.node(NODE_NAME, self._kind.name, master=self.address, wait_s=POLL_S)
 
     def query_graph(self, node: Node) -> GraphView:
-        """Return the graph, with the codec with which each topic is read.
+        """Return the graph, with the codec that is used to read each topic.
 
-        The revision increases with every change of nodes or topics. Back ends that build a new graph for each
-        query don't count revisions themselves.
+        The revision of the graph increases with every change of nodes or topics, even if the back end
+        does not count revisions.
         """
         with _convert_errors():
             view = node.graph(timeout_s=POLL_S)
@@ -67,7 +67,7 @@ class OtherSource(LiveSource):
         return replace(view, topics=topics, revision=self._revision)
 
     def subscribe(self, node: Node, topic: str, msg_type: str, sink: NodeSink) -> Subscriber:
-        """Subscribe to a topic with the message type that can be read (`NetworkKind.reads`)."""
+        """Subscribe to a topic with the message type given by `NetworkKind.readable_type_of`."""
         info = self._view.topics.get(topic) if self._view is not None else None
         wanted = self._kind.readable_type_of(info) if info is not None else msg_type
         with _convert_errors():

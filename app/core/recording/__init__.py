@@ -1,1 +1,1 @@
-"""Recordings: the recorder's process, and the list of files in a folder."""
+"""Recordings: client of the recorder process, replay, and the files in a folder."""

@@ -1,4 +1,4 @@
-"""Selection of topics to record, by names or patterns, and its form in the settings."""
+"""Selection of the topics to record, by name or pattern, and its storage in the settings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MIN_MINUTES, MAX_MINUTES = 0.1, 10_080.0
 """Minimum and maximum duration of a recording in minutes."""
 MAX_NAMES = 1_000
 MAX_NAME_LENGTH = 80
-"""Maximum length of a file name, which all file systems accept with an extension added."""
+"""Maximum length of a file name without extension, supported by all file systems."""
 EXCLUDE_KEYWORD = lazy("not")
 _INVALID_CHARACTERS = re.compile(r'[\x00-\x1f\x7f<>:"/\\|?*\ud800-\udfff]+')
 _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.IGNORECASE)
@@ -32,13 +32,13 @@ _RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\..*)?", re.I
 
 @dataclass(frozen=True, slots=True)
 class RecordingChoice:
-    """Selection of topics to record, and limits of the recording.
+    """Selection of the topics to record, and limits of the recording.
 
     Attributes:
-        mode: "all", "chosen" for the topics in `topics`, or "pattern" for topics that match one of `patterns`
-            (any if empty) and none of `left_out`.
-        ends_min: Maximum duration in minutes; None for no limit.
-        ends_gb: Maximum size in GB (10^9 bytes); None for no limit.
+        mode: "all"; "chosen" for the topics in `topics`; or "pattern" for the topics that match a
+            pattern in `patterns` (empty: all topics) and no pattern in `excluded`.
+        max_minutes: Maximum duration in minutes; None for no limit.
+        max_gb: Maximum size in GB (10^9 bytes); None for no limit.
     """
 
     mode: str = "all"
@@ -51,9 +51,12 @@ class RecordingChoice:
     def expected_end(
         self, elapsed_s: float, size_bytes: float, speed: float | None
     ) -> tuple[float, float] | None:
-        """Return the expected duration (s) and size (bytes) at the end; None if unknown.
+        """Return the expected duration (s) and size (bytes) of the finished recording; None if unknown.
 
-        ``speed`` is the current data rate in bytes per second.
+        Args:
+            elapsed_s: Current duration in seconds.
+            size_bytes: Current size.
+            speed: Current data rate in bytes per second, or None.
         """
         ends = [] if self.max_minutes is None else [60.0 * self.max_minutes]
         if self.max_gb is not None and speed:
@@ -65,7 +68,7 @@ class RecordingChoice:
 
     @property
     def selection(self) -> recorder.TopicSelection:
-        """Selection in the form of the recorder. Raises `BadTopicError` for an invalid topic."""
+        """Selection as expected by the recorder. Raises `BadTopicError` for an invalid topic."""
         if self.mode == "chosen":
             return recorder.TopicSelection(self.topics)
         if self.mode == "pattern":
@@ -74,7 +77,7 @@ class RecordingChoice:
 
     @property
     def problem(self) -> str:
-        """Reason why the selection can't be recorded, or ""."""
+        """Reason why the selection is invalid, or ""."""
         if self.mode == "chosen" and not self.topics:
             return _("No topic is selected.")
         try:
@@ -85,7 +88,7 @@ class RecordingChoice:
 
 
 def parse_choice(told: object) -> RecordingChoice:
-    """Parse a selection from the settings; invalid parts become defaults."""
+    """Parse a selection stored in the settings; invalid parts become defaults."""
     if not isinstance(told, Mapping):
         return RecordingChoice()
     mode = told.get("mode")
@@ -100,7 +103,7 @@ def parse_choice(told: object) -> RecordingChoice:
 
 
 def choice_to_json(choice: RecordingChoice) -> dict[str, object]:
-    """Return the selection as JSON data for the settings."""
+    """Return a selection as JSON data for the settings."""
     return {
         "mode": choice.mode,
         "topics": list(choice.topics),
@@ -121,10 +124,10 @@ class RingSettings:
 
     Attributes:
         is_on: True if the flight recorder is on.
-        seconds: Duration that is stored.
-        size_gb: Maximum size in GB (10^9 bytes).
-        patterns: Patterns of the recorded topics; all topics if empty.
-        left_out: Patterns of topics that are not recorded.
+        seconds: Duration of the buffer in seconds.
+        size_gb: Maximum size of the buffer in GB (10^9 bytes).
+        patterns: Patterns of the recorded topics; empty for all topics.
+        excluded: Patterns of topics that are not recorded.
     """
 
     is_on: bool = False
@@ -135,12 +138,12 @@ class RingSettings:
 
     @property
     def problem(self) -> str:
-        """Reason why these topics can't be recorded, or ""."""
+        """Reason why the selection of topics is invalid, or ""."""
         return RecordingChoice("pattern", (), self.patterns, self.excluded).problem
 
 
 def parse_ring_settings(told: object) -> RingSettings:
-    """Parse settings of the flight recorder; invalid parts become defaults."""
+    """Parse the settings of the flight recorder; invalid parts become defaults."""
     if not isinstance(told, Mapping):
         return RingSettings()
     seconds, size_gb = told.get("seconds"), told.get("size_gb")
@@ -154,7 +157,7 @@ def parse_ring_settings(told: object) -> RingSettings:
 
 
 def ring_settings_to_json(wish: RingSettings) -> dict[str, object]:
-    """Return settings of the flight recorder as JSON data."""
+    """Return the settings of the flight recorder as JSON data."""
     return {
         "is_on": wish.is_on,
         "seconds": wish.seconds,
@@ -174,9 +177,10 @@ def _is_within(value: object, least: float, most: float) -> bool:
 
 
 def parse_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Parse "/arm/* *action* not /arm/raw" into wanted and unwanted patterns.
+    """Parse patterns such as "/arm/* *action* not /arm/raw".
 
-    The patterns after "not" are unwanted.
+    Returns:
+        Patterns of topics to record, and patterns after "not", whose topics are excluded.
     """
     wanted: list[str] = []
     unwanted: list[str] = []
@@ -193,16 +197,21 @@ def parse_patterns(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def file_stem(name: str) -> str:
-    """Convert a name to a file name that is valid on every system; "" if no valid character is left."""
+    """Return ``name`` as a file name that is valid on every operating system.
+
+    Returns "" if no valid character remains.
+    """
     plain = _INVALID_CHARACTERS.sub(" ", name)
     plain = " ".join(plain.split())[:MAX_NAME_LENGTH].strip(" .")
     return f"_{plain}" if _RESERVED_NAMES.fullmatch(plain) else plain
 
 
 def free_path(wanted: Path, *, is_folder: bool = False) -> Path:
-    """Return a path that does not exist: this one, or with a number appended.
+    """Return an unused path: ``wanted``, or the same path with a number appended to the name.
 
-    For a folder, dots in the name are not the start of a suffix.
+    Args:
+        wanted: Preferred path.
+        is_folder: True for a folder; a dot in the name then does not start an extension.
     """
     stem, suffix = (wanted.name, "") if is_folder else (wanted.stem, wanted.suffix)
     path, number = wanted, 2

@@ -1,7 +1,8 @@
-"""Client of the recorder process: start, stop, save the flight recorder, report problems.
+"""Client of the recorder process: start and stop recordings, save the flight recorder, report problems.
 
-The process runs `nep.recordings.child`. It is not slowed down by a busy window, and finishes a recording even
-after Studio has exited. Background threads write commands and read replies, so that the window never blocks.
+The process runs `nep.recordings.child`. A busy window doesn't slow it down, and it finishes a recording
+even after Studio has exited. Background threads write commands and read replies, so that the window
+never blocks.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from nep.masters.process import NO_CONSOLE
 from nep.recordings.formats.figures import TopicStats, parse_stats
 
 LOW_DISK_BYTES = 1_000_000_000
-"""Free disk space below which the user is warned. At 200 MB the recorder stops."""
+"""Free disk space in bytes below which the user is warned. The recorder itself stops at 200 MB."""
 AGAIN_S, AGAIN_AT_MOST_S = 2.0, 30.0
 """Initial and maximum pause before a flight recorder whose process ended is restarted; doubled each time."""
 END_TIMEOUT_S = 2.0
@@ -37,7 +38,12 @@ _TAIL_BYTES = 2000
 
 @dataclass(frozen=True, slots=True)
 class RecorderEvent:
-    """Event sent by a recorder process, as described in `nep.recordings.child`."""
+    """Event sent by a recorder process.
+
+    Attributes:
+        process: Number of the process.
+        content: Content of the event, as described in `nep.recordings.child`.
+    """
 
     process: int
     content: Mapping[str, object]
@@ -45,7 +51,12 @@ class RecorderEvent:
 
 @dataclass(frozen=True, slots=True)
 class RecorderExited:
-    """Event: a recorder process has ended or could not be started; ``detail`` is its last output."""
+    """Event: a recorder process has ended or could not be started.
+
+    Attributes:
+        process: Number of the process.
+        detail: Last output of the process, or the reason why it could not be started.
+    """
 
     process: int
     detail: str
@@ -53,7 +64,7 @@ class RecorderExited:
 
 @dataclass(frozen=True, slots=True)
 class RingChoice:
-    """Selection, folder and limits of the flight recorder."""
+    """Topic selection, folder and limits of the flight recorder."""
 
     folder: Path
     seconds: float = 60.0
@@ -68,14 +79,15 @@ class RecorderState:
 
     Attributes:
         phase: "" (idle), "starting", "recording" or "ending".
-        lost: Number of lost messages, determined by their sequence numbers.
-        unkept: Number of messages that could not be written.
+        lost: Number of lost messages, determined from sequence numbers.
+        unwritten: Number of messages that could not be written.
         free_bytes: Free space on the disk; None while unknown.
-        ring_s: Duration stored by the flight recorder; None while it is off.
-        ring_bytes: Size stored by the flight recorder.
-        keeping: Files that are being saved from the flight recorder.
-        last: File that was finished last.
-        limit: Limit at which that file ended: "time", "size", or "".
+        ring_s: Duration of the flight recorder's content in seconds; None while the flight recorder is
+            off.
+        ring_bytes: Size of the flight recorder's content.
+        saving: Files that are being saved from the flight recorder.
+        last: Last finished file.
+        limit: Limit that ended this file: "time", "size", or "" if it was stopped.
     """
 
     phase: str = ""
@@ -95,10 +107,10 @@ class RecorderState:
 
 
 class CommandChannel(Protocol):
-    """Running recorder process, as used by `RecorderClient`."""
+    """Interface of a running recorder process, as used by `RecorderClient`."""
 
     def send_command(self, content: Mapping[str, object]) -> bool:
-        """Send a command; return False when the queue is full. Never blocks."""
+        """Send a command; return False if the queue is full. Never blocks."""
 
     def close(self, wait_s: float) -> None:
         """Close the input and wait at most ``wait_s`` seconds for the process to exit.
@@ -108,9 +120,9 @@ class CommandChannel(Protocol):
 
 
 StartRecorder = Callable[[int, str, Callable[[object], object]], CommandChannel]
-"""Starts a recorder process from its number, the address of the master, and an event callback.
+"""Function that starts a recorder process, given its number, the master's address, and an event callback.
 
-The callback is called from any thread.
+The callback is called in any thread.
 """
 
 
@@ -118,14 +130,14 @@ class RecorderProcess:
     """Recorder process and its pipes (see `StartRecorder`)."""
 
     def __init__(self, number: int, address: str, post_event: Callable[[object], object]) -> None:
-        # Starts in a thread; posts `RecorderSaid` events, and finally a `RecorderGone`.
+        # Starts in a thread; posts `RecorderEvent` events, and finally a `RecorderExited`.
         self._number, self._address, self._post_event = number, address, post_event
         self._orders: queue.Queue[bytes | None] = queue.Queue(MAX_QUEUED_COMMANDS)
         self._has_ended = threading.Event()
         threading.Thread(target=self._run, name="recorder-process", daemon=True).start()
 
     def send_command(self, content: Mapping[str, object]) -> bool:
-        """Queue a command; return False when the queue is full."""
+        """Queue a command; return False if the queue is full."""
         try:
             self._orders.put_nowait(orjson.dumps(content) + b"\n")
         except queue.Full:
@@ -195,9 +207,9 @@ def _tail(log: IO[bytes]) -> str:
 
 
 class RecorderClient:
-    """Sends commands to the recorder and tracks its state.
+    """Client that sends commands to the recorder process and tracks its state.
 
-    Not thread-safe: use it from the window's thread.
+    Not thread-safe; use it from the main thread.
     """
 
     def __init__(
@@ -241,9 +253,15 @@ class RecorderClient:
         seconds: float | None = None,
         most_bytes: int | None = None,
     ) -> bool:
-        """Start recording these topics (all if empty); return False if a recording is in progress.
+        """Start a recording; return False if one is already in progress.
 
-        The recording stops after ``seconds`` or at ``most_bytes``, whichever comes first.
+        Args:
+            path: File to write.
+            topics: Topics or patterns to record; empty for all topics.
+            left_out: Patterns of topics that are not recorded.
+            note: Note stored in the file.
+            seconds: Maximum duration.
+            most_bytes: Maximum size.
         """
         if self.state.phase:
             return False
@@ -267,7 +285,7 @@ class RecorderClient:
         return True
 
     def stop(self) -> None:
-        """Stop recording. The file is complete when ``phase`` is "" again."""
+        """Stop the recording. The file is complete once ``phase`` is "" again."""
         if self.state.phase in {"starting", "recording"}:
             self._set(replace(self.state, phase="ending"))
             self._send(op="stop")
@@ -278,18 +296,21 @@ class RecorderClient:
             self._send(op="note", text=text)
 
     def write_entry(self, role: str, value: Mapping[str, object], to: str = "") -> None:
-        """Add an event to the recording and to the flight recorder, as far as they are on.
+        """Add an event to the recording and to the flight recorder, if they are on.
 
-        ``to`` restricts this to "recording" or "ring".
+        Args:
+            role: Channel of the event: "runs" or "alarms".
+            value: JSON content of the event.
+            to: "recording" or "ring" to add the event only there.
         """
         is_heard = (self.state.phase and to != "ring") or (self._ring is not None and to != "recording")
         if self._process is not None and is_heard:
             self._process.send_command({"op": "say", "role": role, "value": dict(value), "to": to})
 
     def set_ring(self, choice: RingChoice | None) -> None:
-        """Switch the flight recorder on with this selection, or off with None.
+        """Switch the flight recorder on with these settings, or off with None.
 
-        The flight recorder is restarted after a failure.
+        After a failure, the flight recorder is restarted automatically.
         """
         if choice == self._ring:
             return
@@ -302,9 +323,15 @@ class RecorderClient:
             self._start_ring(choice)
 
     def save_last(self, path: Path, seconds: float, note: str = "") -> bool:
-        """Save the last seconds to a file.
+        """Save the newest content of the flight recorder to a file.
 
-        Return False if the flight recorder is off or saves too many files.
+        Args:
+            path: File to write.
+            seconds: Duration to save.
+            note: Note stored in the file.
+
+        Returns:
+            False if the flight recorder is off or is already saving too many files.
         """
         if self._ring is None or self._process is None or len(self.state.saving) >= MAX_PENDING_SAVES:
             return False
@@ -313,7 +340,7 @@ class RecorderClient:
         return True
 
     def check(self) -> None:
-        """Restart a flight recorder whose process ended unexpectedly. Called once a second."""
+        """Restart the flight recorder if its process ended unexpectedly. Called once a second."""
         if self._ring is not None and self._process is None and self._clock() >= self._retry_at:
             self._start_ring(self._ring)
 
@@ -326,7 +353,7 @@ class RecorderClient:
     # ---- events of the process
 
     def on_event(self, event: RecorderEvent | RecorderExited) -> None:
-        """Apply an event of the process; events of earlier processes are ignored."""
+        """Apply an event of the recorder process. Events of earlier processes are ignored."""
         if event.process != self._number or self._process is None:
             return
         if isinstance(event, RecorderExited):

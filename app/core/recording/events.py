@@ -1,4 +1,4 @@
-"""Events written to recordings: runs of behaviours, and alarms."""
+"""Events that Studio adds to recordings: runs of behaviours, and alarms."""
 
 from __future__ import annotations
 
@@ -14,23 +14,30 @@ from nep.programs.alarms import AlarmEvent
 from nep.programs.alarms.sentences import event_text
 
 MAX_ACTIVE = 200
-"""Maximum number of active alarms that are sent repeatedly; further ones are sent once."""
+"""Maximum number of active alarms that are sent repeatedly; further alarms are sent once."""
 MAX_TEXT_LENGTH = 200
 _ACTIVE_STATES = frozenset({"running", "paused"})
 
 
 class SendEvent(Protocol):
-    """Function that sends an event to the recorder."""
+    """Function that adds an event to the recorder's files."""
 
     def __call__(self, role: str, value: Mapping[str, object], to: str = "") -> object:
-        """Send an event on a channel ("runs" or "alarms"); ``to`` restricts it to "recording" or "ring"."""
+        """Add an event to the recording and to the flight recorder.
+
+        Args:
+            role: Channel of the event: "runs" or "alarms".
+            value: JSON content of the event.
+            to: "recording" or "ring" to add the event only there.
+        """
 
 
 class RecordedEvents:
-    """Publisher of run and alarm events for the recorder. Not thread-safe: use it from the window's thread.
+    """Publisher of run and alarm events for the recorder. Not thread-safe; use it from the main thread.
 
-    Active runs and alarms are sent again by `repeat`: once to a recording that starts later, and every second
-    to the flight recorder, so that each saved part contains them. Otherwise only changes are sent.
+    Active runs and alarms are sent again by `repeat`: once to a recording that starts later, and every
+    second to the flight recorder, so that each saved part contains them. Otherwise only changes are
+    sent.
     """
 
     def __init__(self, say: SendEvent, *, clock_ns: Callable[[], int] = time.time_ns) -> None:
@@ -42,14 +49,18 @@ class RecordedEvents:
         self._run_told: dict[str, object] = {}
 
     def repeat(self, to: str) -> None:
-        """Send the active runs and alarms again, to "recording" or "ring"."""
+        """Send the active runs and alarms again.
+
+        Args:
+            to: Destination: "recording" or "ring" (the flight recorder).
+        """
         for role, told in self._present.values():
             self._say(role, told, to)
 
     # ---- behaviours
 
     def update_run(self, run: RunState) -> None:
-        """Apply the state of the run. Called at each tick."""
+        """Send an event if the state of the run has changed. Called at each tick."""
         before, self._run = self._run, run
         if run is before:
             return
@@ -85,7 +96,7 @@ class RecordedEvents:
     # ---- alarms
 
     def on_alarm(self, event: AlarmEvent) -> None:
-        """Apply an alarm event: raised, cleared, or still on."""
+        """Send an alarm event: raised, cleared, or still active."""
         key = f"alarm-{event.rule.id}"
         known = self._present.get(key)
         if event.kind == "off":

@@ -13,7 +13,7 @@ from nep.recordings.formats.damage import corruption_text
 
 
 class _CancelledError(Exception):
-    """The user cancelled the export."""
+    """Raised in the export thread when the user cancels the export."""
 
 
 class RecordingExport:
@@ -61,7 +61,7 @@ class RecordingExport:
         return done / total if total else None
 
     def cancel(self) -> None:
-        """Cancel the export. The incomplete file is deleted, complete ones remain."""
+        """Cancel the export. The incomplete file is deleted; completed files remain."""
         self._is_cancelled.set()
 
     def close(self, wait_s: float = 2.0) -> None:
@@ -71,7 +71,7 @@ class RecordingExport:
         self._opener.close()
 
     def result_text(self) -> str:
-        """Return the result as a sentence without a full stop; "" while the export is running."""
+        """Return the result as a sentence without a full stop; "" while the export is in progress."""
         if not self.is_over:
             return ""
         if self.was_cancelled and not self.files:

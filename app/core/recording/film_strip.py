@@ -15,12 +15,12 @@ from nep.recordings.reader import RecordedTopic, Recording
 from nep.recordings.recorder import TopicSelection
 
 _BUDGET = (1_000_000_000, 20.0)
-"""Maximum bytes and seconds for reading one recording."""
+"""Maximum number of bytes and seconds for reading one recording."""
 _MAX_TOPICS = 10_000
 SAMPLES = 4
-"""Number of messages of a topic that are read to estimate the total size."""
+"""Number of messages of a topic that are read to estimate the size of all its messages."""
 MAX_SAMPLED_TOPICS = 200
-"""Maximum number of topics whose size is estimated."""
+"""Maximum number of topics whose message size is estimated."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class FilmStripPreview:
     """Preview of a recording from ``start_ns`` to ``end_ns``.
 
     Attributes:
-        pictures: Images at the centres of equal time intervals, of the topic with most images. None where no
-            image can be read; empty if the recording has no images.
-        counts: Number of messages of all topics in equal time intervals.
-        by_topic: The same for each topic.
-        message_bytes: Average message size by topic, as far as known.
+        pictures: Images at the centres of equal time intervals, of the topic with the most images. None
+            for an image that can't be read; empty if the recording has no images.
+        counts: Number of messages of all topics in each of several equal time intervals.
+        by_topic: Number of messages in these intervals, by topic.
+        message_bytes: Average message size, by topic; topics with unknown size are missing.
     """
 
     path: Path
@@ -50,9 +50,15 @@ class FilmStripPreview:
         return None if each is None else each * topic.message_count
 
     def about(self, begin_ns: int, end_ns: int, topics: Collection[str]) -> tuple[float, float | None]:
-        """Estimate the number and total bytes of messages of these topics in a time range.
+        """Estimate the number and the total size (bytes) of the messages in a time range.
 
-        The resolution is that of `counts`. The size is None if it is unknown for one of the topics.
+        The estimate is as precise as the intervals of `counts`. The size is None if it is unknown for
+        one of the topics.
+
+        Args:
+            begin_ns: Start of the range.
+            end_ns: End of the range.
+            topics: Names of the topics to count.
         """
         count = size = 0.0
         is_known = True
@@ -81,7 +87,15 @@ class FilmStripPreview:
 def film_strip(
     path: Path, pictures: int, bars: int, fit: Size, opener: RecordingOpener
 ) -> FilmStripPreview | None:
-    """Read the preview of a recording, with this number and size of images; None if it can't be read."""
+    """Read the preview of a recording; return None if the recording can't be read.
+
+    Args:
+        path: File of the recording.
+        pictures: Number of images.
+        bars: Number of time intervals in which messages are counted.
+        fit: Size of the images in pixels.
+        opener: Opens the recording.
+    """
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=_BUDGET) as recording:
             if not recording.message_count or len(recording.topics) > _MAX_TOPICS:
@@ -132,10 +146,19 @@ def _message_bytes(recording: Recording) -> dict[str, float]:
 def select_part(
     look: FilmStripPreview, begin_ns: int, end_ns: int, wanted: Sequence[str], unwanted: Sequence[str]
 ) -> Part:
-    """Return the part of a recording in a time range (inclusive), limited to topics that match the patterns.
+    """Return the part of a recording in an inclusive time range, limited to topics that match patterns.
 
-    Without patterns, all topics are included. ``topics`` of the result is empty if none matches. Raises
-    `BadTopicError` for an invalid pattern.
+    Raises `BadTopicError` for an invalid pattern.
+
+    Args:
+        look: Preview of the recording.
+        begin_ns: Start of the range.
+        end_ns: End of the range.
+        wanted: Patterns of topics to include; empty for all topics.
+        unwanted: Patterns of topics to exclude.
+
+    Returns:
+        Part of the recording. If no topic matches, its ``topics`` is empty.
     """
     topics = None
     if wanted or unwanted:

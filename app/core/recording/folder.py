@@ -1,4 +1,4 @@
-"""Recordings in a folder and their contents, read in a background thread."""
+"""Recordings in a folder. Their contents are read in a background thread."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ MAX_FILES = 2_000
 MAX_READS_PER_SCAN = 50
 """Number of files after which a partial result is reported."""
 MAX_SCAN_S = 2.0
-"""Time after which a partial result is reported; reading one file may take some seconds."""
+"""Time in seconds after which a partial result is reported. Reading one file may take some seconds."""
 MAX_TOPICS = 200
 CACHE_BYTES = 8_000_000
-"""Cache size for a recording that is opened only briefly."""
+"""Cache size in bytes for a recording that is opened only briefly."""
 SCAN_BUDGET = (256_000_000, 3.0)
-"""Maximum bytes and seconds for scanning one file."""
+"""Maximum number of bytes and seconds for reading one file."""
 _OWNER = "recordings"
 
 
@@ -38,11 +38,12 @@ class RecordingFacts:
 
     Attributes:
         is_read: True if the content was read; otherwise only name, size and time are known.
-        topics: First 200 topic names.
-        is_complete: True if the file was closed properly; otherwise only the intact part is read.
-        is_kept: True if the file was saved by a flight recorder.
-        problem: Why the file can't be read, or "".
-        not_scanned: Why the file was not scanned, or ""; it may still be possible to open it.
+        topics: Names of the first 200 topics.
+        is_complete: True if the file was closed properly; otherwise only the intact part is used.
+        is_from_flight_recorder: True if the file was saved by a flight recorder.
+        problem: Reason why the file can't be read, or "".
+        scan_problem: Reason why the content was not read here, or ""; opening the file may still be
+            possible.
         lost: Number of messages that were lost or could not be written; None if unknown.
     """
 
@@ -65,11 +66,12 @@ class RecordingFacts:
 
 @dataclass(frozen=True, slots=True)
 class FolderScan:
-    """Contents of the folder, newest first.
+    """Result of a scan of the folder.
 
     Attributes:
-        problem: Why the folder can't be read, or "".
-        left_out: Number of older files beyond the limit.
+        files: Recordings, newest first.
+        problem: Reason why the folder can't be read, or "".
+        left_out: Number of older files that are not listed.
         is_whole: True if all files have been read; otherwise call `RecordingFolder.start_scan` again.
     """
 
@@ -86,7 +88,13 @@ def default_folder() -> Path:
 
 
 def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
-    """Return an unused path for a recording."""
+    """Return an unused path for a new recording.
+
+    Args:
+        folder: Folder of recordings.
+        now: Current local time, used in the file name.
+        word: First part of the file name.
+    """
     stem = f"{word}-{now.strftime('%Y-%m-%d-%H-%M-%S')}"
     made, number = folder / f"{stem}{SUFFIX}", 2
     while made.exists():
@@ -95,7 +103,10 @@ def new_path(folder: Path, now: datetime, word: str = "recording") -> Path:
 
 
 class RecordingFolder:
-    """Scans a folder repeatedly, opening only new files. Not thread-safe: use it from the window's thread."""
+    """Scanner of a folder of recordings. Repeated scans open only new files.
+
+    Not thread-safe; use it from the main thread.
+    """
 
     def __init__(self, folder: Path, opener: RecordingOpener | None = None) -> None:
         self.folder = folder
@@ -107,7 +118,8 @@ class RecordingFolder:
     def start_scan(self, being_written: Path | None = None) -> None:
         """Start a scan in the background; `pop_result` returns the result.
 
-        ``being_written`` is not opened.
+        Args:
+            being_written: File of the recording in progress, which is not opened.
         """
         self._worker.submit(_OWNER, lambda: self._scan(being_written))
 
@@ -155,7 +167,7 @@ class RecordingFolder:
 
 
 def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts:
-    """Return the facts completed from the file, or with the reason why it wasn't read."""
+    """Return ``plain`` completed with the content of the file, or with the reason why it wasn't read."""
     try:
         with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             words = recording.recorder_metadata
@@ -190,7 +202,13 @@ def _lost(recording: Recording) -> int | None:
 
 
 def picture_in(path: Path, fit: Size, opener: RecordingOpener) -> Picture | None:
-    """Return an image of the topic with most images, for a view of this size; None if there is none."""
+    """Return an image of the topic with the most images; None if the recording has no readable image.
+
+    Args:
+        path: File of the recording.
+        fit: Size of the view in pixels.
+        opener: Opens the recording.
+    """
     try:
         with opener.open(path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             topics = [each for each in recording.topics.values() if each.codec == "image"]

@@ -1,6 +1,6 @@
 """Opening of recordings in a separate process, so that a damaged file can't crash Studio.
 
-Tests and programs without a window may read recordings in their own process.
+Tests and programs without a window can read recordings in their own process (`LocalOpener`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from nep.recordings.reader import Recording
 
 
 class RecordingOpener(Protocol):
-    """Opens recordings (see `nep.recordings.apart.remote.ReaderProcess`)."""
+    """Interface for opening recordings (see `nep.recordings.apart.remote.ReaderProcess`)."""
 
     def open(
         self,
@@ -27,14 +27,22 @@ class RecordingOpener(Protocol):
         progress: Callable[[int, int], object] | None = None,
         budget: tuple[int, float | None] | None = None,
     ) -> Recording:
-        """Open a recording. Raises `RecordingError`."""
+        """Open a recording. Raises `RecordingError`.
+
+        Args:
+            path: File of the recording.
+            cache_bytes: Size of the cache for decompressed chunks.
+            progress: Called with the number of scanned bytes and the total size.
+            budget: Maximum number of bytes and seconds for scanning a file without an index; None for
+                no limit.
+        """
 
     def close(self) -> None:
-        """Stop immediately, even while a recording is being read. Idempotent."""
+        """Stop immediately, even if a recording is being read. Idempotent."""
 
 
 def process_opener() -> RecordingOpener:
-    """Return an opener that reads recordings in a separate process, which the first recording starts."""
+    """Return an opener that reads recordings in a child process, started with the first recording."""
     return ReaderProcess(module_command("nep.recordings.apart.reader_process"))
 
 
@@ -49,11 +57,11 @@ class LocalOpener:
         progress: Callable[[int, int], object] | None = None,
         budget: tuple[int, float | None] | None = None,
     ) -> Recording:
-        """Open a recording. Raises `RecordingError`."""
+        """Open a recording in this process. See `RecordingOpener.open`."""
         limit = None if budget is None else ReadBudget(path, *budget)
         return Recording(
             path, file=FileReader(path, cache_bytes=cache_bytes, progress=progress, budget=limit)
         )
 
     def close(self) -> None:
-        """Do nothing, because there is no process to stop."""
+        """Do nothing. A local opener has no process to stop."""

@@ -1,4 +1,4 @@
-"""Recordings of a session: those started by the user, the flight recorder, and the folder of files."""
+"""Recordings of a session: recordings by the user, the flight recorder, and the folder of files."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ else:  # they import the reading of recordings, which no start should wait for
 FOLDER_KEY, CHOICE_KEY, RING_KEY = "recordings_folder", "recording", "flight_recorder"
 NO_FOLDER = "recorder:folder"
 CHOOSE_FOLDER = "recording.folder"
-"""Window command that opens the choice of another folder."""
+"""Name of the window command that lets the user choose another folder."""
 _GB = 1_000_000_000
 _SAVED_FILE = re.compile(r"[\w.-]+\.mcap\b")
 
@@ -57,9 +57,11 @@ def _ignore_made(_path: Path, _kind: str) -> None: ...
 
 
 class SessionRecordings:
-    """Recordings of a session. Not thread-safe, including `on_event`: use it from the window's thread.
+    """Recordings of a session. Not thread-safe; use it from the main thread, including `on_event`.
 
-    ``on_made`` is called with each finished file and "recorded" or "kept".
+    Attributes:
+        on_made: Callback for each finished file, with its path and "recorded" or "kept" (flight
+            recorder).
     """
 
     def __init__(
@@ -127,7 +129,7 @@ class SessionRecordings:
         return None
 
     def new_opener(self) -> openers.RecordingOpener:
-        """Return a new opener of recordings, which the caller closes."""
+        """Return a new opener of recordings. The caller must close it."""
         return openers.process_opener() if self._reads_apart else openers.LocalOpener()
 
     # ---- recording
@@ -139,18 +141,21 @@ class SessionRecordings:
 
     @property
     def elapsed_s(self) -> float:
-        """Duration of the recording in seconds; 0 when idle or while its process starts."""
+        """Duration of the recording in seconds; 0 while idle or starting."""
         return 0.0 if self._started_s is None else max(0.0, self._clock() - self._started_s)
 
     def set_choice(self, choice: RecordingChoice) -> None:
-        """Set and save the selection for the next recordings."""
+        """Set and save the topic selection for the next recordings."""
         self.choice = choice
         self._save_setting(CHOICE_KEY, choice_to_json(choice))
 
     def record(self, name: str = "", note: str = "", choice: RecordingChoice | None = None) -> str:
-        """Start a recording; return the reason why it can't start, or "".
+        """Start a recording; return the reason if it can't start, else "".
 
-        ``choice`` applies to this recording only. Without a ``name``, the file is named by the time.
+        Args:
+            name: Name of the file; by default, the file is named by the time.
+            note: Note stored in the file.
+            choice: Topic selection for this recording only; default: the saved selection.
         """
         choice = choice if choice is not None else self.choice
         if self.is_recording:
@@ -190,7 +195,7 @@ class SessionRecordings:
     def set_ring_settings(self, wish: RingSettings) -> None:
         """Set and save the settings of the flight recorder.
 
-        Changing the selection of topics restarts the flight recorder and discards its content.
+        A change of the topic selection restarts the flight recorder and discards its content.
         """
         self.wish = wish
         self._save_setting(RING_KEY, ring_settings_to_json(wish))
@@ -210,9 +215,12 @@ class SessionRecordings:
     def save_last(
         self, note: str = "", seconds: float | None = None, done: DoneCallback | None = None
     ) -> str:
-        """Save the last seconds to a file; return the reason why that can't start, or "".
+        """Save the newest content of the flight recorder; return the reason if that can't start, else "".
 
-        ``done`` is called with the result when the file is finished.
+        Args:
+            note: Note stored in the file.
+            seconds: Duration to save; default: the whole content.
+            done: Called with the result when the file is finished.
         """
         if not self.wish.is_on:
             return _("The flight recorder is off.")
@@ -232,7 +240,13 @@ class SessionRecordings:
         return ""
 
     def save_for_alarm(self, event: AlarmEvent, action: AlarmAction, done: DoneCallback) -> None:
-        """Save the last seconds as the action of an alarm; ``done`` is called with the result."""
+        """Save the newest content of the flight recorder, as the action of an alarm.
+
+        Args:
+            event: Alarm event that triggered the action.
+            action: Action with the duration to save.
+            done: Called with the result.
+        """
         said = event_text(event.rule.condition, event.value)
         why_not = self.save_last(said, action.seconds, done)
         if why_not:
@@ -246,7 +260,11 @@ class SessionRecordings:
         self._apply_ring_settings()
 
     def check(self) -> None:
-        """Monitor the recorder process. Called once a second."""
+        """Restart a recorder process that ended unexpectedly, and repeat active events.
+
+        Called once a second. Active runs and alarms are sent to the flight recorder again, see
+        `RecordedEvents.repeat`.
+        """
         self.client.check()
         self.events.repeat("ring")
 
@@ -272,7 +290,7 @@ class SessionRecordings:
                 done(is_there, words.format(file=path.name))
 
     def close(self) -> None:
-        """Close the recorder; its process finishes a recording in progress, even after Studio has exited."""
+        """Close the recorder. Its process finishes a recording in progress, even after Studio has exited."""
         self.client.close()
 
     def _save_setting(self, key: str, value: object) -> None:
@@ -281,6 +299,6 @@ class SessionRecordings:
 
 
 def saved_file_name(words: str) -> str:
-    """Return the file name contained in a text such as "kept alarm-2026-11-27-10-00-00.mcap", or ""."""
+    """Return the file name in a text such as "kept alarm-2026-11-27-10-00-00.mcap"; "" if there is none."""
     found = _SAVED_FILE.search(words)
     return found[0] if found is not None else ""

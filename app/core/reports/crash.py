@@ -1,7 +1,7 @@
-"""Crash records: which part of Studio crashed, how, and its output.
+"""Crash records: which part of Studio crashed, the cause, and its output.
 
-The code that detects a crash logs it. A log record with the ``extra`` of `crash_extra` is also stored as a
-crash report (`app.core.reports.crash_reports.CrashLog`).
+The code that detects a crash logs it. A log record with the ``extra`` of `crash_extra` is also stored
+as a crash report (`app.core.reports.crash_reports.CrashLog`).
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ CRASH_SIGNALS = frozenset(
     for name in ("SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGKILL", "SIGSEGV", "SIGSYS", "SIGTRAP")
     if hasattr(signal, name)
 )
-"""Signals that mean a crash. The system sends SIGKILL when it runs out of memory."""
+"""Signals that indicate a crash. The system sends SIGKILL when it runs out of memory."""
 FIRST_BAD_STATUS = 0xC0000000
-"""Lowest exit code that means a crash on Windows, where exit codes of crashes are NTSTATUS values."""
+"""Lowest exit code on Windows that indicates a crash; such exit codes are NTSTATUS values."""
 CTRL_C_STATUS = 0xC000013A
-"""Exit code on Windows after Ctrl+C or when the user logs out, which is not a crash."""
+"""Exit code on Windows after Ctrl+C or when the user logs out. Not a crash."""
 STATUS_TEXTS = {
     0xC0000005: "access violation",
     0xC000001D: "illegal instruction",
@@ -46,7 +46,7 @@ class Crash:
         part: Part that crashed.
         how: Cause, in English.
         text: Details such as a traceback.
-        version: Version of Studio that crashed; after an update, that differs from the running version.
+        version: Version of Studio that crashed, which may be older than the running version.
     """
 
     part: Part
@@ -56,19 +56,25 @@ class Crash:
 
 
 def crash_extra(part: Part, how: str, text: str = "") -> dict[str, object]:
-    """Return the ``extra`` of a log record about a crash."""
+    """Return the ``extra`` argument for a log record about a crash.
+
+    Args:
+        part: Part that crashed.
+        how: Cause, in English.
+        text: Details such as a traceback.
+    """
     return {"crash": Crash(part, how, text)}
 
 
 def is_crash(code: int) -> bool:
-    """Return True if an exit code means a crash. Negative codes are signal numbers."""
+    """Return True if an exit code indicates a crash. Negative codes are signal numbers."""
     if code < 0:
         return -code in CRASH_SIGNALS
     return code >= FIRST_BAD_STATUS and code != CTRL_C_STATUS
 
 
 def exit_text(code: int) -> str:
-    """Describe an exit code in English: "ended by signal 11 (SIGSEGV)"."""
+    """Describe an exit code in English, such as "ended by signal 11 (SIGSEGV)"."""
     if code < 0:
         try:
             name = f" ({signal.Signals(-code).name})"
@@ -82,7 +88,7 @@ def exit_text(code: int) -> str:
 
 
 def split_trace(said: str) -> tuple[str, str]:
-    """Split the output of a process into normal output and faulthandler's stack trace, or ""."""
+    """Split the output of a process into normal output and faulthandler's stack trace ("" if none)."""
     lines = said.splitlines(keepends=True)
     for place, line in enumerate(lines):
         if line.startswith(TRACE_BEGINS):
@@ -91,9 +97,9 @@ def split_trace(said: str) -> tuple[str, str]:
 
 
 def fatal_line(trace: str) -> str:
-    """Return the line of a trace that names the cause, or "".
+    """Return the line of a stack trace that states the cause of the crash, or "".
 
-    On Windows, faulthandler also writes exceptions that a system library raises and handles internally.
+    On Windows, faulthandler also writes exceptions that a system library raises and handles itself.
     """
     headers = [line for line in trace.splitlines() if line.startswith(TRACE_BEGINS)]
     return next((line for line in reversed(headers) if not line.startswith(CAUGHT_EXCEPTION_PREFIX)), "")

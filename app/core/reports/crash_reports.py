@@ -1,4 +1,4 @@
-"""Stored crash reports: one text file each, at most the newest ten.
+"""Stored crash reports: one text file for each crash, at most ten.
 
 Each is offered once, at the next start.
 """
@@ -48,7 +48,14 @@ _log = logging.getLogger("studio.crashes")
 
 @dataclass(frozen=True, slots=True)
 class CrashReport:
-    """Stored crash report; ``is_new`` is True until the report has been offered to the user."""
+    """Stored crash report.
+
+    Attributes:
+        path: File of the report.
+        part: Part of Studio that crashed.
+        noticed_s: Time when the crash was detected, in seconds since 1970.
+        is_new: True until the report has been offered to the user.
+    """
 
     path: Path
     part: Part
@@ -57,7 +64,7 @@ class CrashReport:
 
 
 class CrashReports:
-    """Crash reports in a folder, shared by all instances. Disk errors are never raised."""
+    """Crash reports in a folder that all instances share. No method raises OSError."""
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
         # `folder` defaults to `crashes` beside the log files; `clock` is epoch seconds.
@@ -65,7 +72,11 @@ class CrashReports:
         self._clock = clock
 
     def add(self, crash: Crash) -> Path | None:
-        """Store a report and remove the oldest ones; return its file, or None if it can't be written."""
+        """Store a report and delete the oldest reports beyond the limit.
+
+        Returns:
+            File of the report, or None if it can't be written.
+        """
         now = self._clock()
         try:
             path = self._unused_path(f"crash {time.strftime(_STAMP, time.localtime(now))} {crash.part}")
@@ -94,9 +105,9 @@ class CrashReports:
         return sorted(known, key=lambda each: (each.noticed_s, each.path.name), reverse=True)
 
     def take_new(self) -> list[CrashReport]:
-        """Return the new reports, newest first, and mark them as offered.
+        """Return the new reports, newest first, and save that they have been offered.
 
-        A report that can't be marked is omitted; otherwise it would be offered at every start.
+        A report for which that can't be saved is omitted; otherwise it would be offered at every start.
         """
         taken = []
         for each in self.all():
@@ -109,21 +120,21 @@ class CrashReports:
 
 
 class CrashLog(logging.Handler):
-    """Logging handler that stores a report for each crash; repetitions are throttled."""
+    """Logging handler that stores a report for each crash. Repeated crashes are stored less often."""
 
     def __init__(self, reports: CrashReports) -> None:
         super().__init__(logging.WARNING)
         self._reports, self._repeat_filter = reports, RepeatFilter()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Store a report if the record contains a crash (`app.core.reports.crash.crash_extra`)."""
+        """Store a report if the record describes a crash (`app.core.reports.crash.crash_extra`)."""
         crash = getattr(record, "crash", None)
         if isinstance(crash, Crash) and self._repeat_filter.filter(record) is not None:
             self._reports.add(crash)
 
 
 def show_crash_alert(alerts: Alerts, reports: CrashReports) -> None:
-    """Show an alert about crashes since the last start, with a button that creates a problem report."""
+    """Raise an alert about crashes before this start, with a button that creates a problem report."""
     found = reports.take_new()
     if found:
         worst = min(found, key=lambda each: PARTS.index(each.part))
@@ -142,7 +153,7 @@ def show_crash_alert(alerts: Alerts, reports: CrashReports) -> None:
 
 
 def texts(reports: Sequence[CrashReport]) -> list[tuple[str, bytes]]:
-    """Return the file names and texts of reports; unreadable ones are skipped."""
+    """Return the file names and contents of reports; unreadable reports are skipped."""
     found = []
     for each in reports:
         with suppress(OSError):

@@ -1,7 +1,7 @@
 """Missing dependencies: Python packages, and system libraries that Qt needs on Linux.
 
-Wheels of PySide6 contain no system libraries, and Python's error names only the first missing one. This
-module imports nothing that the extra ``studio`` installs.
+Wheels of PySide6 contain no system libraries, and Python's error message names only the first missing
+one. This module imports no packages of the extra ``studio``.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ EXTRA_MODULES = (
     "platformdirs",
     "pyqtgraph",
 )
-"""Modules of the extra ``studio`` in pyproject.toml that the window needs."""
+"""Modules that the window needs and that the extra ``studio`` in pyproject.toml installs."""
 _RENAMED_PACKAGES = {"libasound2": "libasound2t64", "libglib2.0-0": "libglib2.0-0t64"}
 _RENAMED_SINCE = {"debian": 13.0, "ubuntu": 24.04}
 _MISSING_LIBRARY = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file")
@@ -69,19 +69,24 @@ _MISSING_LIBRARY = re.compile(r"(\S+\.so[.\d]*): cannot open shared object file"
 
 @dataclass(frozen=True)
 class MissingLibraries:
-    """Missing libraries, and the packages that contain them, if known."""
+    """Missing system libraries.
+
+    Attributes:
+        names: Names of the libraries.
+        packages: Packages that contain the libraries, as far as known.
+    """
 
     names: tuple[str, ...]
     packages: tuple[str, ...]
 
     @property
     def command(self) -> str:
-        """Command that installs the packages on Debian and Ubuntu; "" if none is known."""
+        """Command that installs the packages on Debian and Ubuntu; "" if no package is known."""
         return f"sudo apt install {' '.join(self.packages)}" if self.packages else ""
 
     @property
     def start_title(self) -> str:
-        """Error message that the window can't be opened."""
+        """Error message for the case that the window can't be opened."""
         words = ngettext(
             "NEP Studio can't start: the system library {names} is missing.",
             "NEP Studio can't start: the system libraries {names} are missing.",
@@ -91,7 +96,7 @@ class MissingLibraries:
 
     @property
     def start_remedy(self) -> str:
-        """Advice how to install what the window needs."""
+        """Instructions for installing the libraries that the window needs."""
         if not self.command:
             return _("Install the package that contains it, then start Studio again.")
         words = _("On Debian and Ubuntu type “{command}” in a terminal, then start Studio again.")
@@ -99,7 +104,7 @@ class MissingLibraries:
 
     @property
     def title(self) -> str:
-        """Error message that the block editor can't be opened."""
+        """Error message for the case that the block editor can't be opened."""
         words = ngettext(
             "The block editor can't open: the system library {names} is missing.",
             "The block editor can't open: the system libraries {names} are missing.",
@@ -109,7 +114,7 @@ class MissingLibraries:
 
     @property
     def remedy(self) -> str:
-        """Advice how to install what the block editor needs."""
+        """Instructions for installing the libraries that the block editor needs."""
         if not self.command:
             return _(
                 "Install the package that contains it, then start Studio again. The Developer layout works "
@@ -128,8 +133,13 @@ def missing_libraries(
 ) -> MissingLibraries | None:
     """Return all missing libraries after a failed import; None if the error has another cause.
 
-    Python's error names one library; the others are found by loading each library that Qt may need. If a
-    library can't be loaded because of a missing dependency, the dependency is returned.
+    Python's error names only one library. The others are found by loading every library that Qt may
+    need; if a library can't be loaded because of a missing dependency, the dependency is returned.
+
+    Args:
+        error: Error of the failed import.
+        load: Loads a library by name; raises OSError.
+        release: Returns the fields of os-release.
     """
     named = _library_in(str(error))
     if not named:
@@ -144,7 +154,7 @@ def missing_libraries(
 
 
 def alert_missing(alerts: Alerts, missing: MissingLibraries) -> None:
-    """Show the alert that the block editor can't be opened, even on the start page."""
+    """Raise an alert that the block editor can't be opened, which is also shown on the start page."""
     alerts.raise_alert(ALERT, "error", missing.title, missing.remedy, count=0)
 
 
@@ -158,7 +168,12 @@ def import_problem(
     error: ImportError,
     is_installed: Callable[[str], bool] = lambda name: bool(importlib.util.find_spec(name)),
 ) -> str:
-    """Return which packages are missing and how to install them; "" if the error has another cause."""
+    """Return a sentence about missing packages and how to install them; "" if the error has another cause.
+
+    Args:
+        error: Error of the failed import.
+        is_installed: Returns True if a module is installed.
+    """
     package = (error.name or "").partition(".")[0]
     if isinstance(error, ModuleNotFoundError) and package in EXTRA_MODULES:
         missing = [each for each in EXTRA_MODULES if each == package or not is_installed(each)]

@@ -1,4 +1,4 @@
-"""Privacy of reports: the home folder, and settings and secrets that must stay on this computer."""
+"""Privacy of reports: removal of the home folder, of private settings and of secrets."""
 
 from __future__ import annotations
 
@@ -12,17 +12,22 @@ PUBLIC_SETTINGS = frozenset({
     "begun", "first_steps", "format", "high_contrast", "language", "layout", "less_motion", "robots_heard",
     "shortcuts", "text_percent", "theme", "toolbox_pinned", "virtual_robots_come_back", "window",
 })  # fmt: skip
-"""Settings whose values are included in a report.
+"""Names of settings whose values are included in a report.
 
-Of all other settings only the names are included, so that future settings, such as keys of networks and
-access codes, stay private until they are added here.
+For all other settings, only the name is included. Future settings, such as network keys and access
+codes, thus stay private until they are added here.
 """
 OMITTED_TEXT = "(left out)"
 _PATH_END = r"""(?=[\\/'":;,)\]}>\s]|\.(?=\s|$)|%2F|%5C|$)"""
 
 
 def without_home(text: str, folder: Path | None = None) -> str:
-    """Replace the home folder by ``~`` in all its spellings, including those in JSON and URLs."""
+    """Replace all spellings of the home folder with ``~``, including those in JSON and in URLs.
+
+    Args:
+        text: Text of the report.
+        folder: Home folder; default: the home folder of the user.
+    """
     home = str(folder if folder is not None else Path.home()).rstrip("/\\")
     if len(home) < 2:  # a home folder "/" would shorten every path
         return text
@@ -35,7 +40,7 @@ def without_home(text: str, folder: Path | None = None) -> str:
 
 
 def reportable_settings(values: Mapping[str, object]) -> dict[str, object]:
-    """Return the settings for a report: the values of `HARMLESS` ones, and only the names of all others."""
+    """Return the settings for a report: values of `PUBLIC_SETTINGS`, placeholders for all others."""
     return {
         name: value if name in PUBLIC_SETTINGS else OMITTED_TEXT for name, value in sorted(values.items())
     }

@@ -1,6 +1,6 @@
-"""Problem report: a zip file for the user to share. Studio never sends it.
+"""Problem report: a zip file that the user can share. Studio never uploads it.
 
-Content for developers is in English; the user sees the list of contents first (`what_goes_in`).
+Texts for developers are in English. The user first sees a list of the contents (`describe_contents`).
 """
 
 from __future__ import annotations
@@ -58,7 +58,12 @@ Facts = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class ReportedWork:
-    """Open behaviour in its current state: its name and the content of its file."""
+    """Open behaviour to include in a report.
+
+    Attributes:
+        name: Name of the behaviour.
+        data: Current content in the file format.
+    """
 
     name: str
     data: bytes
@@ -69,10 +74,10 @@ class ReportParts:
     """Sources of a report.
 
     Attributes:
-        facts: Information that only the window has: versions of Qt, and the screen.
+        facts: Information that only the window has, such as the version of Qt and the screen.
         settings: Current settings.
-        doctor: Returns the findings of the connection doctor; may take a while.
-        log: Log folder.
+        doctor: Returns the findings of the connection doctor; may take some seconds.
+        log: Folder of the log files.
         crashes: Stored crash reports.
     """
 
@@ -89,7 +94,7 @@ def file_name(now_s: float) -> str:
 
 
 def describe_contents(parts: ReportParts) -> list[str]:
-    """Return descriptions of the contents, one line each, so that the user can decide to share them."""
+    """Return a list of the contents, so that the user can decide whether to share them."""
     size = sum(path.stat().st_size for path in _logs(parts.log)) / 1000
     lines = [
         _("The versions of Studio, Python, Qt and this system, and the size of the screen"),
@@ -107,12 +112,18 @@ def describe_contents(parts: ReportParts) -> list[str]:
 
 
 def work_text(names: Sequence[str]) -> str:
-    """Return the line about included behaviours."""
+    """Return the line about the included behaviours."""
     return _("Current settings: {names}").format(names=format_list([f"“{name}”" for name in names]))
 
 
 def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] = ()) -> bytes:
-    """Create the zip file. Slow because of the doctor, so don't call this in the window's thread."""
+    """Create the content of the zip file. Slow because of the doctor; don't call it in the main thread.
+
+    Args:
+        parts: Sources of the report.
+        happened: Description by the user.
+        work: Behaviours to include.
+    """
     files: list[tuple[str, bytes]] = [
         ("README.txt", README_TEXT.format(version=__version__).encode()),
         ("what-happened.txt", (happened.strip() or "(nothing was written)").encode("utf-8", "replace")),
@@ -134,7 +145,7 @@ def make_report(parts: ReportParts, happened: str, work: Sequence[ReportedWork] 
 
 
 def write_report(path: Path, data: bytes) -> None:
-    """Write the zip file atomically. Raises ReportError with advice what to do."""
+    """Write the zip file atomically. Raises ReportError with advice for the user."""
     try:
         write_atomically(path, data)
     except (OSError, ValueError) as error:
@@ -145,7 +156,7 @@ def write_report(path: Path, data: bytes) -> None:
 
 
 class ReportWriter:
-    """Creates and writes one report in a background thread."""
+    """Background thread that creates and writes one report."""
 
     def __init__(self, path: Path, make: Callable[[], bytes]) -> None:
         # Starts at once; `make` is called in the thread.
@@ -162,7 +173,7 @@ class ReportWriter:
         return not self._thread.is_alive()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until the report is written; return False after ``timeout_s`` seconds."""
+        """Wait until the report is written; return False on timeout (in seconds)."""
         self._thread.join(timeout_s)
         return self.is_done
 

@@ -1,7 +1,7 @@
-"""Detection of crashes of Studio: each run creates a marker, and the next start checks remaining markers.
+"""Detection of crashes of Studio by marker files that remain after a crash.
 
-Each run (each window) has a marker file locked by its process, and a trace file for crashes in native code.
-Both are deleted when the run ends normally.
+Each run (each window) has a marker file that its process locks, and a trace file for crashes in native
+code. Both are deleted when the run ends normally.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ else:
 LOG_LINES = 80
 MAX_TRACE_BYTES = 1_000_000
 CLOCK_TOLERANCE_S = 2.0
-"""Tolerance between the start time of a process as reported by the system and the clock."""
+"""Tolerance in seconds when the start time of a process is compared with the clock."""
 NO_TRACE_CAUSE = (
     "it ended without a word: the system ended it (for lack of memory, say), or a person did, or the "
     "computer's session ended"
@@ -48,9 +48,9 @@ _log = logging.getLogger("studio.run")
 
 
 class StudioRun:
-    """Run of Studio, from `begin` to `end`.
+    """One run of Studio, from `start` to `finish`. Usable as a context manager.
 
-    Used as a context manager, a run stores a crash report if an exception leaves the context.
+    If an exception leaves the context, a crash report is stored.
     """
 
     def __init__(
@@ -70,11 +70,11 @@ class StudioRun:
 
     @property
     def is_recorded(self) -> bool:
-        """True if the marker exists; otherwise a crash of this run can't be detected."""
+        """True if the marker file exists; otherwise a crash of this run can't be detected."""
         return self._mark.exists()
 
     def start(self) -> None:
-        """Create the marker. If that fails, one line is logged."""
+        """Create the marker file. A failure is logged."""
         self._began_s = self._clock()
         try:
             self._write(asked=False)
@@ -85,13 +85,13 @@ class StudioRun:
             _log.warning("a crash of this run will not be detected: %s", error, extra=CONSOLE_EXTRA)
 
     def expect_exit(self) -> None:
-        """Record that Studio was asked to exit, so that this does not count as a crash."""
+        """Record that Studio was asked to exit, so that ending now is not detected as a crash."""
         if self.is_recorded:
             with contextlib.suppress(OSError):
                 self._write(asked=True)
 
     def finish(self) -> None:
-        """Delete the marker, because Studio exits normally."""
+        """Delete the marker file when Studio exits normally."""
         self._delete_files()
 
     def __enter__(self) -> Self:
@@ -108,9 +108,10 @@ class StudioRun:
         self.finish()
 
     def left(self) -> list[Crash]:
-        """Return the crashes of earlier runs; each is returned to one caller only.
+        """Return the crashes of earlier runs.
 
-        Runs that ended because the computer restarted or because Studio was asked to exit don't count.
+        If several instances call this, each crash is returned only once. Runs that ended because the
+        computer restarted or because Studio was asked to exit are not crashes.
         """
         try:
             marks = [mark for mark in self._folder.glob("*.json") if mark != self._mark]

@@ -1,4 +1,4 @@
-"""History of the versions of Studio on this computer, for diagnosing problems after an update."""
+"""History of the Studio versions used on this computer, for diagnosing problems after an update."""
 
 from __future__ import annotations
 
@@ -9,25 +9,31 @@ from collections.abc import Mapping
 from nep.version import __version__
 
 KEY = "studio_versions"
-"""Setting that stores the versions, newest last, with the time of their first start (seconds since 1970)."""
+"""Name of the setting that stores the versions and the times of their first start, newest last."""
 MAX_VERSIONS = 10
 VERSION_PATTERN = re.compile(r"[0-9A-Za-z][0-9A-Za-z.+-]{0,39}")
 """Pattern of a valid version; anything else in a file is ignored."""
 UNKNOWN_VERSION = "earlier"
 """Placeholder for versions used before this setting existed; their start time is 0."""
 _MAX_TIME_S = 1e10
-"""Latest valid time. A damaged file may contain a time that the calendar doesn't support."""
+"""Latest valid time in seconds since 1970.
+
+A damaged file may contain a time that the calendar doesn't support.
+"""
 
 VersionEntries = list[dict[str, object]]
 
 
 def valid_version(value: object) -> str:
-    """Validate a version read from a file; return "" if it is invalid."""
+    """Return a version read from a file, or "" if it is invalid."""
     return value if isinstance(value, str) and VERSION_PATTERN.fullmatch(value) else ""
 
 
 def known_versions(values: Mapping[str, object]) -> list[tuple[str, float]]:
-    """Return the valid versions in the settings and their first starts (seconds since 1970), newest last."""
+    """Return the valid versions in the settings and the times of their first start, newest last.
+
+    Times are in seconds since 1970.
+    """
     entries = values.get(KEY)
     found = []
     for entry in entries if isinstance(entries, list) else ():
@@ -49,7 +55,11 @@ def add_this_version(
 ) -> VersionEntries | None:
     """Return the updated setting that includes this version; None if this version is already the newest.
 
-    ``is_first`` is True if no Studio ran on this computer before.
+    Args:
+        values: Current settings.
+        now_s: Current time in seconds since 1970.
+        is_first: True if Studio was never started on this computer before.
+        version: Version to add.
     """
     before = known_versions(values) or ([] if is_first else [(UNKNOWN_VERSION, 0.0)])
     if before and before[-1][0] == version:
@@ -58,7 +68,7 @@ def add_this_version(
 
 
 def format_versions(values: Mapping[str, object]) -> str:
-    """Format the versions for developers: "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
+    """Format the versions for developers, such as "0.0.9 since 2026-11-02, 0.1.0 since 2026-11-27"."""
     versions = [
         f"{version} since {time.strftime('%Y-%m-%d', time.gmtime(since_s))}" if since_s else version
         for version, since_s in known_versions(values)

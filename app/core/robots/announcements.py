@@ -1,8 +1,8 @@
-"""Announcements of robots: the program that announced a name first owns it.
+"""Announcements of robots. The first program that announces a name owns it.
 
-Announcements of other programs under the same name are ignored and reported as claims. The program of a robot
-is replaced only after the master has removed its announcement. Robots of RIZE announce nothing; nodes that
-subscribe to ``robot_action`` count as such robots.
+Announcements of other programs under the same name are ignored and reported as claims. Another program
+can become the owner only after the master has removed the announcement of the previous one. Robots of
+RIZE announce nothing; nodes that subscribe to ``robot_action`` count as such robots.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from nep.protocol.graph_view import GraphView
 MAX_ROBOTS = 200
 MAX_CLAIMANTS = 8
 MAX_OWNERS = 4
-"""Maximum number of earlier programs of a robot whose descriptions are stored, in case they return."""
+"""Maximum number of previous owners of a name whose descriptions are stored, in case they return."""
 MAX_CPU_SHARE = 0.2
-"""Maximum share of the time of the window's thread that parsing descriptions takes on average."""
+"""Maximum average share of the main thread's time that is spent on parsing descriptions."""
 MAX_PARSE_BUDGET_S = 1.0
-"""Maximum time for parsing after an idle period, for example for all robots of a room."""
+"""Maximum time in seconds for parsing after an idle period, for example for all robots of a room."""
 
 NATIVE = frozenset({"native", "gateway"})
 SUFFIXES = ("_driver", "_robot", "_node")
@@ -45,7 +45,12 @@ SUFFIXES = ("_driver", "_robot", "_node")
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Rejected announcement: the problem (title), and the consequence (detail)."""
+    """Rejected announcement of a name that another program owns.
+
+    Attributes:
+        title: Problem in one sentence.
+        detail: Consequence.
+    """
 
     title: str
     detail: str
@@ -53,11 +58,15 @@ class Claim:
 
 @dataclass(slots=True)
 class _Announcement:
-    """Description topic, its owner, and the newest description of each publisher.
+    """Topic of a description, its owner, and the newest description of each publisher.
 
-    ``place`` is the number of topics that the same node announced before this one. ``owners`` are the nodes
-    that owned the topic, newest first. Their descriptions are stored while they aren't listed: a latched
-    message arrives only once, and a suspended program resumes over the same connection.
+    The descriptions of all owners are stored even while the graph doesn't list them: a latched message
+    is received only once, and a suspended program resumes on the same connection.
+
+    Attributes:
+        owners: Nodes that have owned the topic, newest first.
+        told: Newest description of each publisher.
+        place: Number of topics that the same node announced before this one.
     """
 
     watch: Watch | None = None
@@ -73,7 +82,7 @@ class _Announcement:
 
 
 class Announcements:
-    """Descriptions on the network, and the programs that own them. Not thread-safe."""
+    """Robot descriptions received from the network, and the programs that own them. Not thread-safe."""
 
     def __init__(
         self,
@@ -98,14 +107,14 @@ class Announcements:
 
     @property
     def robots(self) -> Iterator[tuple[str, Robot, Identity]]:
-        """Announced robots, as topic, description and program."""
+        """Announced robots as tuples of topic, description and owner."""
         for topic, known in self._topics.items():
             if known.watch is not None and known.robot is not None and known.owner is not None:
                 yield topic, known.robot, known.owner
 
     @property
     def unreadable(self) -> tuple[str, ...]:
-        """Description topics whose descriptions are invalid."""
+        """Topics whose descriptions are invalid."""
         return tuple(
             topic for topic, known in self._topics.items() if known.is_unreadable and known.robot is None
         )
@@ -142,7 +151,7 @@ class Announcements:
         return found
 
     def update(self, view: GraphView) -> None:
-        """Apply a new graph: find the announced robots and their owners."""
+        """Apply a new graph, which determines the announced robots and their owners."""
         there = {
             topic: nodes
             for topic, info in view.topics.items()
@@ -179,7 +188,7 @@ class Announcements:
         self._parse_pending()
 
     def add(self, batches: Mapping[str, Batch]) -> bool:
-        """Add received descriptions; return True if any was parsed, including earlier ones."""
+        """Add received descriptions; return True if a description, possibly an earlier one, was parsed."""
         for topic in batches.keys() & self._topics.keys():
             known = self._topics[topic]
             for message in batches[topic].messages:
@@ -306,15 +315,18 @@ class RizeNames:
         self._told: dict[str, None] = {}
 
     def add(self, name: str) -> None:
-        """Add a name received in a ready message on ``rize_event``."""
+        """Add the name in a ready message received on ``rize_event``."""
         self._told.setdefault(name)
         if len(self._told) > MAX_ROBOTS:
             del self._told[next(iter(self._told))]
 
     def names_in(self, view: GraphView, native: Collection[str] = ()) -> set[str]:
-        """Return the names of the robots of RIZE in this graph.
+        """Return the names of the RIZE robots in a graph.
 
-        ``native`` are the robots with a description, which also send ready messages on ``rize_event``.
+        Args:
+            view: Current graph.
+            native: Names of robots with a description, which also send ready messages on
+                ``rize_event``.
         """
         candidates = [name for name in self._told if name not in native]
         info = view.topics.get(rize.COMMANDS)

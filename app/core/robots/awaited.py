@@ -15,9 +15,15 @@ MIN_LENGTH, MAX_LENGTH = 1, 60
 def awaited_values(
     workspaces: Iterable[Mapping[str, object]], robot: Robot, event: Event, name: str
 ) -> tuple[str, ...]:
-    """Return the values of the event data ``name`` that blocks wait for, then the suggested default.
+    """Return the values of an event field that blocks wait for, followed by the default of the field.
 
-    Unique, at most `MAX_WORDS`. ``workspaces`` are saved workspaces, that of the current behaviour first.
+    At most `MAX_VALUES` unique values are returned.
+
+    Args:
+        workspaces: Workspaces of the open behaviours, the current one first.
+        robot: Robot that sends the event.
+        event: Description of the event.
+        name: Name of the field in the event's data.
     """
     hat = block_type_of(robot.model, "when", event.name)
     argument = BlockTemplate(event.text, event.filters).arguments.get(name, "")

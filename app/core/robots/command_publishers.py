@@ -1,4 +1,4 @@
-"""Publishers for commands to robots, opened and closed in the thread of the message source."""
+"""Publishers for robots' commands, opened and closed in the thread of the message source."""
 
 from __future__ import annotations
 
@@ -10,20 +10,17 @@ from nep.nodes.node import Node
 from nep.programs.robots.moving import COMMAND_TYPE
 
 Submit = Callable[[str, Callable[[Node], None]], None]
-"""Runs a job with the node in the source's thread, in order. The text describes the job."""
+"""Function that queues a job with the node in the source's thread, given a description and the job."""
 
 
 class CommandPublishers:
-    """Opens and closes the publishers for commands to robots.
-
-    Not thread-safe: use it from the window's thread.
-    """
+    """Manager of the publishers for robots' commands. Not thread-safe; use it from the main thread."""
 
     def __init__(self, submit: Submit) -> None:
         self._submit = submit
 
     def open(self, link: RobotLink) -> None:
-        """Open the publishers for a robot's command and world topics, unless that was already started."""
+        """Open the publishers for a robot's command and world topics, unless already requested."""
         topics = link.robot.topics
         if link.publisher is not None or link.is_opening:
             return
@@ -43,7 +40,7 @@ class CommandPublishers:
         self._submit(_("connect to {robot}").format(robot=link.name), open_them)
 
     def close_outdated(self, link: RobotLink) -> None:
-        """Close the publishers for topics that the robot's description no longer contains."""
+        """Close the publishers for topics that are no longer in the robot's description."""
         old = [publisher for publisher in (link.publisher, link.world) if publisher is not None]
         link.publisher = link.world = None
 
@@ -55,13 +52,13 @@ class CommandPublishers:
             self._submit(_("close the old publishers of {robot}").format(robot=link.name), close_them)
 
     def close(self, link: RobotLink) -> None:
-        """Close the publishers for a robot that is discarded, including those that are being opened."""
+        """Close the publishers of a robot that is removed, including publishers that are being opened."""
         if link.is_opening or link.publisher is not None or link.world is not None:
             self._submit("", lambda _node: close_publishers(link))
 
 
 def close_publishers(link: RobotLink) -> None:
-    """Close the publishers of a robot now."""
+    """Close the publishers of a robot in the calling thread."""
     for publisher in (link.publisher, link.world):
         if publisher is not None:
             publisher.close()

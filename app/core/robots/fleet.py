@@ -51,7 +51,7 @@ RESET_SETTING = "runs_begin_at_start"
 
 
 class Fleet:
-    """All robots, in the order of their discovery. Not thread-safe: use it from the window's thread."""
+    """All robots, in order of discovery. Not thread-safe; use it from the main thread."""
 
     def __init__(
         self,
@@ -97,7 +97,7 @@ class Fleet:
 
     @property
     def links(self) -> Sequence[RobotLink]:
-        """All robots seen since the start, including disconnected ones."""
+        """All robots found since the start, including disconnected ones."""
         return tuple(self._links.values())
 
     @property
@@ -125,9 +125,10 @@ class Fleet:
 
     @property
     def current(self) -> RobotLink | None:
-        """Robot current by panels for one robot.
+        """Robot shown by panels that show one robot, or None.
 
-        The chosen one if it is connected, else a virtual one, else the first.
+        This is the chosen robot if it is connected, else a connected virtual robot, else the first
+        connected robot.
         """
         chosen = self._links.get(self._chosen)
         if chosen is not None and chosen.is_connected:
@@ -136,7 +137,7 @@ class Fleet:
         return next((link for link in connected if link.virtual), connected[0] if connected else chosen)
 
     def select(self, name: str) -> None:
-        """Choose the robot shown by panels for one robot."""
+        """Choose the robot that is shown by panels that show one robot."""
         if name != self._chosen:
             self._chosen = name
             self.revision += 1
@@ -144,22 +145,27 @@ class Fleet:
     # -- commands of the user --------------------------------------------------------------------------------
 
     def watch_sensors(self, name: str) -> Watch:
-        """Subscribe to the sensors of a robot until the returned watch is closed.
+        """Subscribe to the sensors of a robot; return the watch, which must be closed.
 
         Raises:
-            RobotUnknownError: No robot has that name.
+            RobotUnknownError: No robot has this name.
         """
         return self._watches.open(topics_of(self._get(name).robot))
 
     def invoke(self, name: str, action: str, input: Payload) -> Invocation:
         """Send an action to a robot.
 
+        Args:
+            name: Name of the robot.
+            action: Name of the action.
+            input: Input of the action.
+
         Raises:
-            RobotUnknownError: No robot has that name.
-            RobotInputError: The robot lacks the action or rejects the input; contains a message for each
-                invalid value.
-            MayNotMoveError: The user must allow the motion first. The action is sent once the user has done
-                so.
+            RobotUnknownError: No robot has this name.
+            RobotInputError: The robot lacks the action or rejects the input; contains a message for
+                each invalid value.
+            MayNotMoveError: The user is asked to allow the motion. If the user allows it, the action is
+                sent.
         """
         link = self._get(name)
         described = link.robot.action(action)
@@ -192,9 +198,13 @@ class Fleet:
         self._tries.cancel(self._get(name), action)
 
     def change_world(self, name: str, change: Payload) -> None:
-        """Change the world of a virtual robot: touch its head, move the ball, say a word.
+        """Change the world of a virtual robot, for example touch its head, move the ball or say a word.
 
-        As for a motion, the user must allow this first if Studio doesn't know that the robot is virtual.
+        If Studio doesn't know that the robot is virtual, the user must allow the change like a motion.
+
+        Args:
+            name: Name of the robot.
+            change: Message for the world topic.
         """
         link = self._get(name)
         actions = [action.name for action in link.robot.actions]
@@ -206,16 +216,16 @@ class Fleet:
 
     @property
     def resets_at_start(self) -> bool:
-        """True if virtual robots return to their start position when a behaviour starts."""
+        """True if virtual robots move to their start position when a behaviour starts."""
         return self._settings is None or self._settings.get(RESET_SETTING, True)
 
     def set_resets_at_start(self, *, begins: bool) -> None:
-        """Set `begins_at_start`. Raises SettingsError if the setting can't be saved."""
+        """Set and save `resets_at_start`. Raises SettingsError."""
         if self._settings is not None:
             self._settings.set(RESET_SETTING, begins)
 
     def return_to_start(self, names: Iterable[str]) -> None:
-        """Move the virtual robots among ``names`` to their start position if `begins_at_start` is set."""
+        """If `resets_at_start` is set, move the virtual robots among ``names`` to their start position."""
         links = [link for name in names if (link := self._links.get(name)) is not None and link.virtual]
         for link in links if self.resets_at_start else ():
             if link.world is not None:
@@ -226,7 +236,7 @@ class Fleet:
             self.change_world(name, change)
 
     def mark_stopping(self, names: Iterable[str]) -> None:
-        """Set robots to the state "stopping" until `stopped` applies the result."""
+        """Set robots to the state "stopping", until `apply_stop` applies the result of the Stop."""
         self.stops += 1
         for link in map(self._links.get, names):
             if link is not None and link.stop_began_s is None:
@@ -239,18 +249,18 @@ class Fleet:
 
     @property
     def unresponsive(self) -> tuple[str, ...]:
-        """Names of robots that may be moving and don't reply. Every Stop reports them."""
+        """Names of robots that may be moving and don't reply. Every Stop reports these robots."""
         return tuple(name for name in self.moved.names if not self._is_responsive(self._links.get(name)))
 
     @property
     def stoppable(self) -> tuple[str, ...]:
-        """Names of the robots that a Stop of all robots waits for."""
+        """Names of the robots whose replies a Stop of all robots waits for."""
         unlisted = (target.robot.name for target in self._unlisted if target.is_expected)
         return tuple(dict.fromkeys((*(link.name for link in self.connected), *self.moved.names, *unlisted)))
 
     @property
     def stop_targets(self) -> tuple[StopTarget, ...]:
-        """Targets of a Stop of all robots, including robots whose reply is not awaited."""
+        """Targets of a Stop of all robots, including robots whose replies are not awaited."""
         return targets_of(self._links.values(), self.moved, self._unlisted)
 
     @staticmethod
@@ -260,7 +270,7 @@ class Fleet:
     def apply_stop(self, words: Mapping[str, tuple[str, str]], report: StopReport) -> None:
         """Apply the result of a Stop.
 
-        Invocations of a robot whose stop was not confirmed end only when the robot reports their end.
+        If the Stop of a robot is not confirmed, its invocations end only when the robot reports that.
 
         Args:
             words: Message and status for each robot.
@@ -280,7 +290,7 @@ class Fleet:
             self._heartbeat.stop(name)
 
     def confirm_stopped(self, names: Iterable[str]) -> None:
-        """Apply the user's confirmation that these robots are not moving."""
+        """Record that these robots are not moving, according to the user."""
         known = tuple(names)
         self.moved.confirm(known)
         for link in map(self._links.get, known):
@@ -289,16 +299,13 @@ class Fleet:
                 self._update_motion(link)
 
     def take_settled(self) -> tuple[str, ...]:
-        """Return and clear the robots without a proven Stop that have since ended all actions.
-
-        The end of the actions is what the robots report.
-        """
+        """Return and clear the robots that have reported the end of all actions after an unconfirmed Stop."""
         return self._messages.take_settled()
 
     # -- input from the session ------------------------------------------------------------------------------
 
     def update(self, view: GraphView) -> None:
-        """Apply a new graph, which may connect, replace or disconnect robots."""
+        """Apply a new graph, by which robots are connected, replaced or disconnected."""
         self._has_graph, before = True, self._own.view
         self._movable.view = view
         self._own.update(view)
@@ -342,11 +349,11 @@ class Fleet:
 
     @property
     def claims(self) -> Mapping[str, Claim]:
-        """Rejected announcements of programs by id."""
+        """Rejected announcements of programs, by id."""
         return {**self._announcements.claims, **self._foreign_claims}
 
     def take_notices(self) -> tuple[str, ...]:
-        """Return and clear notices for the user about restarted robots."""
+        """Return and clear the notices for the user about restarted robots."""
         notes, self._notes = tuple(self._notes), []
         return notes
 
@@ -358,7 +365,7 @@ class Fleet:
             close_publishers(link)
 
     def on_unwatched(self, topic: str) -> None:
-        """Discard the sensor values of a topic that is no longer subscribed to."""
+        """Discard the sensor values received on a topic that is no longer watched."""
         for link in self._links.values():
             for sensor in link.robot.sensors:
                 if sensor.topic == topic:
@@ -445,9 +452,12 @@ class Fleet:
         )
 
     def connect(self, robot: Robot, topic: str, identity: Identity | None = None) -> None:
-        """Connect a robot described on ``topic``.
+        """Connect a robot. Does nothing if neither the robot nor its program has changed.
 
-        No effect if neither the robot nor its program has changed.
+        Args:
+            robot: Description of the robot.
+            topic: Topic of the description.
+            identity: Program of the robot; None for a robot of RIZE.
         """
         link = self._links.get(robot.name)
         was_real = not robot.virtual or (link is not None and link.identity == identity and link.was_real)

@@ -1,4 +1,4 @@
-"""Health checks that raise alerts: undecodable data, silent robots, duplicate names, unsaved settings."""
+"""Health checks that raise alerts: undecodable messages, silent robots, duplicate names, unsaved settings."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from nep.protocol.graph_view import Alert, GraphView
 SILENT_S = 3.0
 RECOVERY_S = 1.0
 RESTART_TIMEOUT_S = 5.0
-"""Time within which a restarted driver is expected to be connected again."""
+"""Time limit in seconds for a restarted driver to connect again."""
 PORTS_ALERT = "ports"
 OPEN_DOCTOR_LABEL = lazy("Open the connection doctor")
 DISCARD_ALERT = "leaving"
 INSTALLATION_ALERT = "installation"
-"""Id of the alert about Studio's installation; "program" is the alert about the program of a behaviour."""
+"""Id of the alert about Studio's installation. The id "program" belongs to the program of a behaviour."""
 ROBOT_ALERTS = ("robot", "moving", "camera", "rejected", "errors")
-"""Prefixes of the ids of alerts about one robot. A colon and the name of the robot follow."""
+"""Id prefixes of alerts about one robot. They are followed by a colon and the name of the robot."""
 
 REAL_ROBOT_HINT = lazy("Check that it is switched on and connected to the same Wi-Fi.")
 VIRTUAL_ROBOT_HINT = lazy("Start the virtual robot again.")
@@ -35,10 +35,10 @@ class _BadTopic:
     """Topic with messages that can't be decoded.
 
     Attributes:
-        count: Number of these messages.
+        count: Number of undecodable messages.
         unchecked: Number of messages that were not checked.
-        since: Time of the last error.
-        is_well: True if only decodable messages arrived since.
+        since: Time of the last error (monotonic seconds).
+        has_recovered: True if all messages received since the last error can be decoded.
     """
 
     count: int = 0
@@ -48,7 +48,7 @@ class _BadTopic:
 
 
 class Health:
-    """Raises and resolves health alerts. Not thread-safe: use it from the window's thread."""
+    """Health checks that raise and resolve alerts. Not thread-safe; use it from the main thread."""
 
     def __init__(self, topics: Topics, fleet: Fleet, alerts: Alerts, clock: Callable[[], float]) -> None:
         self._topics, self._fleet, self._alerts, self._clock = topics, fleet, alerts, clock
@@ -60,10 +60,13 @@ class Health:
         self._robots: set[str] = set()
 
     def update(self, found: Mapping[str, CheckResult]) -> None:
-        """Raise alerts about topics with undecodable messages, including their exact number.
+        """Raise alerts about topics with undecodable messages.
 
-        `check` resolves the alert after a second without undecodable messages, so that a topic with both
-        kinds of messages has one continuous alert.
+        `check` resolves an alert after a second without undecodable messages, so that the alert of a
+        topic with both kinds of messages doesn't flicker.
+
+        Args:
+            found: Results of the decode checks, by topic.
         """
         for topic, checked in found.items():
             bad = self._bad.get(topic)
@@ -120,7 +123,11 @@ class Health:
                 self._check_presence(link, now, runs_here=link.name in started)
 
     def report_journal_problem(self, sentence: str | None) -> None:
-        """Raise the alert that unsaved work can't be backed up, with the reason; None resolves the alert."""
+        """Raise or resolve the alert that unsaved work can't be backed up.
+
+        Args:
+            sentence: Reason, or None to resolve the alert.
+        """
         if sentence is None:
             self._alerts.resolve("journal")
             self._alerts.resolve(DISCARD_ALERT)
@@ -136,9 +143,13 @@ class Health:
         )
 
     def confirm_discard(self, name: str, sentence: str) -> bool:
-        """Return True if the user closes the window although the work of ``name`` can't be saved.
+        """Return True if the user confirms closing the window although some work can't be saved.
 
-        The first call raises an alert with the reason ``sentence`` and returns False.
+        The first call raises an alert and returns False; a second call confirms.
+
+        Args:
+            name: Name of the behaviour.
+            sentence: Reason why the behaviour can't be saved.
         """
         if self._alerts.has(DISCARD_ALERT):
             return True
@@ -155,7 +166,11 @@ class Health:
         return False
 
     def report_settings_problem(self, sentence: str | None) -> None:
-        """Raise the alert that settings can't be saved, with the reason; None resolves the alert."""
+        """Raise or resolve the alert that settings can't be saved.
+
+        Args:
+            sentence: Reason, or None to resolve the alert.
+        """
         if sentence is None:
             self._alerts.resolve("settings")
             return
@@ -168,7 +183,11 @@ class Health:
         )
 
     def program(self, fate: ExecutableState) -> None:
-        """Raise the alert that Studio's installation was replaced or removed."""
+        """Raise or resolve the alert that Studio's installation was replaced or removed.
+
+        Args:
+            fate: State of the installation.
+        """
         if fate == "replaced":
             self._alerts.raise_alert(
                 INSTALLATION_ALERT,
@@ -285,7 +304,11 @@ class Health:
         self._claims = set(claims)
 
     def update_unreachable(self, problems: Mapping[str, str]) -> None:
-        """Raise alerts for robots that a Stop can't reach; ``problems`` are the reasons by name."""
+        """Raise alerts for robots that a Stop can't reach.
+
+        Args:
+            problems: Reason for each of these robots, by name.
+        """
         for name in self._unreachable - problems.keys():
             self._alerts.resolve(f"stop:{name}")
         for name, why in problems.items():

@@ -1,6 +1,6 @@
 """Health of one robot as a list of facts: connection, battery, sensors, Stop.
 
-The status of a fact says whether it needs attention. Unknown values are listed as unknown.
+The status of a fact tells if it needs attention. Unknown values are listed as unknown.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ MAX_MISSED_MESSAGES = 5
 """Number of consecutive missing messages after which a sensor counts as silent."""
 LOW_PERCENT = 20
 WARM_C = 60
-"""Temperature above which motors of small robots begin to lose force, in °C."""
+"""Temperature in °C above which the motors of small robots begin to lose torque."""
 
 CONNECTION, BATTERY, TEMPERATURE = lazy("Connection"), lazy("Battery"), lazy("Temperature")
 STOP, CAMERA, SENSORS = lazy("Stop"), lazy("Camera"), lazy("Sensors")
@@ -36,9 +36,9 @@ class HealthFact:
     """One fact about a robot.
 
     Attributes:
-        title: One of the constants above, to be translated with `nep.i18n`.
-        status: "ok", "warn", "error", or "off" if missing or unknown.
-        words: Value of the fact.
+        title: One of the constants of this module, to be translated with `nep.i18n`.
+        status: "ok", "warn", "error", or "off" if the value is missing or unknown.
+        words: Value as text.
     """
 
     title: str
@@ -55,7 +55,9 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) 
     """Return all facts about a robot; those that need attention come first.
 
     Args:
-        now: Monotonic seconds, on the same clock as the robot's replies.
+        link: State of the robot.
+        topics: Topics of the live network.
+        now: Monotonic seconds, on the same clock as the times in ``link``.
         age_words: Formats a duration, such as "14 s".
     """
     facts = [_connection(link, now, age_words)]
@@ -70,7 +72,7 @@ def facts_of(link: RobotLink, topics: Topics, now: float, age_words: FormatAge) 
 
 
 def has_reported(link: RobotLink, facts: Sequence[HealthFact]) -> bool:
-    """Return True if the robot itself has sent anything; otherwise only its description is known."""
+    """Return True if the robot has sent a message; otherwise only its description is known."""
     return link.replied_s is not None or any(
         fact.title in REPORTED_TITLES and fact.status == "ok" for fact in facts
     )

@@ -1,4 +1,4 @@
-"""Known robots: names of real robots and when they were last connected, stored in the settings."""
+"""Known robots: names of real robots and the times when they were last connected, stored in the settings."""
 
 from __future__ import annotations
 
@@ -19,16 +19,20 @@ Entry = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class KnownRobot:
-    """Real robot and the time when it was last connected (seconds since 1970)."""
+    """Real robot that is or was connected.
+
+    Attributes:
+        seen_s: Time of the last connection in seconds since 1970.
+    """
 
     name: str
     seen_s: float
 
 
 class KnownRobots:
-    """Known real robots, the most recently connected first.
+    """Known real robots, most recently connected first.
 
-    Virtual robots are not stored, because they can be started at any time.
+    Virtual robots are not stored, because the user can start them at any time.
     """
 
     def __init__(self, settings: ListSettings | None = None, clock: Callable[[], float] = time.time) -> None:
@@ -36,13 +40,13 @@ class KnownRobots:
 
     @property
     def robots(self) -> tuple[KnownRobot, ...]:
-        """All known robots, the most recently connected first; invalid entries are skipped."""
+        """All known robots, most recently connected first; invalid entries are skipped."""
         entries: list[Entry] = self._settings.get(KEY, []) if self._settings is not None else []
         found = {robot.name: robot for robot in map(_parse_robot, entries) if robot is not None}
         return tuple(sorted(found.values(), key=lambda robot: -robot.seen_s))
 
     def record(self, robots: Sequence[Robot]) -> None:
-        """Record that these robots are connected or were connected until now."""
+        """Save the current time as the time of the last connection of these robots."""
         names = [robot.name for robot in robots if not robot.virtual]
         if names:
             now = self._clock()

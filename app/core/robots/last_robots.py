@@ -1,4 +1,4 @@
-"""Virtual robots of the last session, which are started again at the next start unless that is disabled."""
+"""Virtual robots of the last session, which are started again at the next start if the user wants that."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_ROBOTS = 8
 
 
 class RobotStarter(Protocol):
-    """Part of the interface of `app.core.robots.launcher.Launcher` that is used here."""
+    """Part of the interface of `app.core.robots.launcher.Launcher` that `LastRobots` uses."""
 
     wanted: dict[str, str]
 
@@ -24,7 +24,7 @@ class RobotStarter(Protocol):
 
 
 class LastRobots:
-    """Stores the running virtual robots in the settings. Not thread-safe: use it from the window's thread."""
+    """List of the running virtual robots in the settings. Not thread-safe; use it from the main thread."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -32,15 +32,15 @@ class LastRobots:
 
     @property
     def is_restart_enabled(self) -> bool:
-        """True if the virtual robots are started again at the next start."""
+        """True if running virtual robots are started again at the next start of Studio."""
         return self._settings.get(COME_BACK, True)
 
     def set_restart_enabled(self, wanted: bool) -> None:
-        """Set `come_back`. Raises SettingsError."""
+        """Set and save `is_restart_enabled`. Raises SettingsError."""
         self._settings.set(COME_BACK, wanted)
 
     def start(self, launcher: RobotStarter) -> None:
-        """Start the robots of the last session. Returns immediately; no robot moves."""
+        """Start the robots of the last session. Returns immediately; starting a robot does not move it."""
         if not self.is_restart_enabled:
             return
         kept: Mapping[str, object] = self._settings.get(KEPT, {})
@@ -49,9 +49,10 @@ class LastRobots:
                 launcher.start_virtual_robot(name, model)
 
     def save(self, launcher: RobotStarter) -> None:
-        """Save the names of the current robots if they have changed.
+        """Save the names of the running robots if they have changed.
 
-        Called during the session, so that they are known after a crash. The settings report errors.
+        Called during the session, so that the names survive a crash. The settings report errors
+        themselves.
         """
         if launcher.wanted != self._saved:
             self._saved = dict(launcher.wanted)

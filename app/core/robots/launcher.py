@@ -25,14 +25,17 @@ from nep.system.addresses import is_loopback
 
 END_TIMEOUT_S = 2.0
 VIRTUAL_ROBOTS = {"pepper": "app.robots.simulated", "diffdrive": "app.robots.turtle"}
-"""Module that implements each model of virtual robot."""
+"""Name of the module that implements a virtual robot, by model."""
 TAIL_BYTES, TAIL_LETTERS = 100_000, 2000
 FIRST_GRAPH_TIMEOUT_S = 3.0
-"""Time that a start waits for the first graph, which may show that the robot already exists."""
+"""Time in seconds that a start request waits for the first graph, which may already contain the robot."""
 STARTING_S = 30.0
-"""Time during which a started robot counts as starting; slow computers need that long."""
+"""Time in seconds during which a started robot counts as starting; slow computers need that long."""
 REQUEST_LIFETIME_S = 4.0
-"""Lifetime of a start request while the robot is still listed; its end is noticed only within 3.3 s."""
+"""Lifetime in seconds of a start request while a robot with the same name is listed.
+
+The exit of that robot may be detected as late as 3.3 s afterwards.
+"""
 
 MODULE_FLAGS = ("-m", "--module")
 MAX_KNOWN = 1000
@@ -42,7 +45,7 @@ _log = logging.getLogger("studio.launcher")
 
 @dataclass(frozen=True, slots=True)
 class _StartRequest:
-    """Request to start a virtual robot of this model, with its deadlines (monotonic seconds)."""
+    """Request to start a virtual robot, with its model and its deadlines (monotonic seconds)."""
 
     model: str
     known_deadline_s: float
@@ -51,7 +54,11 @@ class _StartRequest:
 
 @dataclass(frozen=True, slots=True)
 class LaunchFailed:
-    """Event: a process could not be started or ended unexpectedly; ``detail`` is the end of its output."""
+    """Event: a process could not be started, or exited unexpectedly.
+
+    Attributes:
+        detail: Last lines of the output, or the reason why the process could not be started.
+    """
 
     what: str
     message: str
@@ -60,7 +67,7 @@ class LaunchFailed:
 
 
 class Process(Protocol):
-    """Part of the interface of `subprocess.Popen` that is used here."""
+    """Part of the interface of `subprocess.Popen` that `Launcher` uses."""
 
     pid: int
 
@@ -71,18 +78,27 @@ class Process(Protocol):
         """Wait for the process to exit and return its exit code. Raises `subprocess.TimeoutExpired`."""
 
     def terminate(self) -> None:
-        """Ask the process to exit."""
+        """Request the process to exit."""
 
     def kill(self) -> None:
         """Kill the process."""
 
 
 StartProcess = Callable[[Sequence[str], Mapping[str, str], IO[bytes]], Process]
-"""Starts a command with an environment; its output is written to the file. Raises OSError."""
+"""Function that starts a process, given the command, the environment, and the file for its output.
+
+Raises OSError.
+"""
 
 
 def start_process(command: Sequence[str], environment: Mapping[str, str], log: IO[bytes]) -> Process:
-    """Start a process of the operating system. The default `StartProcess`."""
+    """Start a process of the operating system. The default `StartProcess`.
+
+    Args:
+        command: Program and arguments.
+        environment: Environment variables.
+        log: File for the output.
+    """
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
@@ -94,7 +110,7 @@ def start_process(command: Sequence[str], environment: Mapping[str, str], log: I
 
 
 class Launcher:
-    """Starts child processes, detects when they exit, and stops them when the window closes."""
+    """Starter of child processes, which detects when they exit and stops them when the window closes."""
 
     def __init__(
         self,
@@ -127,13 +143,13 @@ class Launcher:
 
     @property
     def virtual_robots(self) -> tuple[str, ...]:
-        """Names of running virtual robots that this Studio started."""
+        """Names of the running virtual robots that this Studio started."""
         with self._lock:
             return tuple(name for name, (process, _log) in self._robots.items() if process.poll() is None)
 
     @property
     def starting_robots(self) -> tuple[str, ...]:
-        """Virtual robots that are starting."""
+        """Names of the virtual robots that are starting."""
         now = self._clock()
         return tuple(name for name, until in self._starting.items() if now < until)
 
@@ -153,19 +169,20 @@ class Launcher:
         return self._master.has_started
 
     def ensure_master(self) -> None:
-        """Start a master if none is running. Returns immediately; a failure is posted."""
+        """Start a master if none is running. Returns immediately; a failure is posted as `LaunchFailed`."""
         self._master.ensure()
 
     def ensure_master_running(self) -> None:
-        """Call `ensure_master` with a back-off after failures. Call it repeatedly."""
+        """Call `ensure_master`, unless a failed start was too recent. Call this method repeatedly."""
         self._master.ensure_running()
 
     def start_virtual_robot(self, name: str = "Pepper", model: str = "pepper") -> None:
-        """Start a virtual robot with this name and model, unless one with this name is listed.
+        """Request the start of a virtual robot, unless a robot with this name is listed.
 
-        Robots of other Studios count too. The request stays valid for some seconds, in which `follow` starts
-        the robot as soon as it is known that none is listed. If Studio started the master itself, no robot
-        can be listed.
+        Robots started by other Studios count as well. The request is valid for some seconds;
+        `start_requested`
+        starts the robot as soon as the graph shows that no such robot is listed, or immediately if this
+        Studio started the master.
         """
         now = self._clock()
         self.wanted[name] = model
@@ -174,7 +191,7 @@ class Launcher:
         self.start_requested()
 
     def start_requested(self) -> None:
-        """Start requested robots that are not listed. Called at each tick of the session."""
+        """Start the requested robots that are not listed. Called at each tick of the session."""
         if not self._requests:
             return
         now = self._clock()
@@ -217,7 +234,7 @@ class Launcher:
             self.ended -= {name}
 
     def restart_virtual_robot(self, name: str, model: str = "pepper") -> None:
-        """Restart a virtual robot; a process that doesn't respond is killed."""
+        """Restart a virtual robot. A process that doesn't respond is killed."""
         self.wanted[name] = model
         self._requests.pop(name, None)
         with self._lock:
@@ -230,7 +247,7 @@ class Launcher:
         self._start_robot(name, model)
 
     def stop_virtual_robot(self, name: str) -> None:
-        """Stop a virtual robot that was started here, and discard a pending request to start it."""
+        """Stop a virtual robot that this Studio started, and discard a pending request to start it."""
         self.wanted.pop(name, None)
         self._stop_robot(name)
 
@@ -269,7 +286,10 @@ class Launcher:
                 log.close()
 
     def close(self) -> None:
-        """Stop the virtual robots. The master keeps running while other programs are registered."""
+        """Stop the virtual robots.
+
+        The master keeps running while programs other than Studio are registered.
+        """
         self._requests.clear()
         for name in list(self._robots):
             self._stop_robot(name)
@@ -299,7 +319,7 @@ def _tail(log: IO[bytes]) -> str:
 
 
 class VirtualProcesses:
-    """Identifies processes of virtual robots on this computer. Caches the results. Not thread-safe."""
+    """Detection of the processes of virtual robots on this computer, with cached results. Not thread-safe."""
 
     def __init__(self, modules: Collection[str], started: Callable[[], Collection[int]] = tuple) -> None:
         self._modules = frozenset(modules)
@@ -309,8 +329,9 @@ class VirtualProcesses:
     def is_started_by_studio(self, identity: Identity) -> bool:
         """Return True if a program is a virtual robot started by a Studio of this user.
 
-        That is this process, a process that it started (or the child of one, as in a frozen build), or a
-        process of the same user on this computer that runs a module of `VIRTUAL_ROBOTS`.
+        This applies to Studio's own process, to its child processes (or a child of one, as in a frozen
+        build), and to processes of the same user on this computer that run a module of
+        `VIRTUAL_ROBOTS`.
         """
         if identity.pid is None or identity.host != platform.node():
             return False
@@ -323,7 +344,7 @@ class VirtualProcesses:
         return self._known[identity]
 
     def has_ended(self, identity: Identity) -> bool:
-        """Return True if a program has certainly exited; always False for programs on other computers."""
+        """Return True if a program has certainly exited. Always False for programs on other computers."""
         if identity.pid is None or identity.host != platform.node():
             return False
         import psutil  # noqa: PLC0415 (slow import, not needed to show the window)

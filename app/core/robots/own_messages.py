@@ -1,4 +1,4 @@
-"""Filter for robots' messages that accepts only those sent by the robot's own program."""
+"""Filter that accepts messages about a robot only from the robot's own program."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from nep.protocol.graph_view import GraphView
 
 
 class OwnMessages:
-    """Filters robots' messages by sender. Not thread-safe: use it from the window's thread."""
+    """Filter that drops messages not sent by the robot's own program.
+
+    Not thread-safe; use it from the main thread.
+    """
 
     def __init__(self, senders: Senders, links: Mapping[str, RobotLink]) -> None:
         # `senders` map publishers to nodes; `links` are the robots by name.
@@ -27,8 +30,8 @@ class OwnMessages:
     def update(self, view: GraphView) -> None:
         """Apply a new graph.
 
-        Programs that left the graph are remembered while they are connected, because they may only be
-        suspended.
+        Programs that left the graph are remembered while they are still connected, because they may
+        only be suspended.
         """
         before, self.view = self.view, view
         for link in self._links.values() if before.nodes.keys() - view.nodes.keys() else ():
@@ -49,14 +52,17 @@ class OwnMessages:
 
     @staticmethod
     def topics(robot: Robot) -> set[str]:
-        """Return the topics on which only the robot's own program is accepted, if it publishes there."""
+        """Return the robot's topics on which messages of other programs are ignored.
+
+        This applies if the robot's own program publishes on the topic.
+        """
         return {robot.topics.answer, *topics_of(robot)}
 
     def other_programs(self, name: str) -> list[Identity]:
-        """Return the programs other than the robot's own that receive its commands and publish replies.
+        """Return other programs that receive the robot's commands and publish replies.
 
-        Includes suspended programs while they are connected, because they process pending commands when they
-        resume.
+        Suspended programs are included while they are connected, because they process pending commands
+        when they resume.
         """
         link = self._links.get(name)
         if link is None or link.robot.dialect != "native":
@@ -69,7 +75,7 @@ class OwnMessages:
         return listed + [each for id, each in self._lapsed.get(name, {}).items() if id in connected]
 
     def new_programs(self, link: RobotLink, before: GraphView) -> list[Identity]:
-        """Return the programs that serve the robot now but did not in ``before``.
+        """Return the programs that serve the robot now but did not in the graph ``before``.
 
         A program serves a robot if it receives the robot's commands and publishes replies.
         """
@@ -90,8 +96,8 @@ class OwnMessages:
     def is_from(self, link: RobotLink, message: Message) -> bool | None:
         """Return True if the robot's own program sent a message; None while the sender is unknown.
 
-        Programs of RIZE can't be distinguished: True for any subscriber of the robot's commands and for the
-        gateway.
+        Programs of RIZE can't be distinguished: the result is True for every subscriber of the robot's
+        commands and for the gateway.
         """
         if link.identity is None and link.robot.dialect == "native":
             return True
@@ -103,9 +109,14 @@ class OwnMessages:
         return None if node is None or link.identity is None else node == link.identity.node_id
 
     def newest(self, link: RobotLink, batch: Batch | None, topic: str) -> Payload | None:
-        """Return the payload of the newest valid message.
+        """Return the payload of the newest valid message; None if there is none.
 
         If the robot's own program publishes the topic, messages of other programs are ignored.
+
+        Args:
+            link: State of the robot.
+            batch: New messages of the topic, or None.
+            topic: Name of the topic.
         """
         if batch is None or not batch.messages:
             return None
@@ -118,7 +129,7 @@ class OwnMessages:
 
 
 def mapping_of(message: Message) -> Payload | None:
-    """Return the payload if it can be decoded and is a mapping, else None."""
+    """Return the payload of a message; None if it can't be decoded or is not a mapping."""
     try:
         value = message.payload
     except NepError:

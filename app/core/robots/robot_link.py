@@ -1,4 +1,4 @@
-"""State of one robot as known to Studio, and the user's manual invocations of its actions."""
+"""State of one robot as known to Studio, and the actions that the user invoked manually."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from nep.i18n import _, lazy
 from nep.nodes.publisher import Publisher
 
 SENDER = "studio"
-"""Sender id of manual commands."""
+"""Sender id in manual commands."""
 MAX_PAST_INVOCATIONS = 40
 MAX_DISCONNECTED = 200
-"""Maximum number of disconnected robots in the list; all robots of a room may disconnect together."""
+"""Maximum number of listed robots that are disconnected; all robots of a room may disconnect together."""
 NOT_STOPPED = "not stopped"
 CONNECTING = "connecting"
 STOPPING = "stopping"
@@ -32,7 +32,7 @@ STATE_LABELS = {
     "busy": lazy("busy"),
     "ready": lazy("ready"),
 }
-"""Text for each value of `RobotLink.state`."""
+"""Display text for each value of `RobotLink.state`."""
 
 Payload = Mapping[str, object]
 
@@ -42,11 +42,11 @@ class Invocation:
     """Manual invocation of an action.
 
     Attributes:
-        state: State in the robot's last reply; "sent" before the first one.
+        state: State in the robot's last reply; "sent" before the first reply.
         waits_for: Actions that must end before this one starts, while the state is "accepted".
         replaces: Actions that were cancelled by this one.
-        timeout_s: Time limit, from the start of execution; None for no limit.
-        at_s: Time of sending in seconds since 1970.
+        timeout_s: Time limit in seconds, measured from the start of execution; None for no limit.
+        sent_at_s: Time of sending in seconds since 1970.
     """
 
     id: str
@@ -67,45 +67,45 @@ class Invocation:
 
     @property
     def remaining_s(self) -> float | None:
-        """Seconds until the time limit; None without a limit or before the start."""
+        """Remaining seconds until the time limit; None without a limit or before execution has started."""
         if self.timeout_s is None or self.execution_start_s is None:
             return None
         return self.execution_start_s + self.timeout_s - self.clock()
 
     @property
     def is_running(self) -> bool:
-        """True if the robot has not reported the end of the action."""
+        """True until the robot reports the end of the action."""
         return self.state not in FINAL_STATES
 
     @property
     def elapsed_s(self) -> float:
-        """Seconds from sending to the end, or until now."""
+        """Seconds since the command was sent; the total duration after the end."""
         return (self.ended_s if self.ended_s is not None else self.clock()) - self.started_s
 
 
 @dataclass(slots=True, eq=False)
 class RobotLink:
-    """State of one robot as known to Studio.
+    """State of one robot as known to Studio. All times are in monotonic seconds.
 
     Attributes:
-        values: Newest value of each sensor while it is watched.
-        tried: Last manual invocations, newest last.
-        mute: True if the robot did not reply to a command.
-        heard_s: Time of its last reply or of the last command to it, whichever is later.
-        answered_s: Time of its last reply.
-        gone_s: Time of its disconnection.
-        not_stopped: Why the last Stop is not confirmed ("Arm may still move: the brake does not answer"); ""
-            if it is.
-        goes_on: The robot's own report of actions that it could not end; "" if there is none.
-        may_move: Why the robot may be moving although it doesn't reply (`MovedRobots`); "" otherwise.
-        has_proven_stop: True if its program has ever confirmed a Stop.
-        stop_began_s: Time of a Stop without a reply yet.
-        stopping: True if such a Stop takes long enough to be shown.
-        is_reached: True if a Stop would reach the robot now.
+        values: Newest value of each sensor while the sensor is watched.
+        past_invocations: Last manual invocations, newest last.
+        is_unresponsive: True if the robot did not reply to a command.
+        last_contact_s: Time of the last reply of the robot or of the last command to it, whichever is later.
+        replied_s: Time of the last reply; None before the first reply.
+        gone_s: Time of the disconnection; None while connected.
+        stop_problem: Reason why the last Stop is not confirmed, such as "Arm may still move: the brake
+            does not answer"; "" if it is confirmed.
+        unended_actions: Message of the robot about actions that it could not end, or "".
+        motion_warning: Reason why the robot may be moving although it doesn't reply (`MovedRobots`), or "".
+        has_proven_stop: True if the robot's program has ever confirmed a Stop.
+        stop_began_s: Time of a Stop that the robot has not replied to, or None.
+        is_stopping: True if such a Stop takes long enough to be shown.
+        is_reachable: True if a Stop sent now would reach the robot.
         identity: Program of the robot.
-        topics_before: Topics of its earlier descriptions.
-        rejected: Number of messages that its driver rejected.
-        errors: Number of exceptions that its driver caught.
+        topics_before: Topics of the robot's earlier descriptions.
+        rejected: Number of messages that the robot's driver rejected.
+        errors: Number of exceptions that the robot's driver caught.
         was_real: True if the robot was not virtual at any time.
     """
 
@@ -147,15 +147,15 @@ class RobotLink:
 
     @property
     def can_confirm_stop(self) -> bool:
-        """True if the robot confirms a Stop; robots of RIZE don't."""
+        """True if the robot confirms that it has stopped. Robots of RIZE can't."""
         return self.robot.safe_stop.confirmed
 
     @property
     def state(self) -> str:
-        """One of "not stopped", "stopping", "away", "connecting", "silent", "busy" and "ready".
+        """State: "not stopped", "stopping", "away", "connecting", "silent", "busy" or "ready".
 
-        A disconnected robot whose Stop is not confirmed, or that stopped replying after a command, may still
-        move.
+        "not stopped" means that the robot may still move: its last Stop is not confirmed, or it stopped
+        replying after a command.
         """
         if self.stop_problem or self.motion_warning or (self.is_connected and self.unended_actions):
             return NOT_STOPPED
@@ -179,7 +179,7 @@ class RobotLink:
 
     @property
     def state_label(self) -> str:
-        """State in words, such as "ready" or "may still move"."""
+        """Display text of the state, such as "ready" or "may still move"."""
         state = self.state
         if self.is_connected and self.is_unresponsive and state == NOT_STOPPED and not self.stop_problem:
             return _("not responding")
@@ -201,11 +201,15 @@ class RobotLink:
 
 
 def excess_disconnected(links: Iterable[RobotLink], in_use: Collection[str]) -> Sequence[RobotLink]:
-    """Return the robots to remove from the list: disconnected ones beyond `MAX_AWAY`.
+    """Return the robots to remove from the list: disconnected robots beyond `MAX_DISCONNECTED`.
 
-    The limit is needed because any program can invent new names. Robots that never replied come first, then
-    those disconnected longest. Robots ``in_use``, robots that ever confirmed a Stop, and robots whose Stop is
-    pending or failed are neither counted nor returned.
+    The limit is needed because any program can invent new names. Robots that never replied are removed
+    first, then the robots that have been disconnected for the longest time. Robots that are in use,
+    that ever confirmed a Stop, or whose Stop is pending or failed are neither counted nor returned.
+
+    Args:
+        links: All robots in the list.
+        in_use: Names of the robots that must not be removed.
     """
     away = [
         link
@@ -218,7 +222,7 @@ def excess_disconnected(links: Iterable[RobotLink], in_use: Collection[str]) -> 
 
 
 def topics_of(robot: Robot) -> list[str]:
-    """Return the topics of a robot's sensors, events and state, without images."""
+    """Return the topics of a robot's sensors, events and state, except image topics."""
     topics = [sensor.topic for sensor in robot.sensors if sensor.topic and not sensor.is_image]
     topics += [event.topic for event in robot.events if event.topic]
     if robot.topics.state is not None:

@@ -1,4 +1,4 @@
-"""Messages that robots publish: replies, heartbeats and sensor values."""
+"""Processing of messages that robots publish: replies, heartbeats and sensor values."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 MAX_HELD = 64
-"""Maximum number of stored replies of a publisher that the graph does not list yet."""
+"""Maximum number of replies stored for each publisher that the graph does not list yet."""
 
 
 class RobotMessages:
-    """Applies messages of robots' own programs. Not thread-safe: use it from the window's thread.
+    """Processor of the messages that robots' own programs publish.
 
-    Replies of publishers that the graph does not list yet are stored until the next graph.
+    Not thread-safe; use it from the main thread. Replies of publishers that the graph does not list yet
+    are stored until the next graph.
     """
 
     def __init__(
@@ -33,7 +34,12 @@ class RobotMessages:
         self._settled: dict[str, None] = {}
 
     def read(self, link: RobotLink, batches: Mapping[str, Batch]) -> None:
-        """Apply the replies, newest sensor values and drawing of a robot. ``batches`` is by topic."""
+        """Apply the replies, the newest sensor values and the newest drawing of a robot.
+
+        Args:
+            link: State of the robot.
+            batches: New messages, by topic.
+        """
         answers = batches.get(link.robot.topics.answer)
         for message in answers.messages if answers is not None else ():
             is_own = self._own.is_from(link, message)
@@ -51,7 +57,7 @@ class RobotMessages:
         link.drawing = self._own.newest(link, batches.get(topic), topic) or link.drawing
 
     def apply_held(self, links: Mapping[str, RobotLink]) -> None:
-        """Apply the stored replies whose publishers the new graph lists; discard the others."""
+        """Apply the stored replies whose publishers the new graph lists; discard all others."""
         held, self._held = self._held, {}
         for name, messages in held.items():
             link = links.get(name)
@@ -64,7 +70,7 @@ class RobotMessages:
         self._held.pop(name, None)
 
     def take_settled(self) -> tuple[str, ...]:
-        """Return and clear the robots without a confirmed Stop that have since ended all actions."""
+        """Return and clear the robots that have reported the end of all actions after an unconfirmed Stop."""
         settled, self._settled = tuple(self._settled), {}
         return settled
 

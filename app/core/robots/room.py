@@ -1,4 +1,4 @@
-"""Room shared by the virtual robots, which Studio shows, changes and saves."""
+"""Room that the virtual robots share. Studio shows, changes and saves it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from nep.protocol.graph_view import GraphView
 
 SETTING_KEY = "room"
 SAVE_DELAY_S = 1.0
-"""Time without changes after which the room is saved."""
+"""Time in seconds without changes after which the room is saved."""
 SHARING_FAILED = lazy("can't share the room of the virtual robots: {error}")
 
 
 class SessionRoom:
-    """Room shared by all virtual robots and Studios of the network.
+    """Room shared by all virtual robots and all Studios on the network.
 
-    Joined when the first robot appears. Not thread-safe: use it from the window's thread.
+    The room is joined when the first robot appears. Not thread-safe; use it from the main thread.
     """
 
     def __init__(
@@ -64,7 +64,14 @@ class SessionRoom:
     # -- commands of the user -------------------------------------------------------------------------
 
     def move(self, name: str, x: float, y: float, robots: Mapping[str, tuple[float, float, float]]) -> bool:
-        """Move an object within the walls; return False if a robot (x, y, radius) is in the way."""
+        """Move an object, limited by the walls; return False if a robot is in the way.
+
+        Args:
+            name: Name of the object.
+            x: New position.
+            y: New position.
+            robots: Position and radius (x, y, radius) of each robot, by name.
+        """
         moved = self.room.with_moved(name, x, y).thing(name)
         for there in robots.values():
             if isinstance(moved, (Box, Person)) and _touches(moved, *there):
@@ -72,7 +79,13 @@ class SessionRoom:
         return self._publish() if self._map.move(name, x, y) else False
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Add an object; return its name, or None if the limit is reached."""
+        """Add an object; return its name, or None if the maximum number is reached.
+
+        Args:
+            kind: Kind of the object.
+            x: Position.
+            y: Position.
+        """
         name = self._map.add(kind, x, y)
         self._publish()
         return name
@@ -89,7 +102,7 @@ class SessionRoom:
     # -- input from the session -----------------------------------------------------------------------
 
     def update(self, view: GraphView) -> None:
-        """Apply a new graph; join the room as soon as a robot has published it."""
+        """Apply a new graph. The room is joined as soon as a robot has published it."""
         if self._watch is not None or TOPIC not in view.topics:
             return
         self._watch = self._watches.open([TOPIC])

@@ -1,4 +1,4 @@
-"""Manual invocations of actions, each with exactly one result."""
+"""Manual invocations of actions. Each invocation has exactly one result."""
 
 from __future__ import annotations
 
@@ -14,15 +14,18 @@ from nep.i18n import _, number
 from nep.text import bounded_str
 
 FIRST_REPLY_TIMEOUT_S = 3.0
-"""Time limit for the first reply to a command."""
+"""Time limit in seconds for the first reply to a command."""
 GRACE_S = 0.5
-"""Time after an action's time limit, which the robot should enforce, until Studio ends the invocation."""
+"""Time in seconds that a robot has to report the end of an action after its time limit.
+
+After that, Studio ends the invocation.
+"""
 MAX_MISSED_HEARTBEATS = 4
 MIN_SILENCE_S = 2.0
 
 
 class ManualInvocations:
-    """Manual invocations. Not thread-safe: use it from the window's thread."""
+    """Manual invocations of actions. Not thread-safe; use it from the main thread."""
 
     def __init__(
         self,
@@ -35,7 +38,10 @@ class ManualInvocations:
         self._send, self._rest, self._clock, self._wall = send, rest, clock, wall
 
     def start(self, link: RobotLink, action: Action, input: Payload) -> Invocation:
-        """Send an invocation. It fails immediately if the robot can't be reached."""
+        """Send an invocation and return its state.
+
+        The invocation fails immediately if the robot can't be reached.
+        """
         invocation = Invocation(
             uuid.uuid4().hex,
             action.name,
@@ -64,7 +70,7 @@ class ManualInvocations:
             self._send_cancel(link, invocation)
 
     def apply_reply(self, link: RobotLink, answer: Payload) -> None:
-        """Apply a reply of the robot. Replies to other programs only show that the robot responds."""
+        """Apply a reply of the robot. A reply to another program only shows that the robot is responding."""
         link.last_contact_s = link.replied_s = self._clock()
         link.is_unresponsive = False
         for invocation in link.running:
@@ -94,7 +100,7 @@ class ManualInvocations:
             made.execution_start_s = self._clock()
 
     def check_timeouts(self, links: Iterable[RobotLink]) -> None:
-        """End invocations of robots that don't reply, and those that exceed their time limit."""
+        """End the invocations of robots that don't reply, and invocations that exceed their time limit."""
         now = self._clock()
         for link in links:
             for invocation in link.running:
@@ -136,7 +142,13 @@ class ManualInvocations:
         self._end(link, made, "failed", sentence)
 
     def end_all(self, link: RobotLink, state: str, error: str | None = None) -> None:
-        """End all invocations of a robot with this state."""
+        """End all invocations of a robot.
+
+        Args:
+            link: State of the robot.
+            state: Final state of the invocations.
+            error: Error message of the invocations, or None.
+        """
         for invocation in link.running:
             self._end(link, invocation, state, error)
 
@@ -151,7 +163,13 @@ class ManualInvocations:
 
 
 def command_of(robot: Robot, made: Invocation, input: Payload) -> Payload:
-    """Return the command of an invocation."""
+    """Return the message that invokes an action of a robot.
+
+    Args:
+        robot: Robot that receives the command.
+        made: Invocation of the action.
+        input: Input of the action.
+    """
     if robot.dialect == "rize":
         return rize.to_command(robot, made.action, input, made.id)
     return {"id": made.id, "op": "invoke", "from": SENDER, "action": made.action, "input": dict(input)}

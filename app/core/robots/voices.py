@@ -1,4 +1,4 @@
-"""Speech and sounds of virtual robots on the computer's loudspeaker, one voice at a time."""
+"""Speech and sounds of virtual robots on the computer's loudspeaker. One robot speaks at a time."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ if TYPE_CHECKING:
     from app.core.storage.settings import Settings
 
 SOUND_SETTING = "robots_heard"
-"""Setting: True if robots are audible."""
+"""Name of the setting that is True if robots are audible."""
 FINISHED_RATIO = 0.9
-"""Share of a text after which it counts as finished, because a voice may be slower than the speech bubble."""
+"""Progress (0 to 1) of a text above which a robot's speech counts as finished.
+
+Less than 1, because the voice may be slower than the speech bubble.
+"""
 MAX_WAITING = 4
 PATIENCE_S, PATIENCE_PER_LETTER_S = 10.0, 0.2
 """Time limit of a voice (base, and for each letter), after which the speech engine counts as hung."""
@@ -27,11 +30,14 @@ MAX_NOTES, MAX_S = 32, 10.0
 LOWEST_HZ, HIGHEST_HZ = 20.0, 20_000.0
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
-"""Sequence of tones, each with frequency in hertz (0 for a pause) and duration in seconds."""
+"""Sequence of tones, each with a frequency in hertz (0 for a pause) and a duration in seconds."""
 
 
 class Speaker(Protocol):
-    """Sound output for robots. No method blocks or raises; a computer without sound stays silent."""
+    """Sound output for robots.
+
+    No method blocks or raises an exception; a computer without sound stays silent.
+    """
 
     @property
     def is_busy(self) -> bool:
@@ -39,27 +45,38 @@ class Speaker(Protocol):
 
     @property
     def problem(self) -> str:
-        """Why robots are not audible on this computer, or "".
+        """Reason why robots are not audible on this computer, or "".
 
-        The problem is known only after the first attempt to play something.
+        The reason is known only after the first attempt to play a sound.
         """
 
     def speak(self, words: str, language: str, volume: float) -> None:
-        """Speak a text. ``language`` is a code such as ``en``; ``volume`` is 0 to 1."""
+        """Speak a text.
+
+        Args:
+            words: Text.
+            language: Language code such as ``en``.
+            volume: Volume, 0 to 1.
+        """
 
     def play(self, notes: Notes, volume: float) -> None:
-        """Play tones, even while a voice is speaking."""
+        """Play tones, even while a voice is speaking.
+
+        Args:
+            notes: Tones.
+            volume: Volume, 0 to 1.
+        """
 
     def stop_voice(self) -> None:
         """Stop the voice immediately."""
 
     def stop(self) -> None:
-        """Stop voice and tones immediately."""
+        """Stop the voice and all tones immediately."""
 
 
 @dataclass(frozen=True, slots=True)
 class Utterance:
-    """Text to be spoken by a robot, pending or playing."""
+    """Text that a robot is speaking or will speak."""
 
     robot: str
     text: str
@@ -69,7 +86,15 @@ class Utterance:
 
 @dataclass(frozen=True, slots=True)
 class RobotSound:
-    """Audible part of a robot's drawing. `played` and `spoken` are the progress from 0 to 1."""
+    """Audible part of a robot's drawing.
+
+    Attributes:
+        speech: Text that the robot is speaking, or "".
+        spoken_fraction: Progress of the speech, 0 to 1.
+        sound: Serial number of the sound.
+        played: Progress of the sound, 0 to 1.
+        notes: Tones of the sound.
+    """
 
     speech: str = ""
     spoken_fraction: float = 0.0
@@ -81,7 +106,7 @@ class RobotSound:
 
     @classmethod
     def parse(cls, drawing: Mapping[str, object]) -> RobotSound:
-        """Parse a drawing; missing and malformed parts become silence."""
+        """Parse the audible part of a drawing. Missing and malformed fields become silence."""
         speech, sound = drawing.get("speech"), drawing.get("sound")
         played = sound if isinstance(sound, Mapping) else {}
         number = played.get("number")
@@ -97,10 +122,10 @@ class RobotSound:
 
 
 class RobotVoices:
-    """Plays the speech and sounds of virtual robots on `speaker`, if that is set.
+    """Playback of the speech and the sounds of virtual robots on `speaker`, which may be None.
 
-    Robots speak one after the other; interrupted speech stops immediately. Not thread-safe: use it from the
-    window's thread.
+    Robots speak one after the other; interrupted speech stops immediately. Not thread-safe; use it from
+    the main thread.
     """
 
     def __init__(
@@ -129,7 +154,7 @@ class RobotVoices:
         return bool(self._settings.get(SOUND_SETTING, True))
 
     def set_on(self, *, on: bool) -> None:
-        """Make robots audible or silent. Raises SettingsError if the choice can't be saved."""
+        """Make robots audible or silent, and save the choice. Raises SettingsError."""
         try:
             self._settings.set(SOUND_SETTING, on)
         finally:
@@ -138,12 +163,12 @@ class RobotVoices:
 
     @property
     def problem(self) -> str:
-        """Why robots are not audible, or ""."""
+        """Reason why robots are not audible, or ""."""
         return self.speaker.problem if self.speaker is not None else ""
 
     @property
     def current(self) -> Utterance | None:
-        """Text that is being spoken."""
+        """Text that is currently spoken, or None."""
         return self._current
 
     def update(self) -> None:

@@ -1,4 +1,4 @@
-"""Open question of a running program to the user."""
+"""Question of a running program to the user."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ from app.core.run.runner import Runner, RunnerEvent
 
 @dataclass(frozen=True, slots=True)
 class AskedQuestion:
-    """Question of a program: number of the run, number of the question, text, and choices."""
+    """Question of a program to the user.
+
+    Attributes:
+        run: Number of the run.
+        number: Number of the question within the run.
+        words: Text of the question.
+        choices: Possible answers; empty if any answer is allowed.
+    """
 
     run: int
     number: int
@@ -18,14 +25,14 @@ class AskedQuestion:
 
 
 class OpenQuestion:
-    """Stores the open question of the program; there is at most one."""
+    """Storage of the open question of a program. At most one question is open."""
 
     def __init__(self) -> None:
         self.question: AskedQuestion | None = None
         self._runner: Runner | None = None
 
     def reset(self, runner: Runner) -> None:
-        """Reset for a new program."""
+        """Discard the question of the previous program and connect to a new one."""
         self.question, self._runner = None, runner
 
     def apply(self, event: RunnerEvent) -> None:
@@ -35,11 +42,11 @@ class OpenQuestion:
             self.question = AskedQuestion(event.run, number, event.text, event.choices) if number else None
 
     def answer(self, question: AskedQuestion, words: str) -> None:
-        """Send the user's answer to the program. No effect if the question is no longer open."""
+        """Send the user's answer to the program. Does nothing if the question is no longer open."""
         if self._runner is not None and question == self.question:
             self.question = None
             self._runner.answer(question.number, words)
 
     def clear(self) -> None:
-        """Discard the question, because the program has ended."""
+        """Discard the question after the program has ended."""
         self.question = self._runner = None

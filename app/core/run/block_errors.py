@@ -1,4 +1,4 @@
-"""Errors shown at blocks until the block is fixed or the next run starts."""
+"""Errors shown on blocks until the block is fixed or the next run starts."""
 
 from __future__ import annotations
 
@@ -13,10 +13,13 @@ _CONTENT_KEYS = ("type", "fields", "inputs", "extraState", "enabled", "disabledR
 
 
 class BlockErrors:
-    """Error messages by block id (``by_block``).
+    """Error messages shown on blocks.
 
-    An error that prevented the start is removed when the blocks no longer have it. An error that stopped a
-    program is removed when its block, or a block inside it, differs from the run.
+    An error that prevented the start is removed when the compiler no longer reports it. An error that
+    stopped a program is removed when its block, or a block inside it, has been edited since the start.
+
+    Attributes:
+        by_block: Error message of each block, by block id.
     """
 
     def __init__(self) -> None:
@@ -27,11 +30,16 @@ class BlockErrors:
         self._checked: Program | int | None = None  # the newest program, or count of edits, that was checked
 
     def start_run(self, wanted: RequestedRun) -> None:
-        """Clear the errors of the previous run."""
+        """Clear the errors of the previous run, at the start of a new one."""
         self.by_block, self._wanted, self._ran = {}, wanted, wanted.document.workspace
 
     def set_errors(self, errors: Mapping[str, str], *, not_started: bool) -> None:
-        """Set the errors that prevented the start or stopped the program."""
+        """Set the errors of the run.
+
+        Args:
+            errors: Error messages by block id.
+            not_started: True if the errors prevented the start, False if they stopped the program.
+        """
         self.by_block, self._not_started, self._checked = errors, not_started, None
 
     def discard_fixed(self) -> bool:

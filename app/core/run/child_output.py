@@ -10,7 +10,7 @@ from typing import IO
 MAX_LINE_LENGTH = 1_000_000
 CHUNK = 65_536
 PROTOCOL_PREFIX = b'{"is"'
-"""First bytes of each line of the protocol; all other output is counted but not parsed."""
+"""First bytes of each line of the protocol. Other output is counted but not parsed."""
 LINES_PER_S = 1_000
 BYTES_PER_S = 20_000_000
 PAUSE_S = 0.02
@@ -18,7 +18,10 @@ MAX_TEXT_LENGTH = 2_000
 
 
 class Output:
-    """Lines of a pipe, read at a limited rate to keep the window responsive; the writer then blocks."""
+    """Iterator over the lines of a pipe. Limits the rate, so that the window remains responsive.
+
+    A process that writes faster blocks.
+    """
 
     def __init__(
         self, stream: IO[bytes], stopped: threading.Event, clock: Callable[[], float] = time.monotonic
@@ -89,7 +92,7 @@ class RateLimiter:
         self.kept_back = 0
 
     def passes(self) -> bool:
-        """Return True if another item may pass now; count it as rejected otherwise."""
+        """Return True if another item may pass now; otherwise count the item as rejected."""
         now = self._clock()
         if now - self._second >= 1.0:
             self._second, self._passed = now, 0
@@ -100,7 +103,7 @@ class RateLimiter:
         return True
 
     def take_rejected_count(self) -> int:
-        """Return and clear the number of rejected items; 0 until items can pass again."""
+        """Return and clear the number of rejected items; 0 while items are still being rejected."""
         if self._clock() - self._second < 1.0 and self._passed >= self._per_second:
             return 0
         count, self.kept_back = self.kept_back, 0
@@ -108,10 +111,10 @@ class RateLimiter:
 
 
 def texts(said: object) -> tuple[str, ...]:
-    """Return the items of a list as strings; empty for any other type."""
+    """Return the items of a list as strings; empty if the value is not a list."""
     return tuple(str(each) for each in said) if isinstance(said, (list, tuple)) else ()
 
 
 def text_of(said: Mapping[str, object], name: str) -> str:
-    """Return a field as a string, truncated for display."""
+    """Return a field as a string, shortened for display."""
     return str(said.get(name, ""))[:MAX_TEXT_LENGTH]

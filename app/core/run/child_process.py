@@ -1,4 +1,4 @@
-"""Process of a program with its child processes: limited in memory, and killed together."""
+"""Process of a program and its child processes, with limited memory. All are killed together."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ else:
 MAX_MEMORY_BYTES = 1_000_000_000
 """Maximum memory of a program and its child processes in bytes."""
 CHILD_CHECK_INTERVAL_S = 1.0
-"""Interval of checks for new child processes; the memory of the program is checked more often."""
+"""Interval in seconds between searches for new child processes. Memory is checked more often."""
 
 
 class ChildProcess:
-    """Process with its three pipes. Thread-safe."""
+    """Process of a program, with pipes for input, output and errors. Thread-safe."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class ChildProcess:
         return self.popen.poll() is not None
 
     def check(self) -> None:
-        """Look for new child processes, and kill the process if it uses too much memory."""
+        """Search for new child processes, and kill the process if it uses too much memory."""
         if self._process is None:
             return
         if self._clock() >= self._next_family_s:
@@ -78,7 +78,7 @@ class ChildProcess:
             self.kill()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait until the process has ended; return False after ``timeout_s`` seconds."""
+        """Wait until the process has exited; return False on timeout (in seconds)."""
         try:
             self.popen.wait(timeout_s)
         except subprocess.TimeoutExpired:
@@ -86,14 +86,14 @@ class ChildProcess:
         return True
 
     def kill(self) -> None:
-        """Kill the process and its children."""
+        """Kill the process and its child processes."""
         if self._process is not None and not self.has_ended:
             self._family = [*self._family, *_descendants(self._process)]
         self.popen.kill()
         self.kill_descendants()
 
     def kill_descendants(self) -> None:
-        """Kill remaining child processes: the process group, and processes that left the group."""
+        """Kill the remaining child processes, including processes that left the process group."""
         if os.name == "posix":
             with contextlib.suppress(ProcessLookupError, PermissionError):  # the group is empty
                 os.killpg(self.popen.pid, signal.SIGKILL)
@@ -105,7 +105,7 @@ class ChildProcess:
 
 
 def child_command() -> tuple[str, ...]:
-    """Return the command that runs a program: this Python, or the executable of a frozen Studio."""
+    """Return the command that runs a program: the current Python, or the executable of a frozen build."""
     if getattr(sys, "frozen", False):
         return (sys.executable, "--child")
     return (sys.executable, "-m", "app.blocks.runtime.child")

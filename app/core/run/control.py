@@ -1,4 +1,4 @@
-"""Run, Pause, Step and Stop: controls the program's process and collects the robots' replies."""
+"""Run, Pause, Step and Stop: control of the program's process, and collection of the robots' replies."""
 
 from __future__ import annotations
 
@@ -42,23 +42,23 @@ from app.errors import AppError
 from nep.i18n import _
 
 DOUBLE_CLICK_S = 0.5
-"""Maximum time between two clicks on Run that count as a double click."""
+"""Maximum time in seconds between two clicks on Run that count as a double click."""
 CLOSE_WAIT_S = STOP_TIMEOUT_S + 1
 
 _log = logging.getLogger("studio")
 
 
 class RunNetwork(Protocol):
-    """Parts of the session that a run uses."""
+    """Parts of the session that `Runs` uses."""
 
     address: str
     stopper: RobotStopper | None
 
 
 class Runs:
-    """Runs of behaviours. Not thread-safe: use it from the window's thread.
+    """Control of the running behaviour. Not thread-safe; use it from the main thread.
 
-    Other threads wait for the result of a Stop.
+    Waiting for the result of a Stop takes place in other threads.
     """
 
     pace_s = 0.0
@@ -132,7 +132,7 @@ class Runs:
 
     @property
     def tried_value(self) -> TriedValue | None:
-        """Last tried block and its value."""
+        """Value of the block that was tried last, or None."""
         return self._trial.value
 
     @property
@@ -142,11 +142,11 @@ class Runs:
 
     @property
     def block_warnings(self) -> Mapping[str, str]:
-        """Warnings by block id; still available after the run."""
+        """Warnings by block id. They remain available after the run."""
         return self._warnings.by_block
 
     def tick(self) -> None:
-        """Check for edits, changed robots and breakpoints, and refresh `view`. Called at each tick."""
+        """Check for edits, changed robots and breakpoints, and update `view`. Called at each tick."""
         self._view = None
         if (
             self._run.unrunnable_program is not None
@@ -184,9 +184,9 @@ class Runs:
         return self._view[2]
 
     def run(self) -> None:
-        """Run the current behaviour; resume it if it is paused, restart it if it is running.
+        """Run the current behaviour. A paused program is resumed, a running program is restarted.
 
-        Problems are shown at their blocks.
+        Errors that prevent the start are shown on their blocks.
         """
         run = self._run
         if run.state == "paused":
@@ -200,7 +200,7 @@ class Runs:
             self._request(replace(self._current_request, paused=False))
 
     def try_stack(self, stack: Stack) -> None:
-        """Run one stack of the current behaviour, after stopping a running program."""
+        """Stop a running program, and run one stack of the current behaviour."""
         variable = stack.variable_id(self._documents.current.workspace)
         if variable is not None:
             self._show_variable(stack, variable)
@@ -217,7 +217,7 @@ class Runs:
         self._trial.show(document, stack, value.text if value is not None else _("no value yet"))
 
     def is_running_or_pending(self, document: Document) -> bool:
-        """Return True if this behaviour is running, or will run once another program has stopped."""
+        """Return True if this behaviour is running, or will be run when another program has stopped."""
         return (self.active and self.document is document) or (
             self._pending_request is not None and self._pending_request.document is document
         )
@@ -234,7 +234,10 @@ class Runs:
             self._run = replace(self._run, is_restarting=True)
 
     def step(self) -> None:
-        """Run the next block of a paused program or the first of a new one; pause a running program."""
+        """Run the next block of a paused program, or the first block of a new one.
+
+        A running program is paused.
+        """
         if self._run.state in {"ready", "proven"}:
             self._start(RequestedRun(self._documents.current, paused=True))
         elif self._run.state == "running":
@@ -243,7 +246,7 @@ class Runs:
             self._runner.step()
 
     def set_pace(self, seconds: float) -> None:
-        """Set the delay before each block in seconds, also for a running program."""
+        """Set the delay before each block in seconds, including for a running program."""
         self.pace_s, self._view = seconds, None
         if self._runner is not None:
             self._runner.set_pace(seconds)
@@ -273,7 +276,7 @@ class Runs:
             self._mark_blocks(stopped=())
 
     def stop(self) -> None:
-        """Stop the program and every robot; the run bar shows their replies."""
+        """Stop the program and all robots. The run bar shows the robots' replies."""
         self.also_stops()
         self._stopped_again.clear()
         self._pending_request = None
@@ -283,7 +286,7 @@ class Runs:
     def stop_robot(self, name: str) -> None:
         """Stop one robot.
 
-        While a program is running, stop everything, as the program would move the robot again.
+        If a program is running, stop everything, because the program would move the robot again.
         """
         if self.active:
             self.stop()
@@ -299,9 +302,9 @@ class Runs:
         threading.Thread(target=work, name="studio-stop-one", daemon=True).start()
 
     def stop_again(self, name: str) -> None:
-        """Stop a robot again after it reported the end of an action that its Stop could not end.
+        """Repeat the Stop of a robot that has now ended an action that the first Stop could not end.
 
-        At most once for each Stop by the user, so that a robot whose stops always time out is not stopped
+        The Stop is repeated once at most, so that a robot whose Stops always time out is not stopped
         forever.
         """
         report, state = self._run.report, self._run.state
@@ -315,12 +318,12 @@ class Runs:
             self._stop_in_thread(name)
 
     def update_robots(self) -> None:
-        """Report new and restarted robots that are allowed to move to the running program."""
+        """Report new and restarted robots to the running program, once the user has allowed them to move."""
         if self.active:
             self._robots.update()
 
     def confirm_stopped(self) -> None:
-        """Apply the user's confirmation that the robots without a reply are not moving."""
+        """Record that the robots without a reply are not moving, according to the user."""
         if self._run.state == "unanswered" and self._run.report is not None:
             silent = self._run.report.unconfirmed_names
             self._fleet.confirm_stopped(silent)
@@ -336,7 +339,7 @@ class Runs:
             self._alerts.resolve("stop")
 
     def close(self) -> None:
-        """Stop the program, which stops its robots when it ends."""
+        """Stop the program, which stops its robots before it exits."""
         if self._runner is not None:
             self._runner.stop()
         if self._stop_thread is not None:
@@ -345,7 +348,7 @@ class Runs:
     # -- input from the session --------------------------------------------------------------------------
 
     def on_runner(self, event: RunnerEvent) -> None:
-        """Apply an event of the program's process; events of earlier runs are ignored."""
+        """Apply an event of the program's process. Events of earlier runs are ignored."""
         if self._runner is None or event.run != self._runner.run:
             return
         run = self._mark_started(event)
@@ -384,7 +387,7 @@ class Runs:
         return self._run
 
     def on_stop(self, event: StopDone | RobotReplied | RobotStopped | LateReply) -> None:
-        """Apply robots' replies to the newest Stop."""
+        """Apply the replies of robots to the newest Stop."""
         if isinstance(event, RobotStopped):
             self._news.update_fleet(event.report, event.mark)
             self._news.notify_user(event.report, "stop")

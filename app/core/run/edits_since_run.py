@@ -1,4 +1,4 @@
-"""Detection of edits of the running behaviour since Run was pressed."""
+"""Detection of edits of the running behaviour since its start."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from app.blocks.model.program import Program
 
 
 class RunDocument(Protocol):
-    """Part of a document that is used here."""
+    """Part of the interface of `Document` that `EditsSinceRun` uses."""
 
     edits: int
 
     def newest_program(self) -> Program | None:
-        """Return the program of the newest compiled edit."""
+        """Return the newest compiled program, or None."""
 
 
 class EditsSinceRun:
-    """Compares the running program with the current blocks. An edit that was undone counts as no change.
+    """Comparison of the running program with the current blocks.
 
-    Moving a block on the canvas is no change. Robots that connect or disconnect change the program, but not
-    the blocks.
+    Undone edits and blocks that were moved on the canvas don't count as edits. Robots that connect or
+    disconnect change the program but not the blocks.
     """
 
     def __init__(self) -> None:
@@ -31,13 +31,18 @@ class EditsSinceRun:
         self._differs = False
 
     def set_program(self, document: RunDocument | None, program: Program) -> None:
-        """Set the running program and its behaviour; with None, edits are ignored."""
+        """Set the running program.
+
+        Args:
+            document: Behaviour of the program; None to ignore edits.
+            program: Program that was started.
+        """
         self._document, self._ran = document, program.runnable
         self._edits = 0 if document is None else document.edits
         self._compared, self._differs = program, False
 
     def has_edits(self) -> bool:
-        """Return True if the blocks now differ from the running program."""
+        """Return True if the current blocks differ from the running program."""
         if self._document is None:
             return False
         newest = self._document.newest_program()

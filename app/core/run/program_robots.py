@@ -1,4 +1,4 @@
-"""Robots known to a running program; new and restarted ones are reported to it."""
+"""Robots that a running program knows. New and restarted robots are reported to the program."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from nep.programs.robots.moving import MovingTopics
 
 
 def owners_of(fleet: Fleet) -> dict[str, str]:
-    """Return the node ids of the connected robots by name."""
+    """Return the node ids of the connected robots' programs, by the robot's name."""
     return {link.name: link.identity.node_id for link in fleet.connected if link.identity is not None}
 
 
 class ProgramRobots:
-    """Reports robots to a program.
+    """Reporter of new and restarted robots to the running program.
 
-    Robots that the program moves are reported once the user has allowed that.
+    If the program moves a robot, the robot is reported once the user has allowed the motion.
     """
 
     def __init__(self, fleet: Fleet) -> None:
@@ -33,12 +33,12 @@ class ProgramRobots:
     def start(
         self, runner: Runner, asked: Sequence[tuple[Robot, Sequence[str]]], owners: Mapping[str, str]
     ) -> None:
-        """Start with a running program.
+        """Start reporting to a program.
 
         Args:
             runner: Runner of the program.
-            asked: Actions of each robot that the program invokes.
-            owners: Node ids of the robots that the program knows, by name.
+            asked: Robots that the program uses, and the actions that it invokes.
+            owners: Node ids of the robots that the program already knows, by name.
         """
         self._runner, self._known_owners, self._revision = runner, owners, self._fleet.revision
         moving, connected = self._fleet.moving_topics, {link.name for link in self._fleet.connected}
@@ -48,11 +48,11 @@ class ProgramRobots:
         self._requested_actions = {robot.name: actions for robot, actions in asked}
 
     def stop(self) -> None:
-        """Stop reporting, because the program has ended."""
+        """Stop reporting after the program has ended."""
         self._runner = None
 
     def update(self) -> None:
-        """Report the connected robots to the program if they have changed."""
+        """Report the connected robots to the program if they have changed since the last call."""
         if self._runner is None or not self._has_changed():
             return
         self._revision, owners = self._fleet.revision, owners_of(self._fleet)

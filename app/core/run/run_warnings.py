@@ -1,4 +1,4 @@
-"""Warnings of a program at its blocks, shown until the next edit or run."""
+"""Warnings of a program, shown on its blocks until the next edit or run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from nep.i18n import ngettext
 
 
 class RunWarnings:
-    """Newest warning of each block. The Console shows the 1st, 10th, 100th, … occurrence."""
+    """Newest warning of each block. In the Console, the 1st, 10th, 100th, ... occurrence is logged."""
 
     def __init__(self, log: Callable[[str], object]) -> None:
         self._log = log
@@ -18,12 +18,16 @@ class RunWarnings:
         self._edits = 0
 
     def reset(self) -> None:
-        """Clear all warnings for a new run."""
+        """Clear all warnings at the start of a run."""
         self.by_block = {}
         self._counts, self._logged_counts = {}, {}
 
     def clear_if_edited(self, edits: int) -> bool:
-        """Remove the warnings if there was an edit since the newest one; return True if any were removed."""
+        """Remove all warnings if there were edits since the newest one; return True if any were removed.
+
+        Args:
+            edits: Current number of edits of the behaviour.
+        """
         if not self.by_block or edits == self._edits:
             return False
         self.by_block = {}
@@ -34,7 +38,7 @@ class RunWarnings:
 
         Args:
             block: Id of the block.
-            sentence: Warning.
+            sentence: Text of the warning.
             count: Number of occurrences in this run.
             edits: Current number of edits of the behaviour.
         """
@@ -57,7 +61,7 @@ class RunWarnings:
 
 
 def with_count(sentence: str, count: int) -> str:
-    """Append the number of occurrences to a sentence if it is greater than one."""
+    """Append the number of occurrences to a sentence, if there is more than one."""
     if count == 1:
         return sentence
     return ngettext("{sentence} ({count} time)", "{sentence} ({count} times)", count).format(

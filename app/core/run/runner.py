@@ -1,4 +1,4 @@
-"""Runner of a program in a separate process, which can be paused, stepped, and always stopped."""
+"""Execution of a program in a separate process, which can be paused, stepped and stopped at any time."""
 
 from __future__ import annotations
 
@@ -32,20 +32,23 @@ EventKind = Literal[
 State = Literal["ready", "running", "paused", "stopping", "ended"]
 
 STOP_GRACE_S = 0.04
-"""Time after which a stopped program is killed. Stopping takes well below 100 ms in total."""
+"""Time in seconds after which a process is killed if its program doesn't stop.
+
+Stopping normally takes well below 100 ms in total.
+"""
 END_TIMEOUT_S = 2.0
-"""Time after which a process is killed once its program has ended."""
+"""Time in seconds after which a process is killed if it doesn't exit after its program has ended."""
 MEMORY_CHECK_INTERVAL_S = 0.1
-"""Interval of the memory checks."""
+"""Interval between memory checks in seconds."""
 PIPE_TIMEOUT_S = 0.5
-"""Time that pipes may stay open after the process has ended, because child processes may hold them."""
+"""Time in seconds that pipes may stay open after the process has exited, held by child processes."""
 EVENTS_PER_S = 300
 MAX_BLOCKS = 100
 MAX_CHOICES, MAX_CHOICE_LENGTH = 12, 200
 MIN_REPORTED_BYTES = 10_000
 MAX_ERROR_LENGTH = 100_000
 MAX_ERROR_LINES = 200
-"""Number of stored lines of error output; a crash in native code writes the stack of each thread."""
+"""Number of stored lines of error output. A crash in native code writes the stack of each thread."""
 
 _runs = itertools.count(1)
 _log = logging.getLogger("studio.runner")
@@ -53,19 +56,19 @@ _log = logging.getLogger("studio.runner")
 
 @dataclass(frozen=True)
 class RunnerEvent:
-    """Event of a program's process.
+    """Event of a program's process. The kinds of events to which an attribute belongs are in parentheses.
 
     Attributes:
         kind: Kind of event.
         run: Number of the run.
-        blocks: Blocks that are running (running), at which the program is held (paused; the next one first),
-            or that failed (error).
-        says: Description of what is running, or of the next block (paused).
-        text: Printed line; warning for the user (paused); error message (error); reason of a failure (ended);
+        blocks: Ids of the running blocks (running), of the blocks before which the program is paused,
+            the next one first (paused), or of the failed blocks (error).
+        says: Description of the running block, or of the next block (paused).
+        text: Printed line; warning (paused); error message (error); reason for a failure (ended);
             question (ask).
-        ok: True if the program ended without a failed block.
-        silent: Robots that did not reply to the program's own Stop at its end.
-        values: Variables that changed.
+        is_ok: True if the program ended without a failed block.
+        unresponsive_robots: Names of robots that did not reply to the Stop that the program sent at its end.
+        values: Variables that have changed.
         count: Number of occurrences of a warning.
         question: Number of a question; 0 withdraws the open question.
         choices: Possible answers to a question; empty if any answer is allowed.
@@ -86,10 +89,10 @@ class RunnerEvent:
 
 
 class Runner:
-    """Runs one program. ``on_event`` is called in background threads; "ended" is always the last event.
+    """Process that runs one program.
 
-    A program that floods Studio with output, uses too much memory or leaves processes behind is limited and
-    reported.
+    ``on_event`` is called in background threads; the last event is always "ended". A program that
+    floods Studio with output, uses too much memory or leaves processes behind is limited and reported.
     """
 
     def __init__(
@@ -136,18 +139,17 @@ class Runner:
         pace_s: float = 0.0,
         owners: Mapping[str, str] | None = None,
     ) -> None:
-        """Start the program.
-
-        Raises RunnerError if the process can't be started.
+        """Start the program. Raises RunnerError if the process can't be started.
 
         Args:
             program: Compiled program.
             robots: Descriptions of the connected robots.
-            master: Address of the master.
+            master: Address of the master, or None.
             name: Name of the behaviour.
-            paused: True to hold before the first block.
-            pace_s: Delay before each block; see `set_pace`.
-            owners: Node ids of the robots by name. Messages of other nodes are ignored.
+            paused: True to pause before the first block.
+            pace_s: Delay before each block in seconds.
+            owners: Node ids of the robots' programs, by the robot's name. Messages of other nodes are
+                ignored.
         """
         if self._child is not None:
             raise RunnerError(_("this runner has already run its program; create a new one"))
@@ -184,12 +186,22 @@ class Runner:
         self._commands.put({"do": "pace", "pace_s": seconds})
 
     def set_robots(self, owners: Mapping[str, str], guarded: Mapping[str, Sequence[str]]) -> None:
-        """Report new or restarted robots: their node ids, and the topics that move them."""
+        """Report new or restarted robots to the program.
+
+        Args:
+            owners: Node ids of the robots' programs, by the robot's name.
+            guarded: Names of the robots that messages on a topic move, by topic.
+        """
         topics = {topic: list(names) for topic, names in guarded.items()}
         self._commands.put({"do": "robots", "owners": dict(owners), "guarded": topics})
 
     def set_variable(self, python: str, value: str | float | bool) -> None:
-        """Set a variable of the running program; ``python`` is the name of the variable in the program."""
+        """Set a variable of the running program.
+
+        Args:
+            python: Name of the variable in the Python code.
+            value: New value.
+        """
         self._commands.put({"do": "variable", "python": python, "value": value})
 
     def set_breakpoints(self, blocks: Sequence[str]) -> None:
@@ -197,7 +209,7 @@ class Runner:
         self._commands.put({"do": "breakpoints", "blocks": list(blocks)})
 
     def pause(self) -> None:
-        """Pause the program and its robots. The event "paused" is sent when all of them have paused."""
+        """Pause the program and its robots. The event "paused" is posted when all have paused."""
         self._commands.put({"do": "pause"})
 
     def resume(self) -> None:
@@ -215,7 +227,7 @@ class Runner:
         self._commands.put({"do": "answer", "question": question, "text": words})
 
     def stop(self) -> None:
-        """Stop the program within 100 ms: ask it to end, and kill it if it doesn't.
+        """Stop the program within 100 ms: request it to end, and kill the process if it doesn't.
 
         Works in every state. Thread-safe. The robots are stopped by `app.core.robots.stop.stopper`.
         """
@@ -231,7 +243,11 @@ class Runner:
             child.wait(END_TIMEOUT_S)
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Wait until the program has ended and its last event was delivered; return False on timeout."""
+        """Wait until the program has ended and its last event was delivered; return False on timeout.
+
+        Args:
+            timeout_s: Timeout in seconds; None to wait without limit.
+        """
         return self._ended.wait(timeout_s)
 
     def close(self) -> None:

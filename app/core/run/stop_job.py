@@ -1,4 +1,4 @@
-"""Functions for the threads that stop a program and its robots; results are posted to the mailbox."""
+"""Functions of the threads that stop a program and its robots. Results are posted to the mailbox."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ def stop_program(
     *,
     is_for_all: bool,
 ) -> None:
-    """Stop a program and its robots; blocks until the robots have replied or timed out.
+    """Stop a program and its robots. Blocks until all robots have replied or timed out.
 
     Args:
-        post_event: Receives the results.
-        number: Identifies the Stop in the posted events.
-        runner: Runner of the program.
-        names: Robots to stop.
-        ends: As in `app.core.robots.stop.stopper.RobotStopper.stop_all`.
-        is_for_all: As in `app.core.robots.stop.stopper.RobotStopper.stop_all`.
+        post_event: Callback for the results.
+        number: Number of the Stop, included in the events.
+        runner: Runner of the program, or None.
+        stopper: Connections to the robots, or None.
+        names: Names of the robots to stop.
+        ends: See `app.core.robots.stop.stopper.RobotStopper.stop_all`.
+        is_for_all: See `app.core.robots.stop.stopper.RobotStopper.stop_all`.
     """
 
     def on_reply(robot: RobotStop) -> None:
@@ -54,9 +55,13 @@ def stop_program(
 
 
 def stop_robot(post_event: PostEvent, stopper: RobotStopper | None, name: str, mark: int) -> None:
-    """Stop one robot; blocks until it has replied or timed out.
+    """Stop one robot. Blocks until the robot has replied or timed out.
 
-    ``mark`` is the value of `MovedRobots.mark` when the Stop started.
+    Args:
+        post_event: Callback for the result.
+        stopper: Connections to the robots, or None.
+        name: Name of the robot.
+        mark: Value of `MovedRobots.mark` when the Stop started.
     """
 
     def on_late_reply(robot: RobotStop) -> None:

@@ -1,4 +1,4 @@
-"""Reporting of a Stop to the user (Console and alerts) and to the fleet."""
+"""Reports about a Stop: to the user (Console and alerts), and to the fleet."""
 
 from __future__ import annotations
 
@@ -13,20 +13,29 @@ from nep.i18n import _
 
 
 class StopReporter:
-    """Reports the results of stops. Not thread-safe: use it from the window's thread."""
+    """Reporter of the results of Stops. Not thread-safe; use it from the main thread."""
 
     def __init__(self, fleet: Fleet, alerts: Alerts, console: Console) -> None:
         self._fleet, self._alerts, self._console = fleet, alerts, console
 
     def update_fleet(self, report: StopReport, mark: int) -> None:
-        """Apply the result of a Stop that started at ``mark`` (`MovedRobots.mark`) to the fleet."""
+        """Apply the result of a Stop to the fleet.
+
+        Args:
+            report: Result of the Stop.
+            mark: Value of `MovedRobots.mark` when the Stop started.
+        """
         self._fleet.moved.apply_report(report, mark)
         clock = clock_text(time.localtime())
         words = {name: (stop_text(each, clock), each.status) for name, each in report.by_name.items()}
         self._fleet.apply_stop(words, report)
 
     def motion_warnings(self, report: StopReport) -> tuple[str, ...]:
-        """Return why robots without a confirmation may be moving, and which get the Stop later."""
+        """Return sentences about robots without a confirmation.
+
+        The sentences state why a robot may be moving, and which robots receive the Stop once they are
+        connected.
+        """
         pending = [name for name, robot in report.by_name.items() if robot.is_pending]
         motions = (self._fleet.moved.motion(name) for name in report.unconfirmed_names)
         return (
@@ -38,7 +47,12 @@ class StopReporter:
         )
 
     def notify_user(self, report: StopReport, origin: str) -> None:
-        """Report a Stop in the Console as ``origin``, and with an alert while a robot may be moving."""
+        """Report the result of a Stop in the Console, and with an alert while a robot may be moving.
+
+        Args:
+            report: Result of the Stop.
+            origin: Origin of the Console record.
+        """
         for name, program in report.strangers:
             sentence = _("“{program}” replied to Stop on behalf of {robot}; the reply was ignored").format(
                 program=program, robot=name

@@ -1,4 +1,4 @@
-"""Trial of one stack of a behaviour: its label while it is running, and its value."""
+"""Trial of one stack of a behaviour: the label shown while it runs, and its value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,14 @@ from nep.i18n import _
 
 @dataclass(frozen=True, slots=True)
 class TriedValue:
-    """Formatted value of a tried block; ``number`` is the running number of the trial."""
+    """Value of a tried block.
+
+    Attributes:
+        document: Behaviour of the block.
+        block: Id of the block.
+        words: Formatted value.
+        number: Serial number of the trial.
+    """
 
     document: Document
     block: str
@@ -25,7 +32,7 @@ class TriedValue:
 
 
 class Trial:
-    """State of the current or last trial; empty if a whole behaviour runs."""
+    """State of the current or last trial. Empty if a whole behaviour was run."""
 
     def __init__(self) -> None:
         self.value: TriedValue | None = None
@@ -34,18 +41,23 @@ class Trial:
         self._unit = ""
 
     def prepare(self, wanted: RequestedRun) -> None:
-        """Start a request, discarding the value of the previous trial."""
+        """Apply a new request to run, and discard the value of the previous trial."""
         self._request, self._unit, self.value = wanted, "", None
 
     def start(self, program: Program, robots: Iterable[Robot]) -> str:
-        """Start with these robots; return the label of the tried block, or "" for a whole behaviour."""
+        """Record the start of the program; return the label of the tried block ("" for a behaviour).
+
+        Args:
+            program: Program that was started.
+            robots: Connected robots, which determine the unit of a sensor value.
+        """
         if self._request is None:
             return ""
         self._unit = self._request.unit(program, robots)
         return self._request.label(program)
 
     def parse_line(self, line: str) -> str | None:
-        """Format a printed line as the tried value; None if the tried block has no value."""
+        """Return the value in a printed line as formatted text; None if the tried block has no value."""
         wanted = self._request
         if wanted is None or wanted.stack is None or not wanted.has_value:
             return None
@@ -54,5 +66,5 @@ class Trial:
         return words
 
     def show(self, document: Document, stack: Stack, words: str) -> None:
-        """Set the value of a block."""
+        """Set the formatted value of a tried stack."""
         self.value = TriedValue(document, stack.id, words, next(self._tries))

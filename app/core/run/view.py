@@ -11,7 +11,7 @@ from nep.i18n import _, format_list, lazy, ngettext, number
 
 MAX_NAMED = 4
 MAX_NAMES_LENGTH = 24
-"""Maximum length of robot names on the button; longer ones are shown only next to it."""
+"""Maximum number of characters of robot names on the Stop button; longer names are shown only next to it."""
 APPLIES_LATER = lazy("Your changes take effect at the next run")
 NOTHING_TO_RUN_HINT = lazy("Drag “when started” from Events and put blocks below it")
 RUN, GO_ON, RESTART = lazy("Run"), lazy("Resume"), lazy("Restart")
@@ -20,23 +20,24 @@ STOP, STOPPING, STOP_AGAIN = lazy("Stop"), lazy("Stopping"), lazy("Stop again")
 
 @dataclass(frozen=True, slots=True)
 class RunState:
-    """State of a run. Immutable: each event creates a new one.
+    """State of a run. Immutable; each event creates a new state.
 
-    Times are monotonic seconds. The program's clock stops while the program is paused.
+    Times are in monotonic seconds. The program's clock stops while the program is paused.
 
     Attributes:
-        state: "ready", "running", "paused", "stopping", "proven" or "unanswered"; "ready" with a `report`
-            after a Stop without robots.
-        doubts: Why robots that did not reply may be moving (`MovedRobots`).
-        warning: Shown before a paused program resumes.
-        begun: True if the scripts run and receive events; the process starts some tenths of a second earlier.
-        held_s: Total duration of all pauses.
-        pause_began_s: Start of the current pause.
-        again: True if the previous Stop is not proven.
-        restarts: True if a program starts as soon as this Stop is proven.
-        edited: True if the behaviour differs from the running program.
-        trying: Label of a tried block.
-        value: Value of a tried block.
+        state: "ready", "running", "paused", "stopping", "proven" or "unanswered"; "ready" with a
+            `report` after a Stop without robots.
+        doubts: Reasons why robots that did not reply may be moving (`MovedRobots`).
+        warning: Warning shown while the program is paused, or "".
+        is_started: True if the scripts run and receive events; the process starts some tenths of a second
+            earlier.
+        paused_s: Total duration of all pauses.
+        pause_began_s: Start of the current pause, or None.
+        is_stop_repeated: True if the previous Stop is not proven.
+        is_restarting: True if a program will start once this Stop is proven.
+        is_edited: True if the behaviour differs from the running program.
+        tried_label: Label of the tried block, or "".
+        value: Value of the tried block, or None.
     """
 
     state: str = "ready"
@@ -69,7 +70,7 @@ class RunState:
     motion_warnings: tuple[str, ...] = ()
 
     def elapsed(self, now: float) -> float:
-        """Return the running time in seconds, without pauses."""
+        """Return the running time in seconds at ``now``, without pauses."""
         held = self.paused_s
         if self.pause_began_s is not None:
             held += now - self.pause_began_s
@@ -78,16 +79,17 @@ class RunState:
 
 @dataclass(frozen=True, slots=True)
 class RunView:
-    """Contents of the run bar, in the large and the compact form.
+    """Contents of the run bar, in its large and its compact form.
 
     Attributes:
-        edited: True if the running program differs from the blocks, so that Restart is the suggested next
-            step.
-        result: Result of a Stop, shown next to the Stop button.
-        result_status: Icon and colour of `result`.
-        last_stop: Reminder of the last Stop while a program is running.
-        last_stop_status: Icon and colour of `last_stop`.
-        confirm: Label of the button with which the user confirms that a silent robot has stopped.
+        is_edited: True if the running program differs from the blocks, so that Restart is suggested as
+            next step.
+        result: Result of a Stop, shown next to the Stop button, or None.
+        result_status: Status of `result`, which determines icon and colour.
+        last_stop: Reminder of the last Stop while a program is running, or None.
+        last_stop_status: Status of `last_stop`, which determines icon and colour.
+        confirm: Label of the button with which the user confirms that a robot without a reply has
+            stopped, or None.
     """
 
     state: str
@@ -111,9 +113,12 @@ class RunView:
 
 
 def block_label(says: str, blocks: Sequence[str], labels: Mapping[str, str]) -> str:
-    """Return the label of the block at which a program is held.
+    """Return the text that describes the block before which a program is paused.
 
-    The label is the text of the block, or its name if the text contains a quotation.
+    Args:
+        says: Text of the block. If it contains a quotation, the label is returned instead.
+        blocks: Ids of the paused blocks, the next one first.
+        labels: Labels by block id.
     """
     if "“" not in says or not blocks:
         return says
@@ -136,8 +141,8 @@ def view_of(
         connected: Names of the connected robots.
         now: Monotonic seconds.
         coming: Names of the robots that are starting.
-        elsewhere: True if the run belongs to a behaviour in another tab; then the title names that behaviour,
-            and Run applies to the current one.
+        elsewhere: True if the run belongs to a behaviour in another tab. The title then names that
+            behaviour, and Run applies to the current tab.
         slow: True if blocks run with a delay.
     """
     view = replace(_view(run, connected, coming, now), is_slow=slow)
@@ -369,13 +374,13 @@ def _unanswered_view(run: RunState, now: float) -> RunView:
 
 
 def duration_text(value: float) -> str:
-    """Format a duration in whole seconds: ``14 s``, ``2 min 5 s``."""
+    """Format a duration in whole seconds, such as ``14 s`` or ``2 min 5 s``."""
     whole = int(value)
     return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60} s"
 
 
 def connected_text(names: Sequence[str], coming: Sequence[str] = ()) -> str:
-    """Return the line below "Ready": the connected robots, or else those that are starting."""
+    """Return the line below "Ready": the names of connected robots, or else of starting robots."""
     if not names and coming:
         words = ngettext("{robots} is starting", "{robots} are starting", len(coming))
         return words.format(robots=format_list(coming))
@@ -386,9 +391,9 @@ def connected_text(names: Sequence[str], coming: Sequence[str] = ()) -> str:
 
 
 def result_text(report: StopReport) -> str:
-    """Format the result of a Stop: ``all 2 robots stopped (41 ms)``.
+    """Format the result of a Stop, such as ``all 2 robots stopped (41 ms)``.
 
-    `StopReport.status` determines the icon.
+    The icon next to the text depends on `StopReport.status`.
     """
     names, still = report.names, report.stopped_names
     unsure = [robot.full_name for robot in report.robots if not robot.can_confirm]
@@ -416,8 +421,11 @@ def _stopped_count_text(stopped: int, count: int) -> str:
 def unanswered_texts(report: StopReport, doubts: Sequence[str] = ()) -> tuple[str, str, str, str]:
     """Return title, detail, compact text and button label for robots that have not confirmed a Stop.
 
-    A report of a robot itself ("Arm may still move: the brake is stuck") comes first, unchanged. ``doubts``
-    are the reasons why robots may be moving (`RunState`).
+    Messages of the robots themselves ("Arm may still move: the brake is stuck") come first, unchanged.
+
+    Args:
+        report: Result of the Stop.
+        doubts: Reasons why robots may be moving (`RunState`).
     """
     still = report.stopped_names
     names = format_list(report.unconfirmed_names)
@@ -461,7 +469,12 @@ def _problem_text(report: StopReport) -> str:
 
 
 def stop_text(robot: RobotStop, clock: str) -> str:
-    """Format the reply of a robot to a Stop for its health panel."""
+    """Format the result of a Stop for the health panel of a robot.
+
+    Args:
+        robot: Result for the robot.
+        clock: Formatted time of the Stop.
+    """
     if not robot.can_confirm:
         return _("sent at {time}; this robot can't confirm").format(time=clock)
     if robot.is_confirmed:
@@ -475,5 +488,5 @@ def stop_text(robot: RobotStop, clock: str) -> str:
 
 
 def clock_text(now: time.struct_time) -> str:
-    """Format a time of day: ``8:41``."""
+    """Format a time of day, such as ``8:41``."""
     return f"{now.tm_hour}:{now.tm_min:02d}"

@@ -1,4 +1,4 @@
-"""Requests to run a behaviour or a single stack of it."""
+"""Requests to run a behaviour, or a single stack of a behaviour."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from nep.i18n import _
 
 
 class OpenBehaviours(Protocol):
-    """Access to the open behaviours that a run needs."""
+    """Part of the interface of `Documents` that a run uses."""
 
     @property
     def current(self) -> Document:
-        """Behaviour of the current tab, which Run applies to."""
+        """Behaviour of the current tab, to which Run applies."""
 
     def title(self, document: Document) -> str:
         """Return the title of a behaviour."""
@@ -28,7 +28,13 @@ class OpenBehaviours(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RequestedRun:
-    """Request to run a behaviour, or only one ``stack`` of it. ``paused``: hold before the first block."""
+    """Request to run a behaviour or a single stack of it.
+
+    Attributes:
+        document: Behaviour to run.
+        paused: True to pause before the first block.
+        stack: Stack to run; None for the whole behaviour.
+    """
 
     document: Document
     paused: bool = False
@@ -40,11 +46,11 @@ class RequestedRun:
 
     @property
     def has_value(self) -> bool:
-        """True if the stack is a value block, whose value the program prints."""
+        """True if the stack is a value block. The program then prints the value."""
         return self.stack is not None and self.stack.is_value
 
     def unit(self, program: Program, robots: Iterable[Robot]) -> str:
-        """Return the unit of a tried sensor value; "" for any other value."""
+        """Return the unit of a tried sensor value; "" for any other block."""
         if (
             self.stack is None
             or len(program.sensors) != 1
@@ -59,7 +65,10 @@ class RequestedRun:
         return display_unit(sensor.unit) or ""
 
     def problems(self, program: Program) -> dict[str, str]:
-        """Return the errors by block. Missing robots don't prevent a whole behaviour from running."""
+        """Return the errors that prevent the start, by block id.
+
+        Missing robots don't prevent a whole behaviour from running.
+        """
         wrong = {each.block_id: each.message for each in program.problems if each.severity == "error"}
         found = {block: sentence for block, sentence in wrong.items() if block}
         if self.stack is None or found:

@@ -1,8 +1,8 @@
-"""Self-test for checking packages of Studio: steps with time limits, a report, and a watchdog.
+"""Self-test of packaged builds of Studio: steps with time limits, a report, and a watchdog.
 
-`surroundings` creates a separate folder, home folder and master. `report` writes the result. `test` runs the
-steps with time limits and a watchdog, and checks for processes that are left. The steps in the window are in
-`app.ui.self_test`.
+`surroundings` creates a separate folder, home folder and master, and `report` writes the result. `test`
+runs the steps and the watchdog, and checks for processes that were left behind. The steps in the window
+are in `app.ui.self_test`.
 """
 
 from app.core.self_test.surroundings import UnwritableFolderError as UnwritableFolderError

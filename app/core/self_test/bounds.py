@@ -1,4 +1,4 @@
-"""Time limits of the self-test in seconds; generous, so that slow computers pass too."""
+"""Time limits of the self-test in seconds, long enough for slow computers."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ STEP_TIMEOUTS_S: dict[str, float] = {
     "close": 60.0,
     "processes": 20.0,
 }
-"""Time limit of each step by its name in the report, in order."""
+"""Time limit of each step, by name of the step in the report, in the order of execution."""
 TOTAL_TIMEOUT_S = 480.0
 """Time limit of all steps together."""
 GRACE_S = 10.0
-"""Time between a time limit and the moment when the watchdog kills the process.
+"""Time between the end of a time limit and the moment at which the watchdog kills the process.
 
 A window that still responds reports the failure itself within this time.
 """
 EXIT_TIMEOUT_S = 30.0
-"""Time that the process has to exit after the report was completed successfully."""
+"""Time limit for the process to exit after the test has succeeded."""

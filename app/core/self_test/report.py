@@ -18,12 +18,24 @@ from nep.version import __version__
 
 FORMAT, FORMAT_VERSION = "nep-studio-selftest", 1
 MAX_AGE_S = 24 * 3600.0
-"""Maximum age of the process when the self-test starts; a greater one means that the clock was changed."""
+"""Maximum plausible age of the process in seconds at the start of the self-test.
+
+A greater age means that the clock was changed.
+"""
 
 
 @dataclass
 class StepReport:
-    """One step: the expectation and the result. Times are milliseconds since the start of the process."""
+    """Report of one step. Times are in milliseconds since the start of the process.
+
+    Attributes:
+        words: Expectation.
+        bound_s: Time limit in seconds.
+        began_ms: Start of the step.
+        ended_ms: Duration; None while the step is in progress.
+        ok: True if the step succeeded.
+        said: Details of the result.
+    """
 
     name: str
     description: str
@@ -47,7 +59,7 @@ class StepReport:
 
 
 def seconds_since_start() -> float:
-    """Return the age of this process in seconds as reported by the system; 0 if unknown."""
+    """Return the age of this process in seconds according to the system; 0 if unknown."""
     try:
         age = time.time() - psutil.Process().create_time()
     except psutil.Error:
@@ -78,7 +90,7 @@ class Report:
         self._over = False
 
     def now_ms(self) -> int:
-        """Return milliseconds since the start of the process."""
+        """Return the time in milliseconds since the start of the process."""
         return round((time.monotonic() + self._offset_s) * 1000)
 
     @property
@@ -99,18 +111,31 @@ class Report:
             self._facts.update(facts)
 
     def mark(self, name: str) -> None:
-        """Record the current time as ``NAME_ms``. Only the first call for a name has an effect."""
+        """Record the current time under the key ``NAME_ms``.
+
+        Only the first call for each name has an effect.
+        """
         with self._lock:
             self._marks.setdefault(f"{name}_ms", self.now_ms())
 
     def start_step(self, name: str, words: str, bound_s: float) -> None:
-        """Start a step."""
+        """Start a step.
+
+        Args:
+            name: Name of the step.
+            words: Expectation.
+            bound_s: Time limit in seconds.
+        """
         with self._lock:
             self._steps.append(StepReport(name, words, bound_s, self.now_ms()))
             self._write()
 
     def record_success(self, said: str = "") -> None:
-        """Record that the current step succeeded."""
+        """Record that the current step has succeeded.
+
+        Args:
+            said: Details of the result.
+        """
         with self._lock:
             step = self.current_step
             if step is not None:
@@ -118,7 +143,7 @@ class Report:
                 self._write()
 
     def fail(self, why: str) -> None:
-        """Record that the test failed; only the first reason is stored."""
+        """Record that the test has failed. Only the first reason is stored."""
         with self._lock:
             step = self.current_step
             if step is not None:
@@ -127,7 +152,7 @@ class Report:
             self._write()
 
     def finish(self) -> bool:
-        """Complete the report; return True if the test succeeded."""
+        """Complete the report; return True if the test has succeeded."""
         with self._lock:
             self._over = True
             self.mark("total")

@@ -1,4 +1,4 @@
-"""Environment of a self-test: a folder, settings and a master that are isolated from other instances."""
+"""Environment of a self-test: a folder, settings and a master, isolated from other instances."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from nep.system.addresses import MASTER_VARIABLE
 
 REPORT, PICTURE, CRASH = "report.json", "window.png", "crash.txt"
 EMPTY_REPORT = b"{}\n"
-"""Initial content of the report, so that no reader mistakes an old report for the new one."""
+"""Initial content of the report file, which overwrites the report of an earlier test."""
 
 
 class UnwritableFolderError(AppError):
@@ -35,22 +35,27 @@ class UnwritableFolderError(AppError):
 
 @dataclass(frozen=True)
 class TestEnvironment:
-    """Folder with the results, which also contains the home folder (settings, journal, log) of the test."""
+    """Folder for the results of a self-test, which also contains its home folder (settings, log, ...)."""
 
     folder: Path
     home: Path
     master: str
 
     def path(self, name: str) -> Path:
-        """Return the path of a result file."""
+        """Return the path of the result file ``name``."""
         return self.folder / name
 
 
 def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -> TestEnvironment:
-    """Create the folder with a home folder in it; set both and a free master port in ``environ``.
+    """Create the folder for the results, with a home folder in it. Raises UnwritableFolderError.
 
-    Result files of an earlier test are removed, nothing else. The web engine can't use its sandbox as root;
-    the test loads only Studio's own page and then disables the sandbox. Raises UnwritableFolderError.
+    Result files of an earlier test are removed; other files remain.
+
+    Args:
+        folder: Folder for the results.
+        environ: Environment variables, in which the home folder and an unused master port are set.
+        is_root: True if the user is root. The sandbox of the web engine, which can't be used as root,
+            is then disabled; the test loads only Studio's own page.
     """
     folder = Path(os.path.abspath(folder))  # noqa: PTH100 - links are not resolved, so that the name stays as given
     try:
@@ -73,7 +78,7 @@ def prepare(folder: Path, environ: MutableMapping[str, str], *, is_root: bool) -
 
 
 def remove_home(made: TestEnvironment) -> None:
-    """Remove the home folder of the test as far as possible; ending processes may still use files in it."""
+    """Remove the home folder of the test. Files that exiting processes still use remain."""
     for path in sorted(made.home.rglob("*"), reverse=True):
         with suppress(OSError):
             path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()

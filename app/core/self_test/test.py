@@ -1,4 +1,4 @@
-"""Self-test of this process: its steps in order, and a watchdog that ends the process in any case."""
+"""Self-test of this process: steps in order, and a watchdog that ends the process in any case."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KILL_S = 5.0
 
 
 class SelfTest:
-    """Progress of the steps, and the watchdog. Thread-safe."""
+    """Execution of the steps, and the watchdog. Thread-safe."""
 
     def __init__(self, place: TestEnvironment, facts: dict[str, object]) -> None:
         # Starts the watchdog: from now on the process ends in time, whatever its threads do.
@@ -46,24 +46,36 @@ class SelfTest:
     # -- steps --------------------------------------------------------------------------------------------
 
     def start_step(self, name: str, words: str) -> None:
-        """Start the step with this name (in `bounds.STEP_S`); ``words`` describes the expectation."""
+        """Start a step.
+
+        Args:
+            name: Name of the step, a key of `bounds.STEP_S`.
+            words: Expectation.
+        """
         bound_s = bounds.STEP_TIMEOUTS_S[name]
         self.report.start_step(name, words, bound_s)
         self._wait_until(time.monotonic() + bound_s + bounds.GRACE_S, words)
 
     def record_success(self, said: str = "") -> None:
-        """Record that the current step succeeded; ``said`` are details."""
+        """Record that the current step has succeeded.
+
+        Args:
+            said: Details of the result.
+        """
         self.report.record_success(said)
 
     def fail(self, why: str) -> None:
-        """Record that the test failed; only the first reason is stored."""
+        """Record that the test has failed. Only the first reason is stored."""
         self.report.fail(why)
 
     def run(self, show: Callable[[], int]) -> int:
-        """Call ``show``, which runs the steps until the window is closed; clean up and return the exit code.
+        """Run the test and clean up; return the exit code.
 
-        The exit code is 0 on success, and 1 on failure, which includes an exception or another result of
-        ``show``.
+        Args:
+            show: Opens the window and runs the steps until the window is closed; returns its exit code.
+
+        Returns:
+            0 on success, 1 on failure. An exception or a non-zero result of ``show`` is a failure.
         """
         try:
             code = show()
@@ -141,7 +153,7 @@ class SelfTest:
 
 
 def children() -> list[psutil.Process]:
-    """Return all child processes, recursively."""
+    """Return all descendants of this process."""
     try:
         return psutil.Process().children(recursive=True)
     except psutil.Error:
@@ -149,7 +161,7 @@ def children() -> list[psutil.Process]:
 
 
 def command(process: psutil.Process) -> list[str]:
-    """Return the command line of a process; empty if it has ended."""
+    """Return the command line of a process; empty if the process has exited."""
     try:
         return process.cmdline()
     except (psutil.Error, OSError):  # see `is_web`
@@ -157,13 +169,13 @@ def command(process: psutil.Process) -> list[str]:
 
 
 def is_master(process: psutil.Process) -> bool:
-    """Return True if a process is a master with an owner; such a master ends shortly after its owner."""
+    """Return True if a process is a master with an owner process, after whose exit it exits as well."""
     words = command(process)
     return "master" in words and "--owner-pid" in words
 
 
 def is_web(process: psutil.Process) -> bool:
-    """Return True if a process belongs to the web view, whose processes end with their parent."""
+    """Return True if a process belongs to the web view. Such processes exit with their parent."""
     try:
         return process.name().lower().startswith(WEB_PROCESS[:15])
     except (psutil.Error, OSError):  # raised on Windows, where psutil has no own exception
@@ -171,9 +183,13 @@ def is_web(process: psutil.Process) -> bool:
 
 
 def is_windows_program(process: psutil.Process, root: str = os.environ.get("SYSTEMROOT", "")) -> bool:
-    """Return True if a process is a program of Windows, in the folder ``root``.
+    """Return True if a process is part of Windows, such as a console host.
 
-    Windows starts some of its programs as child processes, such as console hosts, and ends them at any time.
+    Windows starts such programs as child processes and ends them at any time.
+
+    Args:
+        process: Process to check.
+        root: Folder of Windows.
     """
     try:
         program = process.exe()
@@ -183,7 +199,7 @@ def is_windows_program(process: psutil.Process, root: str = os.environ.get("SYST
 
 
 def kill_children() -> None:
-    """Kill all child processes."""
+    """Kill all descendants of this process."""
     family = children()
     for each in family:
         with suppress(psutil.Error):

@@ -1,4 +1,4 @@
-"""Calculated curves, which are extended as their inputs grow."""
+"""Calculated curves, which are extended when their inputs grow."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from app.core.series.formula import Calculation, WindowFunction
 from app.core.series.samples import Floats, Samples
 
 MAX_WAIT_S = 0.5
-"""Maximum time (by time stamps) that the newest sample of one input waits for the other inputs."""
+"""Maximum time in seconds, by time stamps, that the newest sample of one input waits for other inputs."""
 HOLDS_S, HOLDS = 1.0, 8.0
 """Maximum validity of a sample of another input: seconds, and number of usual intervals."""
 BATCH_SIZE = 200_000
-"""Maximum number of samples calculated in one tick."""
+"""Maximum number of samples that are calculated in one tick."""
 
 
 class Calculated:
-    """Samples calculated from other samples; `advance` processes new input."""
+    """Samples that are calculated from other samples. `advance` processes new input."""
 
     def __init__(self, inputs: Sequence[Samples]) -> None:
         # Sampled at the times of the first input.
@@ -29,7 +29,7 @@ class Calculated:
         self._next = self._inputs[0].begun  # absolute index in the first input
 
     def advance(self) -> None:
-        """Calculate the available samples."""
+        """Calculate all samples for which the inputs are available."""
         base = self._inputs[0]
         changed = [each.rewritten_from(seen) for each, seen in zip(self._inputs, self._seen, strict=True)]
         self._seen = [each.rewritten for each in self._inputs]
@@ -94,9 +94,10 @@ class WindowCurve(Calculated):
 
 
 class ExpressionCurve(Calculated):
-    """Expression of several curves.
+    """Curve calculated by an expression from several curves.
 
-    Evaluated at the times of the first input, with the newest sample of each other input.
+    The expression is evaluated at the times of the first input, with the newest sample of each other
+    input.
     """
 
     def __init__(self, calculate: Calculation, inputs: Sequence[Samples]) -> None:
@@ -119,7 +120,7 @@ class ExpressionCurve(Calculated):
 
 
 def held_values(samples: Samples, times: Floats) -> Floats:
-    """Return the newest sample at each time.
+    """Return the newest value at each of the given times.
 
     The result is NaN before the first sample, in a gap, and long after the last sample.
     """

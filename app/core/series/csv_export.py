@@ -1,4 +1,4 @@
-"""Curves as CSV: one row for each time at which any curve has a value."""
+"""Export of curves as CSV, with one row for each time at which any curve has a value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,14 @@ ROWS_PER_CHUNK = 5000
 
 @dataclass(frozen=True, slots=True)
 class CsvColumn:
-    """Snapshot of one curve: name, numbers with their times (s), and states with their start times."""
+    """Snapshot of one curve.
+
+    Attributes:
+        name: Title of the column.
+        times: Times of the numbers in seconds.
+        values: Numbers.
+        states: Start time and value of each state.
+    """
 
     name: str
     times: Floats
@@ -27,7 +34,13 @@ class CsvColumn:
 
 
 def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = inf) -> list[CsvColumn]:
-    """Return a snapshot of the curves in a time range, which another thread can write."""
+    """Return a snapshot of the curves in a time range, which can be written in another thread.
+
+    Args:
+        curves: Curves to export.
+        begin_s: Start of the range.
+        end_s: End of the range.
+    """
     columns = []
     for curve in curves:
         first, end = curve.samples.index_range(begin_s, end_s)
@@ -43,9 +56,14 @@ def columns_of(curves: Sequence[Curve], begin_s: float = -inf, end_s: float = in
 
 
 def csv_lines(columns: Sequence[CsvColumn], origin_ns: int) -> Iterator[str]:
-    """Yield a CSV file (RFC 4180) in chunks: the header, then rows by time.
+    """Yield a CSV file (RFC 4180) in chunks: the header, then the rows by time.
 
-    Times are given in nanoseconds since 1970 and as ISO 8601 in UTC. A state is in the row of its start.
+    Times are written in nanoseconds since 1970, and as ISO 8601 in UTC. A state is written in the row
+    of its start.
+
+    Args:
+        columns: Snapshots of the curves.
+        origin_ns: Time 0 of the curves, in ns since 1970.
     """
     yield csv_text([["stamp_ns", "time_utc", *(escape_formula(column.name) for column in columns)]])
     states = [np.array([time_s for time_s, _word in column.states]) for column in columns]

@@ -1,4 +1,4 @@
-"""Curves of one plot: their sources and calculations, shared between curves."""
+"""Curves of one plot. Curves share sources and calculations."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from nep.i18n import _
 
 MAX_CURVES = 64
 MAX_TOTAL_SAMPLES = 8 * MAX_SAMPLES
-"""Maximum number of samples of all curves of a plot (about 150 MB), which the curves share."""
+"""Maximum total number of samples of all curves of a plot (about 150 MB)."""
 MIN_SAMPLES = 8192
 
 
@@ -39,7 +39,7 @@ class Curve:
     """Curve of a plot.
 
     Attributes:
-        text: Text as typed.
+        text: Expression as typed by the user.
         source: Source of the samples.
         samples: Numbers over time.
         of: Series of the field; None for a calculated curve.
@@ -52,7 +52,7 @@ class Curve:
 
     @property
     def states(self) -> States | None:
-        """States of a field with text or boolean values."""
+        """States of a field with text or boolean values, else None."""
         return self.series.states if self.series is not None and len(self.series.states) else None
 
     @property
@@ -64,7 +64,7 @@ class Curve:
 
     @property
     def last(self) -> object:
-        """Newest value as received; `MISSING` before the first."""
+        """Newest value as received; `MISSING` before the first value."""
         if self.series is not None:
             return self.series.last
         return float(self.samples.values[-1]) if len(self.samples) else MISSING
@@ -81,7 +81,7 @@ def topics_of(source: Source) -> set[str]:
 
 @dataclass(slots=True, eq=False)
 class _SharedSamples:
-    """Samples used by one or several curves, with the number of users."""
+    """Samples that one or several curves use, with the number of these curves."""
 
     samples: Samples
     user_count: int = 0
@@ -91,7 +91,7 @@ class _SharedSamples:
 
 
 class Curves:
-    """All curves of one plot. Not thread-safe: use it from the window's thread."""
+    """All curves of one plot. Not thread-safe; use it from the main thread."""
 
     def __init__(self, feed: SeriesFeed, topics: Callable[[], Iterable[str]]) -> None:
         # `topics` returns the names of existing topics.
@@ -103,17 +103,18 @@ class Curves:
     # -- commands of the user ----------------------------------------------------------------------
 
     def add(self, text: str, also: Iterable[str] = ()) -> list[Curve]:
-        """Add the curves of a typed text; ``[*]`` adds one for each element of the newest message.
+        """Add and return the curves for a typed expression.
 
-        If the text is invalid, nothing is added. It is not an error if the field does not exist, because
-        fields are known only after a message of the topic.
+        A path with ``[*]`` adds a curve for each array element. If the expression is invalid, nothing
+        is added. A field that does not exist is no error, because fields are known only after the first
+        message of a topic.
 
         Args:
-            text: Text that the user typed.
-            also: Topics that are valid although they don't exist at the moment.
+            text: Expression that the user typed.
+            also: Names of topics that are valid although they don't exist at the moment.
 
         Raises:
-            CurveError: The text is invalid; the message says how to fix it.
+            CurveError: The expression is invalid; the message says how to fix it.
         """
         source = parse(text, [*self._known_topics(), *also])
         sources: Sequence[Source] = [source]
@@ -123,12 +124,17 @@ class Curves:
         return self.add_sources(sources, text)
 
     def add_field(self, topic: str, path: FieldPath) -> list[Curve]:
-        """Add the curves of a field, even if its topic doesn't exist."""
+        """Add and return the curves of a field, even if its topic doesn't exist."""
         paths = path.expanded(self.payload_of(topic)) if path.has_wildcard else [path]
         return self.add_sources([FieldSource(topic, each) for each in paths], str(FieldSource(topic, path)))
 
     def add_sources(self, sources: Sequence[Source], text: str) -> list[Curve]:
-        """Add curves of these sources, except those that are already plotted."""
+        """Add and return curves for sources, except for sources that are already plotted.
+
+        Args:
+            sources: Sources of the curves.
+            text: Expression that the user typed.
+        """
         there = {each.text for each in self.all}
         new = [each for each in sources if str(each) not in there]
         if not sources:
@@ -144,7 +150,7 @@ class Curves:
         return curves
 
     def remove(self, curve: Curve) -> None:
-        """Remove a curve; its topic is unwatched if no other curve needs it."""
+        """Remove a curve. Its topic is no longer watched if no other curve needs it."""
         if curve in self.all:
             self.all.remove(curve)
             self._release(curve.text)
@@ -156,7 +162,7 @@ class Curves:
             self.remove(curve)
 
     def advance(self) -> None:
-        """Calculate new samples. Call this once per tick, after the messages were added."""
+        """Calculate new samples. Called once per tick, after new messages were added."""
         for shared in self._shared.values():
             if shared.calculated is not None:
                 shared.calculated.advance()
@@ -164,12 +170,12 @@ class Curves:
     # -- queries -----------------------------------------------------------------------------------
 
     def payload_of(self, topic: str) -> object:
-        """Return the newest message of a plotted topic; `MISSING` if there is none."""
+        """Return the payload of the newest message of a plotted topic; `MISSING` if there is none."""
         known = self._topics.get(topic)
         return known.payload if known is not None else MISSING
 
     def fields(self, topic: str) -> list[PlottableField]:
-        """Return the fields of a plotted topic that can be shown in a plot."""
+        """Return the plottable fields in the newest message of a plotted topic."""
         payload = self.payload_of(topic)
         return [] if payload is MISSING else list(fields_of(payload))
 
@@ -180,7 +186,7 @@ class Curves:
 
     @property
     def unread_count(self) -> int:
-        """Number of messages that can't be decoded, are too large, or have an invalid time stamp."""
+        """Number of messages that were skipped: undecodable, too large, or with an invalid time stamp."""
         return sum(each.unread + each.unplaced for each in self._topics.values())
 
     @property
@@ -197,7 +203,7 @@ class Curves:
 
     @property
     def newest_s(self) -> float | None:
-        """Time of the newest sample or state of all curves; None if there is none."""
+        """Time in seconds of the newest sample or state of all curves; None if there is none."""
         found = [
             last
             for curve in self.all
@@ -207,7 +213,7 @@ class Curves:
         return max(found, default=None)
 
     def no_values_reason(self, curve: Curve) -> str:
-        """Return why a curve has no values; "" if it has some or may get some."""
+        """Return a sentence about why a curve has no values; "" if it has values or may get some."""
         if curve.series is None or len(curve.samples) or len(curve.series.states):
             return ""
         payload = self.payload_of(curve.series.topic)

@@ -1,4 +1,4 @@
-"""Feed of the series: passes all messages of plotted topics to the series, once per tick."""
+"""Feed that passes all messages of plotted topics to the series, once per tick."""
 
 from __future__ import annotations
 
@@ -9,24 +9,33 @@ from app.core.network.mailbox import Batch
 from app.core.network.watches import WatchHandle
 
 DEEP_CAPACITY = 8192
-"""Maximum number of messages of a plotted topic between ticks; enough for 8 s at 1 kHz."""
+"""Maximum number of messages of a plotted topic between two ticks, enough for 8 s at 1 kHz."""
 
 
 class SeriesReceiver(Protocol):
     """Receiver of the messages of a topic."""
 
     def process(self, batch: Batch, now_ns: int) -> None:
-        """Process a batch; ``now_ns`` is this computer's time, used for messages without a time stamp."""
+        """Process the messages received since the last tick.
+
+        Args:
+            batch: Messages, oldest first.
+            now_ns: Current time of this computer in ns since 1970, used for messages without a time
+                stamp.
+        """
 
     def rewind(self) -> None:
-        """Remove all messages without counting losses, because the source jumped to another time."""
+        """Remove all messages without counting them as lost. Called when the source seeks to another time."""
 
 
 class SeriesFeed:
-    """Receivers of messages by topic. Not thread-safe: use it from the window's thread.
+    """Receivers of messages, by topic. Not thread-safe; use it from the main thread.
 
-    A topic is subscribed to while it has a receiver, even if no panel is visible, so that plots have no gaps.
-    ``origin_ns`` is time 0 of all series.
+    A topic is subscribed to while it has a receiver, even if no panel is visible, so that plots have no
+    gaps.
+
+    Attributes:
+        origin_ns: Time 0 of all series, in ns since 1970.
     """
 
     def __init__(
@@ -36,7 +45,7 @@ class SeriesFeed:
         set_room: Callable[[str, int | None], None] = lambda _topic, _messages: None,
     ) -> None:
         # `watch` opens a watch by topic key; `set_room` sets the number of messages kept between ticks
-        # (`Mailbox.set_room`).
+        # (`Mailbox.set_capacity`).
         self._watch, self._clock_ns, self._set_room = watch, clock_ns, set_room
         self._takers: dict[str, list[SeriesReceiver]] = {}
         self._deep: dict[str, list[SeriesReceiver]] = {}
@@ -45,18 +54,21 @@ class SeriesFeed:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Topics with receivers."""
+        """Names of the topics that have a receiver."""
         return tuple(self._takers)
 
     def now_s(self) -> float:
-        """Return this computer's current time in seconds since ``origin_ns``."""
+        """Return the current time of this computer in seconds since ``origin_ns``."""
         return (self._clock_ns() - self.origin_ns) / 1e9
 
     def register(self, topic: str, taker: SeriesReceiver, *, deep: bool = True) -> None:
-        """Pass the messages of a topic to ``taker``.
+        """Add a receiver for the messages of a topic.
 
-        Without ``deep``, messages may be dropped while the window is busy, and a recording provides no
-        history.
+        Args:
+            topic: Key of the topic.
+            taker: Receiver.
+            deep: True to receive all messages, and the history of a recording. If False, messages may
+                be dropped while the window is busy.
         """
         self._takers.setdefault(topic, []).append(taker)
         if deep:
@@ -82,13 +94,13 @@ class SeriesFeed:
                 self._set_room(topic, None)
 
     def rewind(self, topics: Iterable[str] | None = None) -> None:
-        """Reset the receivers of these topics (None: all), because the source jumped to another time."""
+        """Reset the receivers of topics (None: all topics). Called when the source seeks to another time."""
         for topic in list(self._takers) if topics is None else topics:
             for taker in self._takers.get(topic, ()):
                 taker.rewind()
 
     def add(self, batches: Mapping[str, Batch]) -> None:
-        """Pass the messages of a tick to the receivers."""
+        """Pass the messages received since the last tick to the receivers."""
         if not self._takers:
             return
         now_ns = self._clock_ns()

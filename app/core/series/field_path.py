@@ -1,8 +1,8 @@
-"""Field paths to values in messages: ``pose.x[2]``, ``joints[*].position``.
+"""Paths of values in messages, such as ``pose.x[2]`` or ``joints[*].position``.
 
-A path is parsed once. A key that is not a plain word is a JSON string in brackets, as in ``people["first
-name"]``; ``[*]`` stands for every element of an array. In a message that is neither object nor array, the
-value is called ``value``.
+A key that is not a plain word is written as a JSON string in brackets, as in ``people["first name"]``;
+``[*]`` matches every element of an array. If a message is neither an object nor an array, the path of
+its value is ``value``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ from nep.errors import nearest
 from nep.i18n import _
 
 WILDCARD: Final = "*"
-"""Step that stands for every element of an array. As a key, it would be quoted in brackets."""
+"""Text of the step that matches every element of an array.
+
+A key with this text is written in quotes.
+"""
 MAX_STEPS, MAX_EVERY, MAX_FIELDS = 32, 65, 2000
 MAX_LENGTH = 400
 BARE_VALUE_KEY = "value"
@@ -28,8 +31,9 @@ _STEP = re.compile(
     r"""|\[(?P<every>\*)\]|\[(?P<key>"(?:[^"\\]|\\.)*")\]"""
 )
 _PLAIN = re.compile(r"""[^.\[\]"\s,()+*/%^-]+\Z""")
-"""Keys that can't be confused with a calculation; `head-yaw`, which looks like a difference, is written
-`["head-yaw"]`.
+"""Pattern of keys that can't be confused with a calculation.
+
+The key `head-yaw`, for example, looks like a difference, so it is written as `["head-yaw"]`.
 """
 
 FieldKind = Literal["number", "state", "list"]
@@ -63,13 +67,13 @@ def is_list(value: object) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class FieldPath:
-    """Steps from a message to a value: keys, indices, or `ALL`."""
+    """Path from a message to a value, as a sequence of keys, indices and `ALL`."""
 
     steps: tuple[Step, ...]
 
     @classmethod
     def parse(cls, text: str) -> FieldPath:
-        """Parse a path. Raises `CurveError` if it is invalid."""
+        """Parse the text of a path. Raises `CurveError` if the path is invalid."""
         steps: list[Step] = []
         at = 0
         while at < len(text):
@@ -114,12 +118,10 @@ class FieldPath:
         return here
 
     def expanded(self, payload: object) -> list[FieldPath]:
-        """Return the paths that replace each `ALL` by the indices in a message.
+        """Return the paths in which each `ALL` is replaced with the indices of the array in a message.
 
-        The path itself if it has none.
-
-        At most 65, one more than the curves of a plot, so that too many are reported and not silently cut
-        off.
+        A path without `ALL` is returned unchanged. At most 65 paths are returned, one more than the
+        maximum number of curves in a plot, so that the caller can detect that there are too many.
         """
         if not self.has_wildcard:
             return [self]
@@ -161,7 +163,14 @@ def _format_step(step: Step) -> str:
 
 @dataclass(frozen=True, slots=True)
 class PlottableField:
-    """Plottable value of a message: a number, a state (text, boolean), or an array of numbers."""
+    """Value of a message that can be plotted.
+
+    Attributes:
+        path: Path of the value.
+        kind: Kind of value: a number, a state (text or boolean), or an array of numbers.
+        value: Value in the message.
+        count: Number of curves that the value results in.
+    """
 
     path: FieldPath
     kind: FieldKind
@@ -170,9 +179,13 @@ class PlottableField:
 
 
 def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[PlottableField]:
-    """Yield the plottable values of a message, upper levels first.
+    """Yield the plottable values of a message, outermost first.
 
-    For an array, the first elements and ``[*]`` are included.
+    The first elements of an array are included, and ``[*]`` for all its elements.
+
+    Args:
+        payload: Decoded message.
+        most: Maximum number of values.
     """
     waiting: list[tuple[tuple[Step, ...], object]] = [((), payload)]
     if not isinstance(payload, Mapping) and not is_list(payload):
@@ -195,9 +208,9 @@ def fields_of(payload: object, most: int = MAX_FIELDS) -> Iterator[PlottableFiel
 
 
 def kind_of_value(value: object) -> FieldKind | None:
-    """Return how a value can be plotted.
+    """Return the kind of a plottable value, or None if the value can't be plotted.
 
-    Returns None for objects, bytes, null, and arrays of anything but numbers.
+    Objects, bytes, null, and arrays that contain anything but numbers can't be plotted.
     """
     if isinstance(value, (bool, str)):
         return "state"
@@ -211,7 +224,10 @@ def kind_of_value(value: object) -> FieldKind | None:
 
 
 def complete(text: str, known: Sequence[str]) -> str:
-    """Complete ``text`` up to the next dot, bracket or end that all matching entries of ``known`` share."""
+    """Complete a text up to the next dot, bracket or slash that all matching entries of ``known`` share.
+
+    Returns ``text`` unchanged if no entry starts with it.
+    """
     fitting = [each for each in known if each.startswith(text)]
     if not fitting:
         return text
@@ -224,5 +240,5 @@ def complete(text: str, known: Sequence[str]) -> str:
 
 
 def nearest_field(path: FieldPath, payload: object) -> str | None:
-    """Return the path of the most similar field in a message; None if none is similar."""
+    """Return the path in a message that is most similar to ``path``; None if no path is similar."""
     return nearest(str(path), [str(each.path) for each in fields_of(payload)])

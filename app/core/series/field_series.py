@@ -1,4 +1,4 @@
-"""Series of one topic: the time of each message is determined once, then each field is read."""
+"""Series of one topic. The time of each message is determined once; then each field is read."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 MAX_STAMP_NS = 1 << 63
-"""Latest valid time stamp (in the year 2262); later ones are counted and their messages skipped."""
+"""Latest valid time stamp (year 2262). Messages with a later time stamp are skipped and counted."""
 SILENCE_S, SILENCES = 1.0, 8.0
 """Minimum silence that counts as a gap: seconds, and number of usual intervals."""
 MIN_SILENCES = 3
-"""Number of consecutive gaps after which their length becomes the usual interval."""
+"""Number of consecutive gaps after which the topic's usual interval is updated to their length."""
 MAX_PUBLISHERS = 64
 UNREADABLE = object()
 """Placeholder for a message that can't be read."""
 
 
 class FieldSeries:
-    """History of one field: `numbers`, and `states` for text and boolean values.
+    """Values of one field over time: `numbers`, and `states` for text and boolean values.
 
     Attributes:
         last: Newest value as received.
@@ -49,9 +49,12 @@ class FieldSeries:
         return kind_of_value(self.last) == "state"
 
     def add_values(self, times_s: Sequence[float], payloads: Sequence[object], gaps: Sequence[bool]) -> None:
-        """Add the field's values from messages.
+        """Add the values of the field in some messages.
 
-        ``gaps`` is True where messages are missing before a message.
+        Args:
+            times_s: Time of each message in seconds.
+            payloads: Decoded messages.
+            gaps: True for each message before which messages are missing.
         """
         find = self.path.value_in
         times: list[float] = []
@@ -96,7 +99,7 @@ class FieldSeries:
 
 
 def number_of(value: object) -> float:
-    """Convert a number to float; too large numbers become infinite and are not drawn."""
+    """Convert a number to float. Numbers that are too large become infinite and are not drawn."""
     try:
         return float(value)  # type: ignore[arg-type]
     except OverflowError:
@@ -104,13 +107,13 @@ def number_of(value: object) -> float:
 
 
 class TopicSeries:
-    """All series of one topic, and receiver of its messages (`app.core.series.feed`).
+    """All series of one topic. Receives the topic's messages from `app.core.series.feed`.
 
     Attributes:
         lost: Number of messages that did not arrive.
         unread: Number of messages that can't be decoded or are too large.
         unplaced: Number of messages with an invalid time stamp.
-        payload: Newest message.
+        payload: Payload of the newest message.
     """
 
     def __init__(self, topic: str, origin_ns: int) -> None:
@@ -126,13 +129,13 @@ class TopicSeries:
         self._silences = 0  # consecutive
 
     def add_field(self, field: FieldSeries) -> None:
-        """Add a field, which is read from the newest message and from all later ones."""
+        """Add a field. Its values are read from the newest message and from all later messages."""
         self.fields.append(field)
         if self.payload is not MISSING and self._last_s is not None:
             field.add_values([self._last_s], [self.payload], [False])
 
     def process(self, batch: Batch, now_ns: int) -> None:
-        """Add received messages."""
+        """Add the messages received since the last tick."""
         # publishers, because dropped messages also appear as jumps of their sequence numbers
         seen: set[int | None] = set()
         lost = first_jumps = 0
@@ -165,7 +168,7 @@ class TopicSeries:
             field.add_values(times, payloads, gaps)
 
     def rewind(self) -> None:
-        """Remove all values, because the source jumped to another time."""
+        """Remove all values. Called when the source seeks to another time."""
         self._seqs.clear()
         self._gap, self._last_s, self._usual_s, self._silences = False, None, None, 0
         self.received = self.lost = self.unread = self.unplaced = 0

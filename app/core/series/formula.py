@@ -1,12 +1,12 @@
-"""Typed curves: a field of a topic, or a calculation with fields.
+"""Expressions for curves: a field of a topic, or a calculation with fields.
 
 ::
 
     /odom.pose.x          difference(/odom.speed)          mean(/odom.speed, 2 s)
     hypot(/odom.pose.x, /odom.pose.y)                      /odom.speed - 2 * /cmd_vel.linear
 
-Fields are replaced by names first; `ast` parses the rest. Only the operations listed here are executed,
-on numpy arrays. Typed text is never run as Python.
+Fields are first replaced with names; then `ast` parses the expression. Only the operations listed in
+this module are executed, on numpy arrays. The text is never executed as Python.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ FUNCTIONS: dict[str, tuple[int, Callable[..., Floats]]] = {
     "min": (2, np.minimum), "max": (2, np.maximum), "floor": (1, np.floor), "ceil": (1, np.ceil),
     "sign": (1, np.sign), "deg": (1, np.degrees), "rad": (1, np.radians),
 }  # fmt: skip
-"""Allowed functions, each with its number of arguments."""
+"""Number of arguments of each allowed function, by name."""
 CONSTANTS = {"pi": np.pi, "e": np.e}
 OPERATORS: dict[type[ast.operator], Callable[[Floats, Floats], Floats]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Mod: np.mod,
@@ -53,7 +53,7 @@ _UNITS = {"ms": 0.001, "s": 1.0, "min": 60.0}
 
 @dataclass(frozen=True, slots=True)
 class FieldSource:
-    """Field of a topic."""
+    """Source of a curve that is a field of a topic."""
 
     topic: str
     path: FieldPath
@@ -65,7 +65,13 @@ class FieldSource:
 
 @dataclass(frozen=True, slots=True)
 class WindowSource:
-    """Change of a source over time, or its mean over the last ``window_s`` seconds."""
+    """Source of a curve that is calculated from consecutive values of another source.
+
+    Attributes:
+        kind: Calculation, such as "difference" or "mean".
+        of: Other source.
+        window_s: Length of the window for the mean, in seconds.
+    """
 
     kind: WindowFunction
     source: Source
@@ -81,12 +87,12 @@ class WindowSource:
 
 @dataclass(frozen=True, slots=True)
 class ExpressionSource:
-    """Number calculated from several sources.
+    """Source of a curve that is calculated from several sources.
 
     Attributes:
         text: Display name.
         inputs: Sources.
-        calculate: Calculates the values; the arguments are in the order of `inputs`.
+        calculate: Function that calculates the values; takes the values of `inputs` in order.
     """
 
     text: str
@@ -101,9 +107,13 @@ Source = FieldSource | WindowSource | ExpressionSource
 
 
 def parse_field(text: str, topics: Sequence[str]) -> FieldSource | None:
-    """Return the field if the text is a single field; otherwise None.
+    """Parse an expression that is a single field; return None if it is a formula.
 
     Raises `CurveError` if the text consists of a topic and an invalid path.
+
+    Args:
+        text: Text that the user typed.
+        topics: Names of the existing topics.
     """
     topic = _topic_at(text, topics)
     if topic is None:
@@ -297,7 +307,7 @@ def _constant(value: object) -> Floats:
 
 
 def unknown_topic(name: str, topics: Sequence[str]) -> CurveError:
-    """Return the error for an unknown topic, which suggests the most similar one."""
+    """Return an error for an unknown topic, which suggests the existing topic with the most similar name."""
     near = nearest(name, list(topics))
     if near is None:
         return CurveError(_("topic {topic} does not exist").format(topic=name))

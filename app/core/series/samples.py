@@ -1,8 +1,8 @@
-"""Samples of one series over time, bounded, with gaps and a multi-resolution pyramid.
+"""Samples of one series over time, limited in number, with gaps and a multi-resolution pyramid.
 
-All values are finite; if a value is missing, the next sample is marked as following a gap. Minimum, maximum
-and sum are stored for every 16, 128 and 1024 samples, so that drawing a million samples costs no more than
-some thousands. Samples are appended; late ones are inserted in order.
+All values are finite. If a value is missing, there is a gap before the next sample. Minimum, maximum
+and sum are stored for every 16, 128 and 1024 samples, so that drawing a million samples costs no more
+than some thousands. Samples are appended; late samples are inserted in order.
 """
 
 from __future__ import annotations
@@ -20,10 +20,13 @@ Indexes = NDArray[np.intp]
 MAX_SAMPLES = 1 << 20
 """Maximum number of samples: a quarter of an hour at 1 kHz, 20 MB."""
 MAX_LATENESS_S = 1.0
-"""Maximum lateness of a sample that is inserted. A later one means that the clock was set back."""
+"""Maximum lateness in seconds of a sample that is inserted.
+
+A later sample means that the clock was set back.
+"""
 SHIFTS = (4, 7, 10)
 RAW_PER_COLUMN = 4
-"""Number of samples per pixel up to which each sample is drawn."""
+"""Maximum number of samples per pixel for which each sample is drawn."""
 FEW_RANGES, FEW_NUMBERS = 8, 4096
 """Numbers of ranges and samples up to which a Python loop is faster than a vectorized reduction."""
 _INITIAL_CAPACITY = 1024
@@ -33,7 +36,7 @@ _MAX_REWRITES = 256
 
 @dataclass(frozen=True, slots=True)
 class RangeStats:
-    """Statistics of a range; minimum, maximum and mean are None without samples."""
+    """Statistics of a time range. Minimum, maximum and mean are None if it contains no samples."""
 
     count: int = 0
     minimum: float | None = None
@@ -43,9 +46,12 @@ class RangeStats:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Polyline to draw: times (s) and values, NaN at gaps.
+    """Polyline to draw.
 
-    ``is_whole`` is True if it includes all samples.
+    Attributes:
+        times: Times in seconds.
+        values: Values, NaN at gaps.
+        is_complete: True if the polyline contains all samples of the range.
     """
 
     times: Floats
@@ -87,11 +93,11 @@ class _Level:
 
 @dataclass(slots=True)
 class _Pixels:
-    """Drawn pixels from ``first`` (inclusive) to ``end`` (exclusive), with two points each.
+    """Drawn pixel columns from ``first`` (inclusive) to ``end`` (exclusive), with two points each.
 
     Attributes:
-        keys: Numbers of the pixels that aren't empty.
-        broken: True for pixels after a gap.
+        keys: Indices of the columns that contain samples.
+        broken: True for each column that follows a gap.
     """
 
     first: float = 0.0
@@ -122,9 +128,9 @@ class _Pixels:
 
 @dataclass(slots=True)
 class _PixelCache:
-    """Cache of the last drawn pixels that later samples can't change.
+    """Cache of the last drawn pixel columns that later samples can't change.
 
-    A scrolling plot draws almost the same pixels again.
+    A scrolling plot draws almost the same columns at each frame.
     """
 
     width_s: float = 0.0
@@ -134,13 +140,13 @@ class _PixelCache:
 
 
 class Samples:
-    """Times in s, ascending, and finite values. Not thread-safe: use it from the window's thread.
+    """Samples with ascending times (s) and finite values. Not thread-safe; use it from the main thread.
 
-    An absolute index includes evicted samples.
+    Absolute indices count evicted samples too.
 
     Attributes:
-        begun: Number of samples evicted to stay within ``limit``; the oldest quarter is evicted at a time.
-        undone: Number of samples removed because a clock was set back.
+        begun: Number of evicted samples. When ``limit`` is reached, the oldest quarter is evicted.
+        undone: Number of samples that were removed because a clock was set back.
     """
 
     def __init__(self, limit: int = MAX_SAMPLES) -> None:
@@ -165,22 +171,22 @@ class Samples:
 
     @property
     def times(self) -> Floats:
-        """Times (s), oldest first; a view."""
+        """Times in seconds, oldest first, as a view."""
         return self._times[: self._count]
 
     @property
     def values(self) -> Floats:
-        """Values; a view."""
+        """Values in the order of `times`, as a view."""
         return self._values[: self._count]
 
     @property
     def gaps(self) -> NDArray[np.bool_]:
-        """True if a gap precedes each sample; a view."""
+        """True for each sample that follows a gap, as a view."""
         return self._gaps[: self._count]
 
     @property
     def last_s(self) -> float | None:
-        """Time of the newest sample; None without samples."""
+        """Time of the newest sample in seconds; None without samples."""
         return float(self._times[self._count - 1]) if self._count else None
 
     @property
@@ -192,11 +198,17 @@ class Samples:
     # -- input -------------------------------------------------------------------------------------
 
     def break_line(self) -> None:
-        """Mark a gap before the next sample."""
+        """Insert a gap before the next sample."""
         self._gap_pending = self._count > 0
 
     def extend(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
-        """Append samples in order of arrival; samples that aren't finite become gaps."""
+        """Append samples in order of arrival. Samples that aren't finite become gaps.
+
+        Args:
+            times: Times in seconds.
+            values: Values.
+            gaps: True for each sample that follows a gap.
+        """
         good = np.isfinite(times) & np.isfinite(values)
         if not good.all():
             gaps = _carry_gaps(gaps, good)
@@ -220,7 +232,13 @@ class Samples:
         self._evict_old()
 
     def add(self, time_s: float, value: float, *, gap: bool = False) -> None:
-        """Append one sample."""
+        """Append one sample.
+
+        Args:
+            time_s: Time in seconds.
+            value: Value.
+            gap: True if the sample follows a gap.
+        """
         self.extend(np.array([time_s]), np.array([value]), np.array([gap]))
 
     def _append(self, times: Floats, values: Floats, gaps: NDArray[np.bool_]) -> None:
@@ -255,7 +273,10 @@ class Samples:
         self._rewrite(place, time_s)
 
     def truncate(self, time_s: float) -> None:
-        """Remove samples at or after a time: the clock was set back, or a recording continues there."""
+        """Remove the samples at and after a time.
+
+        Used when the clock was set back, or when a recording continues at that time.
+        """
         place = int(np.searchsorted(self.times, time_s, side="left"))
         if place < self._count:
             self.undone += self._count - place
@@ -275,7 +296,13 @@ class Samples:
         self._rewrites.append((self.rewritten, time_s))
 
     def rewritten_from(self, seen: int) -> float | None:
-        """Return the earliest time changed since ``rewritten`` was ``seen``; None if nothing has changed."""
+        """Return the earliest time at which samples were changed, other than by appending.
+
+        Returns None if there was no such change.
+
+        Args:
+            seen: Value of ``rewritten`` up to which the caller knows the changes.
+        """
         if seen == self.rewritten:
             return None
         if not self._rewrites or self._rewrites[0][0] > seen + 1:
@@ -325,7 +352,10 @@ class Samples:
         return int(first), int(np.searchsorted(self.times, end_s, side="right"))
 
     def at(self, time_s: float) -> tuple[float, float] | None:
-        """Return time and value of the newest sample up to a time; None before the first one and in a gap."""
+        """Return time and value of the newest sample at or before a time.
+
+        Returns None before the first sample and in a gap.
+        """
         place = int(np.searchsorted(self.times, time_s, side="right")) - 1
         if place < 0:
             return None
@@ -334,7 +364,10 @@ class Samples:
         return float(self._times[place]), float(self._values[place])
 
     def time_at_step(self, time_s: float, steps: int) -> float | None:
-        """Return the time of the sample ``steps`` samples after (or before) a time; None if there is none."""
+        """Return the time of the sample that is ``steps`` samples after a time, or before it if negative.
+
+        Returns None if there is no such sample.
+        """
         if steps > 0:
             place = int(np.searchsorted(self.times, time_s, side="right")) + steps - 1
         else:
@@ -342,7 +375,7 @@ class Samples:
         return float(self._times[place]) if 0 <= place < self._count else None
 
     def stats(self, begin_s: float, end_s: float) -> RangeStats:
-        """Return the statistics of a range."""
+        """Return the statistics of the samples in a time range."""
         first, end = self.index_range(begin_s, end_s)
         if end <= first:
             return RangeStats()
@@ -351,10 +384,15 @@ class Samples:
         return RangeStats(end - first, float(low[0]), float(high[0]), mean if isfinite(mean) else None)
 
     def line(self, begin_s: float, end_s: float, columns: int) -> Line:
-        """Return the polyline for a range on ``columns`` pixels.
+        """Return the polyline of a time range.
 
-        Contains all samples, or the minimum and maximum in each pixel, and one sample on each side of the
-        range, so that the line reaches the edges.
+        The polyline contains all samples, or the minimum and the maximum in each pixel column. One
+        sample on each side of the range is added, so that the polyline reaches the edges.
+
+        Args:
+            begin_s: Start of the range.
+            end_s: End of the range.
+            columns: Width in pixels.
         """
         first, end = self.index_range(begin_s, end_s)
         points = end - first
@@ -471,7 +509,7 @@ class Samples:
 def _reduce(
     lows: Floats, highs: Floats, totals: Floats, starts: Indexes, ends: Indexes
 ) -> tuple[Floats, Floats, Floats]:
-    # As `Samples._reduced`, but ranges may be empty: minimum inf, maximum -inf, sum 0.
+    # As `Samples._reduce_ranges`, but ranges may be empty: minimum inf, maximum -inf, sum 0.
     low, high = np.full(len(starts), np.inf), np.full(len(starts), -np.inf)
     total = np.zeros(len(starts))
     there = ends > starts

@@ -1,4 +1,4 @@
-"""States over time: text and boolean values as runs of equal values, bounded, with gaps."""
+"""Text and boolean values over time, as runs of equal values, limited in number, with gaps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ MAX_STATE_LENGTH = 200
 
 @dataclass(frozen=True, slots=True)
 class StateRun:
-    """Value from ``begin_s`` to ``end_s``; ``word`` is None if the value is unknown."""
+    """Run of equal values from ``begin_s`` to ``end_s``.
+
+    Attributes:
+        word: Value; None if it is unknown.
+    """
 
     begin_s: float
     end_s: float
@@ -23,7 +27,7 @@ class StateRun:
 
 
 class States:
-    """Runs of one field. Beyond `MAX_RUNS` runs, the oldest are evicted and counted."""
+    """Runs of equal values of one field. Beyond `MAX_RUNS` runs, the oldest are evicted and counted."""
 
     def __init__(self, limit: int = MAX_RUNS) -> None:
         self._limit = limit
@@ -36,9 +40,14 @@ class States:
         return len(self._begins)
 
     def add(self, time_s: float, word: str | None, *, gap: bool = False) -> None:
-        """Add a value (None for no value) at a time; ``gap`` is True if messages are missing before it.
+        """Add a value.
 
-        Slightly late values are ignored. A very late one means that the clock was set back.
+        Slightly late values are ignored; a very late value means that the clock was set back.
+
+        Args:
+            time_s: Time in seconds.
+            word: Value; None if the message has no value.
+            gap: True if messages before this one are missing.
         """
         if self.last_s is not None and time_s < self.last_s:
             if self.last_s - time_s <= MAX_LATENESS_S:
@@ -76,13 +85,13 @@ class States:
     def runs(
         self, begin_s: float, end_s: float, *, step_s: float = 0.0, without: Collection[str] | None = None
     ) -> Iterator[StateRun]:
-        """Yield the runs in a range, oldest first. The newest run ends with the last message.
+        """Yield the runs in a time range, oldest first. The newest run ends with the last message.
 
         Args:
             begin_s: Start of the range.
             end_s: End of the range.
-            step_s: Duration in which one run is sufficient.
-            without: Values to be skipped; if given, parts with unknown values are skipped too.
+            step_s: Time resolution; one run in each interval of this length is sufficient.
+            without: Values to skip. If given, runs with unknown values are skipped too.
         """
         place, end = self._index_range(begin_s, end_s)
         while place < end:
@@ -95,7 +104,7 @@ class States:
             place = max(place + 1, bisect_right(self._begins, at_s + step_s) - 1)
 
     def values_in(self, begin_s: float, end_s: float) -> set[str]:
-        """Return the distinct values in a range."""
+        """Return the distinct values in a time range."""
         first, end = self._index_range(begin_s, end_s)
         return {word for word in set(self._words[first:end]) if word is not None}
 
@@ -110,18 +119,18 @@ class States:
         return self._begins[place] if self.last_s is None else self.last_s
 
     def at(self, time_s: float) -> str | None:
-        """Return the value at a time; None if it is unknown."""
+        """Return the value at a time; None if the value is unknown."""
         place = bisect_right(self._begins, time_s) - 1
         return self._words[place] if place >= 0 else None
 
     def change_count(self, begin_s: float, end_s: float) -> int:
-        """Return the number of changes in a range."""
+        """Return the number of changes of the value in a time range."""
         first, end = self._index_range(begin_s, end_s)
         words = [word for word in self._words[first:end] if word is not None]
         return sum(one != other for one, other in pairwise(words))
 
     def duration_s(self, word: str, begin_s: float, end_s: float) -> float:
-        """Return the total duration of a value in a range, in seconds."""
+        """Return how long the field had the value ``word`` in a time range, in seconds."""
         return sum(
             max(0.0, min(self._end_of(place), end_s) - max(self._begins[place], begin_s))
             for place in range(*self._index_range(begin_s, end_s))

@@ -1,6 +1,7 @@
-"""Atomic writing and safe reading of Studio's files.
+"""Atomic writing and safe reading of files.
 
-Files that concern only the user (settings, unsaved work, versions) are private, independent of the umask.
+Files that concern only the user (settings, unsaved work, versions) are private, regardless of the
+umask.
 """
 
 from __future__ import annotations
@@ -27,9 +28,12 @@ _PRIVATE_FOLDER, _OTHERS = 0o700, 0o077
 def read_regular_file(path: Path, most_bytes: int = MAX_BYTES) -> bytes:
     """Return the content of a regular file.
 
-    Raises OSError for anything else, with the reason in ``strerror``.
+    Raises OSError if the path is not a regular file, with the reason in ``strerror``. Never blocks on a
+    pipe, a device, a folder, or a link to one of these.
 
-    Never blocks on a pipe, a device, a folder, or a link to one of these.
+    Args:
+        path: Path of the file.
+        most_bytes: Maximum size; OSError is raised for a larger file.
     """
     # Without NONBLOCK, opening a pipe waits for its writer forever.
     handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -61,11 +65,11 @@ def write_atomically(
     If OSError is raised, the old file is unchanged.
 
     Args:
-        path: File; its folder is created if necessary.
-        data: Bytes, or an iterable of parts, so that a large file need not fit into memory. An exception of
-            the iterable cancels the write.
-        durable: True to flush the data to disk before the old file is replaced, so that one of both survives
-            a power failure. Otherwise the file survives only a crash of this process.
+        path: Path of the file; its folder is created if necessary.
+        data: Content, or an iterable of its parts, so that a large file need not fit into memory. An
+            exception of the iterable cancels the write.
+        durable: True to flush the data to disk before the old file is replaced, so that the old or the
+            new content survives a power failure. If False, it survives only a crash of this process.
         private: True to make the file, and a folder that is created, accessible only to their owner.
     """
     if isinstance(data, bytes) and not data:
@@ -101,17 +105,22 @@ def _remove_stale_parts(path: Path) -> None:
 
 
 def create_private_folder(folder: Path) -> None:
-    """Create the folder if necessary, and make it private. Raises OSError if it can't be created.
+    """Create a folder if necessary, and make it accessible only to its owner. Raises OSError.
 
-    Folders of other users are left unchanged. On Windows nothing is changed, because user folders are already
-    private.
+    Folders of other users are not changed. On Windows nothing is changed, because user folders are
+    already private.
     """
     folder.mkdir(mode=_PRIVATE_FOLDER, parents=True, exist_ok=True)
     _restrict_to_owner(folder)
 
 
 def make_private(folder: Path, files: str) -> None:
-    """Make a folder and the matching files in it private, because earlier versions did not."""
+    """Make a folder and files in it private, because earlier versions of Studio did not.
+
+    Args:
+        folder: Path of the folder.
+        files: Glob pattern of the files.
+    """
     if os.name != "posix" or not folder.is_dir():
         return
     _restrict_to_owner(folder)

@@ -1,4 +1,4 @@
-"""CSV (RFC 4180) that is safe for spreadsheets: values received from robots can't become formulas."""
+"""CSV (RFC 4180) that is safe for spreadsheets: received values are never evaluated as formulas."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _START = ("=", "+", "-", "@", "\t", "\r")
 
 
 def escape_formula(text: str) -> str:
-    """Prefix a text with an apostrophe if a spreadsheet would interpret it as a formula."""
+    """Return a text with an apostrophe in front if a spreadsheet would evaluate the text as a formula."""
     return f"'{text}" if text.startswith(_START) else text
 
 

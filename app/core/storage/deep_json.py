@@ -1,8 +1,8 @@
-"""JSON with deep nesting, as for a long stack of blocks, where Blockly nests each block in the previous one.
+"""JSON with deep nesting, such as a long stack of blocks, which Blockly nests in each other.
 
-Python's json supports about 1000 levels, which is a stack of 480 blocks. Values with deeper nesting are
-processed in a thread with a larger stack, up to `LEVELS` (less in early releases of Python 3.12). Beyond
-that, RecursionError is raised as usual.
+Python's json module supports about 1000 levels, which is a stack of 480 blocks. Values with more levels
+are processed in a thread with a larger stack, up to `MAX_LEVELS` (less in early releases of Python 3.12).
+Beyond that, RecursionError is raised as usual.
 """
 
 from __future__ import annotations
@@ -15,26 +15,32 @@ from typing import TypeVar
 
 MAX_LEVELS = 9_000
 MAX_SHALLOW_LEVELS = 8_000
-"""Number of brackets up to which a text can't be nested too deeply."""
+"""Number of brackets in a text up to which its nesting can't be too deep."""
 STACK_BYTES = 255 * 1024 * 1024
-"""Size of the stack in bytes; Python for Windows rejects 256 MiB."""
+"""Stack size of the thread in bytes. Python for Windows rejects 256 MiB."""
 
 T = TypeVar("T")
 _thread_lock = threading.Lock()
 
 
 def loads(text: str | bytes) -> object:
-    """Parse JSON; bytes may be UTF-8, UTF-16 or UTF-32, with or without a BOM.
+    """Parse JSON. Bytes may be UTF-8, UTF-16 or UTF-32, with or without a BOM.
 
-    Raises ValueError for invalid JSON, RecursionError beyond 9000 levels.
+    Raises:
+        ValueError: The text is not valid JSON.
+        RecursionError: The nesting exceeds 9000 levels.
     """
     return run_deep(lambda: json.loads(text))
 
 
 def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> str:
-    """Format a value as JSON, with escaped characters if ``ascii``. Raises RecursionError beyond 9000 levels.
+    """Format a value as JSON. Raises RecursionError beyond 9000 levels of nesting.
 
-    A value with deep nesting is not indented, because its text would consist mostly of spaces.
+    Args:
+        value: Value to format.
+        indent: Number of spaces per level. A value with deep nesting is not indented, because its text
+            would consist mostly of spaces.
+        ascii: True to escape all characters that are not ASCII.
     """
     try:
         return json.dumps(value, indent=indent, ensure_ascii=ascii)
@@ -43,12 +49,12 @@ def dumps(value: object, indent: int | None = None, *, ascii: bool = False) -> s
 
 
 def are_equal(one: object, other: object) -> bool:
-    """Return True if two values are equal, independent of their depth."""
+    """Return True if two values are equal. Supports deep nesting."""
     return run_deep(lambda: one == other)
 
 
 def start_deep(thread: threading.Thread) -> None:
-    """Start a thread whose stack is large enough for values with deep nesting."""
+    """Start a thread with a stack that is large enough for values with deep nesting."""
     with _thread_lock:
         size = threading.stack_size(STACK_BYTES)
         try:
@@ -58,9 +64,10 @@ def start_deep(thread: threading.Thread) -> None:
 
 
 def run_deep(work: Callable[[], T]) -> T:
-    """Return the result of ``work``, called in a thread with a larger stack if necessary.
+    """Call ``work`` and return its result.
 
-    ``work`` may be called twice, so it must not have side effects.
+    After a RecursionError, call it again in a thread with a larger stack. ``work`` must not have side
+    effects, because it may be called twice.
     """
     try:
         return work()

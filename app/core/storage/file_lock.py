@@ -1,4 +1,4 @@
-"""Lock file shared by several instances on one computer."""
+"""Lock file that several instances on one computer share."""
 
 from __future__ import annotations
 
@@ -45,7 +45,10 @@ else:
 
 
 HELD_ERRNOS = frozenset({errno.EACCES, errno.EAGAIN, errno.EWOULDBLOCK, errno.EDEADLK})
-"""Error numbers that mean that another process holds the lock; others mean that locks aren't supported."""
+"""Error numbers that mean that another process holds the lock.
+
+Other error numbers mean that the file system doesn't support locks.
+"""
 
 
 def _acquire(file: IO[bytes], until: float) -> bool:
@@ -70,7 +73,7 @@ def _open_lock_file(path: Path) -> IO[bytes]:
 
 
 class FileLock:
-    """Lock that is held until it is released or this process ends."""
+    """Lock on a file, held until it is released or this process exits."""
 
     def __init__(self, path: Path) -> None:
         # The lock file is `<name>.lock` next to `path`.
@@ -80,7 +83,7 @@ class FileLock:
     def acquire(self) -> bool:
         """Try to acquire the lock; return False if another process holds it.
 
-        Returns True on file systems without locks.
+        Returns True if the file system doesn't support locks.
         """
         if self._file is not None:
             return True
@@ -107,10 +110,16 @@ class FileLock:
 
 @contextmanager
 def locked(path: Path, within_s: float = 1.0) -> Iterator[bool]:
-    """Hold the lock of ``path`` (the file ``<name>.lock``); yield True if it was acquired in time.
+    """Return a context manager that holds the lock file ``<name>.lock`` of a file.
 
-    On file systems without locks (a network disk, a read-only folder), the body runs immediately without a
-    lock. The lock of a process that crashes is released immediately.
+    The value of the context manager is True if the lock was acquired.
+
+    If locks aren't possible (a network disk, a read-only folder), the body runs without a lock. A lock
+    is released immediately if its process crashes.
+
+    Args:
+        path: File to lock.
+        within_s: Maximum time to wait for another process, in seconds.
     """
     until = time.monotonic() + within_s
     try:

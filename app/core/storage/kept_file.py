@@ -1,4 +1,4 @@
-"""Files with data of the user. A damaged file is renamed, so that its content isn't lost."""
+"""Files with data of the user. A damaged file is renamed, so that its content isn't overwritten."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class StoredFile(Generic[T]):
-    """Result of reading such a file.
+    """Result of reading a file with data of the user.
 
     Attributes:
-        value: Content; None if the file is missing or can't be read.
+        value: Parsed content; None if the file is missing or can't be read.
         problem: Message about a file that could not be read, or only partly; otherwise "".
-        is_newer: True if the file was written by a newer Studio and must not be overwritten.
+        is_newer: True if a newer Studio wrote the file, which must then not be overwritten.
     """
 
     value: T | None = None
@@ -34,11 +34,16 @@ class StoredFile(Generic[T]):
 def read_stored(
     path: Path, parse: Callable[[bytes], tuple[T, str]], newer: type[NepError], most_bytes: int
 ) -> StoredFile[T]:
-    """Read a file of limited size; from a damaged file, the readable part is used.
+    """Read a file with data of the user. If the file is damaged, the readable part is used.
 
-    ``parse`` returns the value, and a problem or "". It raises `NepError` for an unreadable file, and
-    ``newer`` for a file written by a newer Studio. A damaged file is renamed, such as from "alarms.json" to
-    "alarms.damaged.json".
+    A damaged file is renamed, for example from "alarms.json" to "alarms.damaged.json".
+
+    Args:
+        path: Path of the file.
+        parse: Parses the content; returns the value, and a message about a problem or "". Raises
+            `NepError` for an unreadable file.
+        newer: Exception that ``parse`` raises for a file of a newer Studio.
+        most_bytes: Maximum size of the file.
     """
     try:
         data = read_regular_file(path, most_bytes)

@@ -1,4 +1,4 @@
-"""User settings: one JSON file in the configuration folder."""
+"""User settings, stored in one JSON file in the configuration folder."""
 
 from __future__ import annotations
 
@@ -19,14 +19,18 @@ from nep.i18n import _
 from nep.system.replace_file import replace_file
 
 FORMAT = 1
-"""Format version; increased when older versions can't read newer settings. New keys need no new version.
+"""Format version, increased when older versions of Studio can't read newer settings.
 
-The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are part of the format.
+New keys need no new version. The states of layouts (`app.ui.shell.docking.workbench.STATE_VERSION`) are
+part of the format.
 """
 _OWN_FILE_NAME = f"settings.format-{FORMAT}.json"
 RECENT_LIMIT = 12
 _MAX_TIME_S = 1e12
-"""Latest valid time. A damaged file may contain a time that the calendar doesn't support."""
+"""Latest valid time in seconds since 1970.
+
+A damaged file may contain a time that the calendar doesn't support.
+"""
 T = TypeVar("T")
 
 
@@ -57,12 +61,18 @@ def state_home() -> Path:
 
 
 def closed_tabs_folder() -> Path:
-    """Return the folder of behaviours whose tabs were closed without saving them to a file."""
+    """Return the folder for behaviours whose tabs were closed before they were saved to a file."""
     return home() / "kept"
 
 
 def saved_language(folder: Path | None = None) -> str:
-    """Read the chosen language, or "", before translations are loaded. Creates and moves no file."""
+    """Return the language chosen in the settings, or "". Usable before translations are loaded.
+
+    No file is created or moved.
+
+    Args:
+        folder: Folder of the settings; default: `home`.
+    """
     place = folder if folder is not None else home()
     values = _read_values(place / "settings.json")
     if _format_of(values) > FORMAT:
@@ -82,7 +92,14 @@ def _read_values(path: Path) -> dict[str, object]:
 
 @dataclass(frozen=True, slots=True)
 class RecentFile:
-    """Recently opened or saved file; ``there`` is False if the file is missing."""
+    """File that was recently opened or saved.
+
+    Attributes:
+        path: Path of the file.
+        name: Display name.
+        opened_s: Time of opening or saving, in seconds since 1970.
+        exists: False if the file is missing.
+    """
 
     path: Path
     name: str
@@ -94,17 +111,17 @@ class ListSettings(Protocol):
     """Part of the interface of `Settings` for storing lists."""
 
     def get(self, key: str, default: list[T]) -> list[T]:
-        """Return a stored list."""
+        """Return a stored list, or ``default`` if there is none."""
 
     def set(self, key: str, value: object) -> None:
         """Store a list."""
 
 
 class Settings:
-    """Settings by name. A damaged file is renamed to ``settings.damaged.json``.
+    """User settings, by key. A damaged file is renamed to ``settings.damaged.json``.
 
-    A file written by a newer Studio in an unknown format is not changed: its readable values are used, and
-    changes are stored next to it in ``settings.format-1.json``.
+    A file of a newer Studio in an unknown format is not changed: its readable values are used, and
+    changes are stored in ``settings.format-1.json`` next to it.
     """
 
     def __init__(self, folder: Path | None = None, clock: Callable[[], float] = time.time) -> None:
@@ -123,18 +140,26 @@ class Settings:
         self._values: dict[str, object] = self._read()
 
     def get(self, key: str, default: T) -> T:
-        """Return the value of ``key``; ``default`` if the value is missing or has another type."""
+        """Return the value of a key, or ``default`` if the value is missing or has another type."""
         value = self._values.get(key, default)
         if default is None or isinstance(value, type(default)):
             return value  # type: ignore[return-value]  # checked on the line above
         return default
 
     def set(self, key: str, value: object) -> None:
-        """Set a value (any JSON) and write the file. Raises SettingsError.
+        """Set a value and write the file.
 
-        Raises TypeError or ValueError if the value can't be converted to JSON; then nothing changes. Values
-        of other keys that another instance has written meanwhile are preserved. A value that could not be
-        written stays in memory and is written together with the next one.
+        Values of other keys that another instance has written in the meantime are preserved. A value
+        that could not be written stays in memory and is written together with the next one.
+
+        Args:
+            key: Name of the setting.
+            value: Value that can be converted to JSON.
+
+        Raises:
+            SettingsError: The file can't be written.
+            TypeError: The value can't be converted to JSON. Nothing is changed.
+            ValueError: The value can't be converted to JSON. Nothing is changed.
         """
         if key in self._values and self._values[key] == value and self.not_kept is None:
             return
@@ -145,17 +170,17 @@ class Settings:
             self._write()
 
     def all(self) -> dict[str, object]:
-        """Return all values by name."""
+        """Return all values, by key."""
         return dict(self._values)
 
     @property
     def recent(self) -> list[RecentFile]:
-        """Recent files, newest first, without missing ones."""
+        """Recent files that exist, newest first."""
         return [file for file in self.all_recent if file.exists]
 
     @property
     def all_recent(self) -> list[RecentFile]:
-        """Recent files, newest first, including missing ones."""
+        """Recent files, newest first, including files that are missing."""
         found = []
         entries: list[object] = self.get("recent", [])
         for entry in entries:
@@ -169,7 +194,12 @@ class Settings:
         return found
 
     def add_recent(self, path: Path, name: str | None = None) -> None:
-        """Move or add ``path`` to the top of the recent files. Raises SettingsError."""
+        """Add a file at the top of the recent files, or move it there. Raises SettingsError.
+
+        Args:
+            path: Path of the file.
+            name: Display name; default: the file name.
+        """
         path = path.resolve()
         self._values = self._merged_values()
         kept = [file for file in self.all_recent if file.path != path]
@@ -184,7 +214,7 @@ class Settings:
         self.set_recent(named)
 
     def set_recent(self, files: Sequence[RecentFile]) -> None:
-        """Replace the recent files, newest first. Raises SettingsError."""
+        """Set the list of recent files, newest first. Raises SettingsError."""
         recent = [
             {"path": str(file.path), "name": file.name, "opened_s": file.opened_s}
             for file in files[:RECENT_LIMIT]

@@ -1,4 +1,4 @@
-"""Robot descriptions parsed from W3C Thing Models or Thing Descriptions.
+"""Entry point for robot descriptions: parsing of W3C Thing Models and Thing Descriptions.
 
 :func:`parse` parses the document once; Studio works with :class:`Robot`. The ``rb:`` terms are documented in
 ``resources/robots/README.md``.
@@ -38,17 +38,28 @@ __all__ = [
 ]  # fmt: skip
 
 MAX_BYTES = 1_000_000
-"""Maximum size of a description in bytes; larger ones are rejected before decoding."""
+"""Maximum size of a description in bytes; larger descriptions are rejected before decoding."""
 _INVALID_TOPIC_CHARACTERS = re.compile(r"[^\w.-]")
 
 
 def topic_of(name: str, leaf: str) -> str:
-    """Return the topic of a part of a robot: ``topic_of("My robot", "camera")`` is ``/My_robot/camera``."""
+    """Return the topic of a sensor, event or other part of a robot.
+
+    ``topic_of("My robot", "camera")`` is ``/My_robot/camera``.
+
+    Args:
+        name: Name of the robot.
+        leaf: Last level of the topic.
+    """
     return f"/{_INVALID_TOPIC_CHARACTERS.sub('_', name)}/{leaf}"
 
 
 def parse(document: Mapping[str, object]) -> Robot:
-    """Parse a Thing Model or Thing Description. Raises DescriptionError, which lists all problems."""
+    """Parse a Thing Model or Thing Description.
+
+    Raises:
+        DescriptionError: The document is invalid; the error lists all problems.
+    """
     problems = validate(document)
     if problems:
         title = as_object(document).get("title")
@@ -58,10 +69,10 @@ def parse(document: Mapping[str, object]) -> Robot:
 
 
 def parse_announcement(message: Message) -> Robot:
-    """Parse the robot description in a message. Messages larger than 1 MB are not decoded.
+    """Parse the robot description in a message.
 
     Raises:
-        DescriptionError: The description is invalid.
+        DescriptionError: The description is invalid or larger than `MAX_BYTES`.
         NepError: The message can't be decoded.
     """
     size = len(message.data)
@@ -77,7 +88,12 @@ def parse_announcement(message: Message) -> Robot:
 
 
 def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
-    """Return the default topics for a robot with this name, which the driver kit uses."""
+    """Return the topics that the driver kit uses for a robot with this name.
+
+    Args:
+        name: Name of the robot.
+        virtual: True to include the topics that only virtual robots have.
+    """
     return RobotTopics(
         description=topic_of(name, "description"),
         command=topic_of(name, "command"),
@@ -88,9 +104,11 @@ def default_topics(name: str, *, virtual: bool = False) -> RobotTopics:
 
 
 def thing_description(model: Mapping[str, object], name: str) -> dict[str, object]:
-    """Return the Thing Description of a robot with this model and name, including id and forms.
+    """Return the Thing Description of one robot, including id and forms.
 
-    The model must be valid (see :func:`validate`). It is not modified.
+    Args:
+        model: Valid Thing Model (see :func:`validate`); it is not modified.
+        name: Name of the robot.
     """
     described = copy.deepcopy(dict(model))
     kind = object_member(described, "rb:robot")

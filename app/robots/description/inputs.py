@@ -1,6 +1,6 @@
-"""Validation of action inputs, with messages for the user.
+"""Parameters of actions, and validation of action inputs with messages for the user.
 
-Example: ``turn: angle must be between -360 and 360 °``
+An example of a message is ``turn: angle must be between -360 and 360 °``.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _UNITS = {"deg": "°", "deg/s": "°/s", "Cel": "°C", "degC": "°C", "um": "µm"
 
 @dataclass(frozen=True)
 class Choice:
-    """Allowed value of a parameter, and the text shown for it."""
+    """Allowed value of a parameter, with the text shown for it."""
 
     value: str | int | float
     title: str
@@ -45,28 +45,28 @@ class Choice:
 
 @dataclass(frozen=True)
 class Parameter:
-    """Input of an action, or field of an event.
+    """Parameter of an action, or field of an event.
 
     Attributes:
         name: Name in messages.
         title: Display name.
         kind: text, number, integer, choice, colour, boolean, angle (degrees), image, list or object.
-        minimum: Smallest number.
-        maximum: Largest number.
+        minimum: Minimum of a number.
+        maximum: Maximum of a number.
         step: Step for editors. Values between steps are valid too.
         unit: Unit as displayed.
         default: Default value.
         choices: Allowed values of a choice.
         required: True if the value must be given.
         advanced: True if forms collapse the parameter.
-        options_from: Sensor that lists possible values.
-        min_length: Minimum length of a text, or number of values.
-        max_length: Maximum length of a text, or number of values.
+        options_from: Name of the sensor that lists possible values.
+        min_length: Minimum length of a text in characters, or of a list in items.
+        max_length: Maximum length of a text in characters, or of a list in items.
         widget: Preferred editor.
-        bare: True for an image sent as base64 without a ``data:`` prefix.
+        is_bare_base64: True for an image sent as base64 without a ``data:`` prefix.
         nullable: True if the value may be None.
-        each: Schema of the values of a list or map.
-        places: Schemas of a list's values by position.
+        item: Schema of the items of a list or of the values of an object.
+        prefix_items: Schemas of a list's items by position.
         fields: Schemas of an object's named values.
     """
 
@@ -93,24 +93,30 @@ class Parameter:
 
 
 def display_unit(unit: str | None) -> str | None:
-    """Return the unit as displayed: "deg" is "°"; None stays None."""
+    """Return a unit as displayed, such as "°" for "deg"; None for None."""
     return None if unit is None else _UNITS.get(unit, unit)
 
 
 def format_number(value: float) -> str:
-    """Format a number without trailing zeros: 360, -0.05."""
+    """Format a number without trailing zeros, such as "360" or "-0.05"."""
     return f"{value:.10g}"
 
 
 def closest_match(wrong: str, known: Iterable[str]) -> str:
-    """Return the most similar known word, or ""."""
+    """Return the known word that is most similar to a wrong one; "" if none is similar."""
     if len(wrong) > _MAX_WORD_LENGTH:
         return ""
     return next(iter(difflib.get_close_matches(wrong, list(known), n=1)), "")
 
 
 def parameter_of(name: str, data: Mapping[str, object], *, required: bool = False) -> Parameter:
-    """Convert a data schema to a parameter."""
+    """Convert a data schema to a parameter.
+
+    Args:
+        name: Name of the parameter.
+        data: JSON object with the data schema.
+        required: True if the value must be given.
+    """
     is_list = data.get("type") == "array"
     shortest, longest = (number(data.get(rule)) for rule in (_ITEM_COUNT_KEYS if is_list else _LENGTH_KEYS))
     held = data.get("items") if is_list else data.get("additionalProperties")
@@ -140,7 +146,7 @@ def parameter_of(name: str, data: Mapping[str, object], *, required: bool = Fals
 
 
 def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
-    """Return the named values of an object schema."""
+    """Return a parameter for each named value of an object schema."""
     required = names(data.get("required"))
     return tuple(
         parameter_of(name, as_object(each), required=name in required)
@@ -149,7 +155,7 @@ def fields_of(data: Mapping[str, object]) -> tuple[Parameter, ...]:
 
 
 def kind_of(data: Mapping[str, object]) -> str:
-    """Return the kind of a data schema as in :class:`Parameter`; "object" if there is no other."""
+    """Return the kind of a data schema (see `Parameter.kind`); "text" for unknown schemas."""
     widget, kind = data.get("rb:widget"), data.get("type")
     if choices_of(data):
         return "choice"
@@ -163,7 +169,7 @@ def kind_of(data: Mapping[str, object]) -> str:
 
 
 def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
-    """Return the choices of a data schema with their texts; empty if any value is allowed."""
+    """Return the choices of a data schema with their texts; empty if the schema isn't limited to choices."""
     enum = data.get("enum")
     pairs: list[tuple[object, str | None]] = []
     if isinstance(enum, (list, tuple)):
@@ -179,10 +185,17 @@ def choices_of(data: Mapping[str, object]) -> tuple[Choice, ...]:
 
 
 def parse_value(parameter: Parameter, words: str) -> object:
-    """Parse a list or object that the user typed: ``1, 2.5`` or JSON. Invalid text is returned unchanged.
+    """Parse a list or object that the user typed, such as ``1, 2.5`` or JSON.
 
-    Numbers with a decimal comma are separated by semicolons: ``1; 2,5``. ``0,2, 0,5`` is ambiguous and
-    returned unchanged, so that the validation rejects it.
+    Numbers with a decimal comma are separated by semicolons: ``1; 2,5``.
+
+    Args:
+        parameter: Parameter for the value.
+        words: Typed text.
+
+    Returns:
+        The value, or the unchanged text if it is invalid or ambiguous such as ``0,2, 0,5``, so that the
+        validation rejects it.
     """
     if parameter.kind == "object" or words.lstrip().startswith(("[", "{")):
         try:
@@ -205,7 +218,7 @@ def parse_value(parameter: Parameter, words: str) -> object:
 
 
 def format_for_editing(value: object) -> str:
-    """Format a list or object for editing; the inverse of :func:`from_words`."""
+    """Format a list or object for editing; the inverse of :func:`parse_value`."""
     if isinstance(value, (list, tuple)) and all(isinstance(item, (str, int, float)) for item in value):
         words = [str(item).lower() if isinstance(item, bool) else str(item) for item in value]
         if not any("," in word or not word.strip() or word.startswith(("[", "{")) for word in words):
@@ -228,12 +241,18 @@ def _parse_item(parameter: Parameter, word: str) -> object:
 
 
 def check_input(action: str, parameters: tuple[Parameter, ...], given: object) -> tuple[str, ...]:
-    """Return a message for each problem of an input; empty if the input is valid."""
+    """Return one message per problem of an input; empty if it is valid.
+
+    Each message starts with the name of the action.
+    """
     return tuple(f"{action}: {problem.message}" for problem in input_problems(parameters, given))
 
 
 def input_problems(parameters: tuple[Parameter, ...], given: object) -> tuple[InputProblem, ...]:
-    """Return the problems of an input in the order of the parameters; unknown names come first."""
+    """Return the problems of an input; empty if it is valid.
+
+    Unknown names come first, followed by problems of values in the order of the parameters.
+    """
     if not isinstance(given, Mapping):
         return (InputProblem("", _("the input must be an object with named values")),)
     known = {parameter.name: parameter for parameter in parameters}
@@ -260,9 +279,12 @@ def input_problems(parameters: tuple[Parameter, ...], given: object) -> tuple[In
 
 
 def value_problem(parameter: Parameter, value: object, place: str = "") -> str | None:
-    """Return what a value must be instead ("speed must be a number"), or None if the value is valid.
+    """Return an error message such as "speed must be a number"; None if the value is valid.
 
-    ``place`` names the value in the message (default: the title of the parameter).
+    Args:
+        parameter: Parameter for the value.
+        value: Value to check.
+        place: Name of the value in the message (default: the title of the parameter).
     """
     place = place or parameter.title
     if parameter.choices:

@@ -1,4 +1,4 @@
-"""Access to members of untrusted JSON documents."""
+"""Access to members of untrusted JSON documents without exceptions."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from nep.text import bounded_str
 
 
 def object_member(mapping: Mapping[str, object], name: str) -> Mapping[str, object]:
-    """Return the member with this name if it is an object, else an empty object."""
+    """Return the member of a mapping with this name if it is an object, else an empty object."""
     return as_object(mapping.get(name))
 
 
@@ -20,7 +20,7 @@ def as_object(value: object) -> Mapping[str, object]:
 
 
 def names(value: object) -> tuple[str, ...]:
-    """Return the items of a list as strings; empty for other types."""
+    """Return the items of a list as strings; an empty tuple for values of other types."""
     return (
         tuple(item if isinstance(item, str) else bounded_str(item) for item in value)
         if isinstance(value, (list, tuple))
@@ -34,9 +34,14 @@ def text(value: object) -> str | None:
 
 
 def display_text(owner: Mapping[str, object], member: str = "title") -> str | None:
-    """Return a member that is shown to the user, in the current language.
+    """Return a text for the user from a robot description, in the current language; None if there is none.
 
-    ``titles`` and ``descriptions`` contain translations. If there is none, Studio's catalogue is used.
+    The members ``titles`` and ``descriptions`` contain translations; without them, Studio's message catalogue
+    is used.
+
+    Args:
+        owner: JSON object with the text.
+        member: "title" or "description".
     """
     words = object_member(owner, f"{member}s")
     own = text(owner.get(member))
@@ -44,12 +49,15 @@ def display_text(owner: Mapping[str, object], member: str = "title") -> str | No
 
 
 def number(value: object) -> float | None:
-    """Return the value if it is a number, else None. Integers stay integers; booleans are not numbers."""
+    """Return the value if it is a number (int or float), else None. Booleans are not numbers."""
     return value if isinstance(value, (int, float)) and not isinstance(value, bool) else None
 
 
 def to_number(value: object) -> float | None:
-    """Convert a value to a number, or None. Text is accepted, because RIZE sends numbers as text."""
+    """Convert a number, or a text that represents a number, to float; return None for other values.
+
+    RIZE sends numbers as text.
+    """
     if isinstance(value, bool):
         return None
     try:
@@ -59,7 +67,7 @@ def to_number(value: object) -> float | None:
 
 
 def finite_float(value: object) -> float | None:
-    """Convert a number to a finite float, or None.
+    """Convert a number to float.
 
     Returns None for other types, NaN, infinity, and integers too large for a float.
     """

@@ -1,4 +1,4 @@
-"""Typed parts of a robot description: actions, sensors, events, safe stop."""
+"""Parts of a robot description as dataclasses: actions, sensors, events, safe stop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,14 @@ from app.robots.description.inputs import Choice, Parameter, check_input, input_
 
 @dataclass(frozen=True)
 class DataField:
-    """Value in the object of a sensor or the output of an action. ``unit`` is the unit as displayed."""
+    """Field in the value of a sensor, or in the result or feedback of an action.
+
+    Attributes:
+        name: Name in messages.
+        title: Display name.
+        kind: Kind as in `Parameter`.
+        unit: Unit as displayed.
+    """
 
     name: str
     title: str
@@ -25,8 +32,12 @@ class Action:
 
     Attributes:
         text: Text of the block, with ``%robot`` once, words, and ``%parameter`` for each parameter.
-        repeat_s: Set for an action that continues after it has succeeded (a speed), until a stop or the next
-            action.
+        says: Sentence about the running action with the same placeholders, such as ``%robot turns %angle °``.
+        risk: "moves" if parts of the robot move, "locomotes" if the robot drives; None for neither.
+        uses: Names of the resources that the action occupies.
+        on_busy: "queue", "replace" or "reject" when a resource is in use.
+        repeat_s: Interval in seconds at which tools may repeat an action that continues after it has
+            succeeded (such as a speed); None for other actions.
     """
 
     name: str
@@ -53,15 +64,18 @@ class Action:
         return next((found for found in self.parameters if found.name == name), None)
 
     def check(self, given: object) -> tuple[str, ...]:
-        """Return a message for each problem of an input; empty if the input is valid."""
+        """Return one message per problem of an input; empty if it is valid.
+
+        Each message starts with the name of the action.
+        """
         return check_input(self.name, self.parameters, given)
 
     def problems(self, given: object) -> tuple[InputProblem, ...]:
-        """Return the problems of an input and the parameters concerned, without the name of the action."""
+        """Return the problems of an input, without the name of the action; empty if it is valid."""
         return input_problems(self.parameters, given)
 
     def complete(self, given: Mapping[str, object]) -> dict[str, object]:
-        """Return the input with default values for missing parameters."""
+        """Return an input with default values added for missing parameters."""
         defaults = {found.name: found.default for found in self.parameters if found.default is not None}
         return {**defaults, **given}
 
@@ -73,7 +87,8 @@ class Sensor:
     Attributes:
         kind: boolean, number, integer, text, choice, object, list, image or detections (boxes in pixels of
             the image of `camera`).
-        text: Text of the block, with ``%robot`` once; empty if there is no block.
+        text: Text of the block, with ``%robot`` once; "" for no block.
+        camera: Name of the camera's sensor, for detections.
     """
 
     name: str
@@ -93,13 +108,18 @@ class Sensor:
 
     @property
     def is_image(self) -> bool:
-        """True for images, which use the codec ``image``."""
+        """True if the values are images, which use the codec ``image``."""
         return self.kind == "image"
 
 
 @dataclass(frozen=True)
 class Event:
-    """Event of a robot. ``filters`` are the fields that the block offers as choices."""
+    """Event of a robot.
+
+    Attributes:
+        filters: Names of the fields by which the block filters events.
+        text: Text of the block.
+    """
 
     name: str
     title: str
@@ -115,7 +135,14 @@ class Event:
 class SafeStop:
     """Declaration of how the robot is stopped.
 
-    ``confirmed`` is False for robots that never reply to a stop.
+    Attributes:
+        action: Name of the stop action.
+        watchdog_s: Time in seconds without a heartbeat of the moving program after which the robot stops by
+            itself; None if the robot has no watchdog.
+        within_s: Time in seconds within which the robot stops.
+        on_program_end: True if the robot stops when the moving program ends.
+        on_disconnect: True if the robot stops when the moving program is disconnected.
+        confirmed: False for robots that never reply to a stop.
     """
 
     action: str
@@ -128,7 +155,7 @@ class SafeStop:
 
 @dataclass(frozen=True)
 class RobotTopics:
-    """Topics of a robot. Only virtual robots have ``state`` and ``world``."""
+    """Names of a robot's topics. Only virtual robots have the topics ``state`` and ``world``."""
 
     description: str
     command: str
@@ -139,10 +166,12 @@ class RobotTopics:
 
 @dataclass(frozen=True)
 class Robot:
-    """Parsed description of a robot; ``source`` is the original document.
+    """Parsed description of a robot.
 
-    ``beat_s`` is the interval at which the robot sends heartbeats on its reply topic during actions; None for
-    none.
+    Attributes:
+        source: Original document.
+        beat_s: Interval in seconds at which the robot sends heartbeats on its reply topic during actions;
+            None if it sends none.
     """
 
     name: str

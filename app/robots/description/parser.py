@@ -1,4 +1,4 @@
-"""Conversion of validated descriptions to typed parts; `description.parse` is the entry point."""
+"""Conversion of validated robot descriptions to dataclasses; `description.parse` is the entry point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,12 @@ _ICONS = {"moves": "move", "locomotes": "footprints"}
 
 
 def read(document: Mapping[str, object], topics: RobotTopics) -> Robot:
-    """Convert a valid document. ``topics`` are the default topics."""
+    """Convert a valid document to a robot.
+
+    Args:
+        document: Thing Model or Thing Description.
+        topics: Topics that are used if the document doesn't contain any.
+    """
     own = object_member(document, "rb:topics")
     topics = RobotTopics(
         description=text(own.get("description")) or topics.description,

@@ -1,7 +1,7 @@
-"""Parsing of typed numbers: comma and point are both decimal separators.
+"""Parsing of numbers typed by the user: comma and point are both decimal separators.
 
-``editor/src/typed_number.ts`` uses the same rules for number fields of blocks;
-``tests/data/typed_numbers.json`` tests both.
+``editor/src/typed_number.ts`` implements the same rules for number fields of blocks;
+``tests/data/typed_numbers.json`` contains test cases for both.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ _GROUPED = re.compile("[+-]?[0-9][0-9.,' _\N{RIGHT SINGLE QUOTATION MARK}]*", re
 
 
 class TypedNumberError(ValueError):
-    """Raised for text that is not a number. The message is for the user.
+    """Raised for a text that is not a number. The message is for the user.
 
-    ``has_separators`` is True if the separators are ambiguous.
+    Attributes:
+        has_separators: True if the text is ambiguous because of its separators.
     """
 
     def __init__(self, *, has_separators: bool) -> None:
@@ -32,10 +33,10 @@ class TypedNumberError(ValueError):
 
 
 def parse_number(text: str) -> float:
-    """Parse a typed number.
+    """Parse a number typed by the user.
 
-    Thousands separators are rejected instead of removed: "1.234" may mean 1234 or 1.234, and a robot that
-    moves a thousand times too far can't be undone.
+    Thousands separators are rejected instead of removed: "1.234" may mean 1234 or 1.234, and it can't be
+    undone if a robot moves a thousand times too far.
 
     Raises:
         TypedNumberError: The text is not a finite number.

@@ -1,7 +1,7 @@
 """Validation of robot descriptions by the profile's JSON Schema, and by rules that a schema can't express.
 
-The schema is ``resources/robots/robot-profile.schema.json``; its terms are documented in the README next to
-it.
+The schema is ``resources/robots/robot-profile.schema.json``; the README in the same folder documents its
+terms.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ PLACEHOLDER = re.compile(r"%([A-Za-z_][A-Za-z0-9_-]*)")
 _MAX_PROBLEMS = 20
 _MAX_DEPTH = 40
 MAX_VALUES = 20_000
-"""Maximum number of values in a description; checking one takes about 0.05 ms. Pepper's has 900."""
+"""Maximum number of values in a description. Checking a value takes about 0.05 ms; Pepper has 900 values."""
 _BLOCK = "rb:block"
 _TEXT_MEMBERS = frozenset({"title", "description", "unit", "vendor", _BLOCK})
-"""Members of a description that are shown to the user or contain such texts."""
+"""Members of a description that are texts for the user or contain such texts."""
 _VALUE_MEMBERS = frozenset({"default", "enum", "const"})
 _MAX_NUMBER = 1e15
 _accepted_descriptions: deque[str] = deque(maxlen=8)
-"""Recently accepted descriptions, because a robot publishes the same one repeatedly."""
+"""JSON texts of recently accepted descriptions, because a robot publishes the same description repeatedly."""
 _RESERVED = {"description", "command", "answer", "state", "world"}
 
 
@@ -74,10 +74,10 @@ def validate(model: object) -> tuple[str, ...]:
 
 
 def without_control_characters(document: Mapping[str, object]) -> dict[str, object]:
-    """Return the document without control characters in texts for the user; names are validated instead.
+    """Return a description without control characters in texts for the user.
 
-    A bidirectional control character in the title of an action would also reorder the text after it, such as
-    the question whether the robot may move.
+    Names are not changed; `validate` checks them. A bidirectional control character in the title of an action
+    would also reorder the text after it, such as the question whether the robot may move.
     """
 
     def clean(value: object, place: str) -> object:

@@ -1,4 +1,4 @@
-"""Arguments of driver functions: the running call, and the link to the network."""
+"""Interfaces that driver functions use: the running call, and the connection to the network."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _log = logging.getLogger(__name__)
 
 
 class Clock(Protocol):
-    """Source of time, replaceable in tests."""
+    """Interface of a monotonic clock, which tests can replace."""
 
     def now(self) -> float:
-        """Return monotonic time in seconds."""
+        """Return the monotonic time in seconds."""
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
         """Wait until the event is set; return False on timeout.
@@ -32,7 +32,7 @@ class MonotonicClock:
     """Monotonic clock of the computer."""
 
     def now(self) -> float:
-        """Return monotonic time in seconds."""
+        """Return the monotonic time in seconds."""
         return time.monotonic()
 
     def wait(self, event: threading.Event, timeout_s: float | None) -> bool:
@@ -41,7 +41,7 @@ class MonotonicClock:
 
 
 class Canceled(Exception):  # noqa: N818 - not an error: the word of the answer's state
-    """Raised in an action that must end now. Drivers clean up and let the exception propagate."""
+    """Raised in an action that has been cancelled. Drivers clean up and let the exception propagate."""
 
 
 class Failed(Exception):  # noqa: N818 - the word of the answer's state
@@ -73,7 +73,9 @@ def _in_event_loop() -> bool:
 
 
 class Link(Protocol):
-    """Connection of a robot's class to the network. Thread-safe.
+    """Connection of a robot's class to the network; implemented by `app.robots.driver.driver.Driver`.
+
+    Thread-safe.
 
     Attributes:
         name: Name of the robot.
@@ -86,7 +88,7 @@ class Link(Protocol):
 
         Args:
             sensor: Name of the sensor.
-            value: A mapping for an object; an array or JPEG bytes for a camera.
+            value: Value of the declared type: a mapping for an object, an array or JPEG bytes for a camera.
         """
 
     def happen(self, event: str, **data: object) -> None:
@@ -98,50 +100,69 @@ class Link(Protocol):
         """
 
     def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
-        """Return a message for each way in which an event differs from the description.
+        """Validate the data of an event; return one sentence per problem, empty if the data are valid.
 
-        Empty if it is valid.
+        Args:
+            event: Name of the event.
+            data: Fields of the event.
         """
 
     def tell(self, leaf: str, value: object) -> None:
-        """Publish a value that is not in the description on ``/<name>/<leaf>``, such as ``state``."""
+        """Publish a value on a topic that is not in the description, such as ``state``.
+
+        Args:
+            leaf: Last level of the topic ``/<name>/<leaf>``.
+            value: Payload.
+        """
 
     def watchers(self, leaf: str) -> int:
         """Return the number of subscribers of a sensor's topic.
 
-        Use this to skip expensive work while nobody is subscribed.
+        Use this method to skip expensive work while there are no subscribers.
+
+        Args:
+            leaf: Name of the sensor.
         """
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
-        """Call ``changed`` in a background thread with each message that changes a virtual robot's world."""
+        """Set a callback for messages that change the world of a virtual robot.
+
+        Args:
+            changed: Called in a background thread with the payload of each message.
+        """
 
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
-        """Join a topic shared by several robots.
+        """Publish and subscribe to a topic that several robots share.
 
         Args:
             topic: Name of the topic.
-            changed: Called with each message, in the same thread as for `on_world`.
+            changed: Called with the payload of each message, in the same thread as for `on_world`.
             latched: True to keep the last message for later subscribers.
 
         Returns:
-            A function that publishes a message.
+            Function that publishes a message.
         """
 
     def run(self, work: Awaitable[object]) -> object:
-        """Run a coroutine in the robot's event loop and wait for the result.
+        """Run an awaitable in the robot's event loop and wait for the result.
 
         The robot's ``async def`` actions run in the same event loop.
         """
 
 
 class Call:
-    """Running action. All methods may be called from the action's thread.
+    """Running action. All methods can be called from the action's thread.
 
     Attributes:
         action: Name of the action.
         clock: Clock used by `wait`.
+
+    Args:
+        action: Name of the action.
+        clock: Clock used by `wait`.
+        report: Publishes the progress of the action.
     """
 
     def __init__(self, action: str, clock: Clock, report: Callable[[Mapping[str, object]], None]) -> None:
@@ -159,7 +180,7 @@ class Call:
         return self._ended.is_set()
 
     def cancel(self) -> None:
-        """Ask the action to end: its next wait raises Canceled. Does not block."""
+        """Cancel the action: its next wait raises Canceled. Does not block."""
         with self._lock:
             self._ended.set()
             callbacks, self._on_cancel = self._on_cancel, []
@@ -174,14 +195,16 @@ class Call:
                 _run_callbacks(callbacks)
 
     def close(self) -> None:
-        """Wait at most 2 s until the callbacks of `on_cancel` have returned."""
+        """Wait at most 2 s for callbacks of `on_cancel` that are still running."""
         if self._canceling is not None:
             self._canceling.join(_JOIN_TIMEOUT_S)
 
     def on_cancel(self, tell: Callable[[], object]) -> None:
-        """Call ``tell`` once, in another thread, when the action is cancelled; immediately if it already is.
+        """Register a callback for cancellation, such as one that aborts a blocking library call.
 
-        Use it to abort a blocking call of a library.
+        Args:
+            tell: Called once, in another thread; called immediately in this thread if the action is already
+                cancelled.
         """
         with self._lock:
             if not self._ended.is_set():
@@ -190,13 +213,13 @@ class Call:
         tell()
 
     def wait(self, seconds: float) -> None:
-        """Sleep. Raises Canceled as soon as the action is cancelled.
+        """Wait for a number of seconds, or until the action is cancelled.
 
         Args:
             seconds: Duration in seconds.
 
         Raises:
-            Canceled: The action must end.
+            Canceled: The action was cancelled.
             RuntimeError: Called in an ``async def`` action, whose event loop would be blocked.
         """
         if _in_event_loop():
@@ -205,18 +228,18 @@ class Call:
             raise Canceled
 
     def until(self, done: Callable[[], bool], *, for_s: float | None = None, every_s: float = 1 / 30) -> bool:
-        """Poll ``done`` until it returns True.
+        """Poll a condition until it is true.
 
         Args:
             done: Condition.
             for_s: Timeout in seconds; None for no limit.
-            every_s: Interval between two polls in seconds.
+            every_s: Interval in seconds between two polls.
 
         Returns:
             True, or False on timeout.
 
         Raises:
-            Canceled: The action must end.
+            Canceled: The action was cancelled.
         """
         limit = None if for_s is None else self.clock.now() + for_s
         while not done():
@@ -226,14 +249,24 @@ class Call:
         return True
 
     def feedback(self, **values: object) -> None:
-        """Publish the progress of the action. Raises Canceled if the action must end."""
+        """Publish the progress of the action.
+
+        Args:
+            values: Fields of the feedback.
+
+        Raises:
+            Canceled: The action was cancelled.
+        """
         if self.canceled:
             raise Canceled
         self._report(values)
 
     def last(self, **values: object) -> None:
-        """Publish the final progress, even if the action is cancelled.
+        """Publish the final progress, even if the action was cancelled.
 
-        A program that was paused uses it to execute the remaining part.
+        A paused program uses this feedback to execute the remaining part of the action.
+
+        Args:
+            values: Fields of the feedback.
         """
         self._report(values)

@@ -1,4 +1,4 @@
-"""Handling of a robot's commands: messages of type ``robot/command`` become tasks.
+"""Handling of a robot's commands: messages of type ``robot/command`` create, cancel and stop tasks.
 
 The replies are of type ``robot/answer``.
 """
@@ -32,7 +32,15 @@ _MAX_ENDED_PROGRAMS = 100
 class CommandHandler:
     """Command handler of one robot.
 
-    Runs in the thread of the robot's `Tasks`; `stop` and `is_stop` may be called from any thread.
+    Runs in the thread of the robot's `Tasks`; `stop` and `is_stop` can be called from any thread.
+
+    Args:
+        robot: Description of the robot.
+        body: Instance of the robot's class.
+        specs: Declarations of the actions by name.
+        tasks: Tasks of the robot.
+        publish: Publishes a reply.
+        done: Waits for the return value of an action if it is awaitable, and returns the result.
     """
 
     def __init__(
@@ -50,7 +58,7 @@ class CommandHandler:
         self._ended_programs: deque[str] = deque(maxlen=_MAX_ENDED_PROGRAMS)
 
     def is_stop(self, command: object) -> bool:
-        """Return True for a command that stops the robot. Thread-safe."""
+        """Return True if a command stops the robot. Thread-safe."""
         message = as_object(command)
         operation = message.get("op")
         return operation == "stop" or (
@@ -58,7 +66,7 @@ class CommandHandler:
         )
 
     def stop(self, command: object) -> None:
-        """Execute a stop command. Thread-safe; does not wait for queued commands."""
+        """Execute a stop command at once, before queued commands. Thread-safe."""
         message = as_object(command)
         ended = text(message.get("ends"))
         if ended is not None:
@@ -70,13 +78,13 @@ class CommandHandler:
             self._tasks.stop(self._reply_callback(wanted, str(operation), self._robot.safe_stop.action))
 
     def receive(self, command: object, publisher: int | None = None, epoch: int | None = None) -> None:
-        """Handle one message of the command topic.
+        """Handle a message of the command topic. Replies only if the command has an id.
 
         Args:
-            command: Payload of any type. There is a reply if the command has an id.
+            command: Payload of any type.
             publisher: Id of the publisher. Heartbeats and cancels are valid only from the publisher that
                 requested the action.
-            epoch: `Tasks.epoch` when the message was received.
+            epoch: Value of `Tasks.epoch` when the message was received.
         """
         message = as_object(command)
         wanted = _id_of(message)
@@ -96,7 +104,15 @@ class CommandHandler:
             raise
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
-        """Reply to a command that was not decoded, unless its id belongs to another command."""
+        """Reply with an error to a command that was not decoded.
+
+        There is no reply if another pending command has the same id.
+
+        Args:
+            wanted: Id of the command.
+            operation: Operation of the command, such as "invoke".
+            error: Error message.
+        """
         if wanted not in self._open_ids:
             self._reply_callback(wanted, operation, "")(TaskReply("failed", error=error))
 
@@ -134,11 +150,11 @@ class CommandHandler:
     def publish_heartbeat(
         self, not_ended: Sequence[str] = (), error: str | None = None, rejected: int = 0
     ) -> None:
-        """Publish a heartbeat, whose absence programs notice.
+        """Publish a heartbeat, so that programs notice when the robot no longer responds.
 
         Args:
-            not_ended: Actions whose functions keep running although they were asked to end.
-            error: Message about them.
+            not_ended: Names of cancelled actions whose functions are still running.
+            error: Message about these actions.
             rejected: Number of messages to the robot that were not handled.
         """
         told: dict[str, object] = {"op": "alive", "id": "", "action": "", "state": "running"}
@@ -157,7 +173,17 @@ class CommandHandler:
         publisher: int | None = None,
         epoch: int | None = None,
     ) -> Task:
-        """Create the task that runs an action with a validated input."""
+        """Create the task that runs an action with a valid input.
+
+        Args:
+            wanted: Id of the command.
+            action: Description of the action.
+            given: Input of the action; defaults are added.
+            answer: Publishes the replies.
+            program: Requesting program.
+            publisher: Id of the publisher of the command.
+            epoch: Value of `Tasks.epoch` when the command was received.
+        """
         spec = self._specs[action.name]
         complete = action.complete(given)
         function: Callable[..., object] = getattr(self._body, action.name)

@@ -1,4 +1,4 @@
-"""Declarations that several robots use: driving, moving parts, position, battery, distance."""
+"""Declarations of actions and sensors that several robots use, such as driving, position and battery."""
 
 from __future__ import annotations
 
@@ -23,10 +23,20 @@ def drives(
     rize: str | None = None,
     from_rize: FromRize | None = None,
 ) -> action:
-    """Declare an action that moves the robot to another place; a newer action replaces it.
+    """Return the decorator of an action that drives the robot; a newer action replaces it.
 
-    Its feedback contains the remaining amount ``to_go`` in ``unit``, so that a program can continue after a
-    pause; with ``moved`` also the amount done.
+    The feedback of the action contains the remaining distance or angle ``to_go``, so that a program can
+    continue after a pause.
+
+    Args:
+        text: Text of the block, as for `action`.
+        icon: Icon of the block.
+        says: The text in the third person, for messages.
+        unit: Unit of the feedback.
+        title: Display name (default: the name of the method).
+        moved: True if feedback and result also contain the distance or angle covered.
+        rize: Name of RIZE's primitive.
+        from_rize: Converts RIZE's input and options to the action's input.
     """
     made: Mapping[str, object] = {"moved": Annotated[float, Range(unit=unit)]} if moved else {}
     return action(
@@ -55,7 +65,19 @@ def moves(
     title: str | None = None,
     rize: str | None = None,
 ) -> action:
-    """Declare an action that moves ``parts`` of the robot without driving; a newer action replaces it."""
+    """Return the decorator of an action that moves parts of the robot without driving.
+
+    A newer action that moves the same parts replaces it.
+
+    Args:
+        text: Text of the block, as for `action`.
+        icon: Icon of the block.
+        says: The text in the third person, for messages.
+        parts: Names of the moved resources, such as "head".
+        timeout_s: Maximum duration in seconds.
+        title: Display name (default: the name of the method).
+        rize: Name of RIZE's primitive.
+    """
     return action(
         text,
         MOVEMENT,
@@ -71,7 +93,11 @@ def moves(
 
 
 def position_sensor(rate_hz: float) -> SensorSpec:
-    """Declare the sensor of position and orientation."""
+    """Return the declaration of a sensor for position (in m) and orientation (in degrees).
+
+    Args:
+        rate_hz: Typical publishing rate.
+    """
     return sensor(
         {
             "x": Annotated[float, Range(unit="m")],
@@ -85,12 +111,16 @@ def position_sensor(rate_hz: float) -> SensorSpec:
 
 
 def battery_sensor() -> SensorSpec:
-    """Declare the sensor of the battery level in percent."""
+    """Return the declaration of a sensor for the battery level in percent."""
     full = Annotated[int, Range(0, 100, unit="%")]
     return sensor(full, title="battery", text="battery", icon="battery-medium")
 
 
 def distance_sensor(most_m: float) -> SensorSpec:
-    """Declare the sensor of the distance to an obstacle ahead, up to ``most_m`` metres."""
+    """Return the declaration of a sensor for the distance to an obstacle ahead.
+
+    Args:
+        most_m: Maximum distance in m.
+    """
     ahead = Annotated[float, Range(0, most_m, unit="m")]
     return sensor(ahead, title="distance", text="distance", icon="ruler", rate_hz=10)

@@ -1,7 +1,7 @@
 """Declaration of a robot in Python: actions, sensors, events and safe stop, converted to a Thing Model.
 
-A robot is a class. Its constructor takes a :class:`~app.robots.driver.call.Link`. Methods decorated with
-:class:`action` are its actions; :func:`sensor`, :func:`picture`, :func:`detections` and :func:`event` are
+A robot is a class whose constructor takes a :class:`~app.robots.driver.call.Link`. Methods decorated with
+:class:`action` are its actions; :func:`sensor`, :func:`picture`, :func:`detections` and :func:`event` create
 class attributes; exactly one method is decorated with :func:`safe_stop`.
 """
 
@@ -58,17 +58,18 @@ class action:  # noqa: N801 - used as a decorator
         icon: Icon of the block.
         says: The text in the third person, for messages.
         title: Display name (default: the name of the method).
-        uses: Resources, such as "base": actions that share one don't run at the same time.
+        uses: Names of the resources that the action occupies, such as "base". Actions that use the same
+            resource don't run at the same time.
         on_busy: "queue", "replace" or "reject" when a resource is in use.
         timeout_s: Maximum duration in seconds.
-        risk: "moves" or "locomotes".
+        risk: "moves" if parts of the robot move, "locomotes" if the robot drives; None for neither.
         cancellable: False if the action can't be cancelled.
-        repeat_s: For actions that continue after their function returned (a speed): the interval at which
-            other tools may send them again. The requesting program must stay alive.
-        output: Fields of the result (default: the return type).
-        feedback: Fields of the progress.
+        repeat_s: For actions that continue after their function returned (such as a speed): interval in
+            seconds at which tools may repeat the action. The requesting program must stay alive.
+        output: Types of the result's fields by name (default: the return type).
+        feedback: Types of the feedback's fields by name.
         rize: Name of RIZE's primitive.
-        from_rize: Converts RIZE's input and options to the action's input, if names alone don't.
+        from_rize: Converts RIZE's input and options to the action's input; None if the names are the same.
 
     Example:
         ::
@@ -94,9 +95,10 @@ class action:  # noqa: N801 - used as a decorator
     from_rize: FromRize | None = None
 
     def __call__(self, function: Function) -> Function:
-        """Register the function as an action and check its types.
+        """Declare a function as an action and check its types.
 
-        Raises DeclarationError with the problem and its line.
+        Raises:
+            DeclarationError: The function is not a valid action; the message contains the line.
         """
         try:
             _check_function(function)
@@ -136,13 +138,21 @@ class action:  # noqa: N801 - used as a decorator
 
 @dataclass(frozen=True)
 class ReturnSpec:
-    """Result of an action: the fields of ``output=``, or else the return type of the function."""
+    """Type of an action's result.
+
+    Attributes:
+        fields: Types of the result's fields by name, as given to the decorator.
+        kind: Return type of the function, which is used if `fields` is empty.
+    """
 
     fields: Mapping[str, object] | None = None
     kind: object = None
 
     def schema(self) -> Schema | None:
-        """Return the schema of the output, which is an object. A single value is in the field ``value``."""
+        """Return the schema of the result, which is always an object; None for an action without result.
+
+        A single value is in the field ``value``.
+        """
         if self.fields:
             return fields_schema(self.fields)
         if self.kind is None:
@@ -153,7 +163,7 @@ class ReturnSpec:
         return {"type": "object", "properties": {"value": {"title": "value", **schema}}}
 
     def to_output(self, value: object) -> Mapping[str, object]:
-        """Convert the return value of a function to the output. Raises RobotValueError for a wrong type."""
+        """Convert the return value of a function to the result. Raises RobotValueError for a wrong type."""
         made = self._to_output(value)
         check_encodable(made)
         return made
@@ -174,7 +184,15 @@ class ReturnSpec:
 
 @dataclass(frozen=True)
 class ActionSpec:
-    """Declaration of an action, as given to the decorator :class:`action`."""
+    """Declaration of an action, created by the decorator :class:`action`.
+
+    Attributes:
+        description: Description of the action in the Thing Model.
+        primitive: Name of RIZE's primitive, or None.
+        from_rize: Converts RIZE's input and options to the action's input.
+        inputs: Types of the parameters by name.
+        returns: Type of the result.
+    """
 
     description: Schema
     primitive: str | None
@@ -185,7 +203,7 @@ class ActionSpec:
 
 @dataclass(frozen=True)
 class StopSpec:
-    """Declaration of the stop, as given to :func:`safe_stop`."""
+    """Declaration of the stop, created by :func:`safe_stop`; see there for the attributes."""
 
     watchdog_s: float
     within_s: float
@@ -193,7 +211,14 @@ class StopSpec:
 
 @dataclass(frozen=True)
 class SensorSpec:
-    """Declaration of a sensor, with its part of the description."""
+    """Declaration of a sensor.
+
+    Attributes:
+        description: Description of the sensor in the Thing Model.
+        is_image: True for a camera.
+        is_object: True if the values are objects.
+        kind: Type of the value, or a mapping of field names to types.
+    """
 
     description: Schema
     is_image: bool = False
@@ -201,7 +226,7 @@ class SensorSpec:
     kind: object = None
 
     def to_json(self, value: object) -> object:
-        """Convert a value for publishing. Raises RobotValueError for a wrong type."""
+        """Convert a value to the payload of the sensor's topic. Raises RobotValueError for a wrong type."""
         if self.is_image:
             return value
         if isinstance(self.kind, Mapping):
@@ -211,7 +236,13 @@ class SensorSpec:
 
 @dataclass(frozen=True)
 class EventSpec:
-    """Declaration of an event, with its part of the description and its form on RIZE's blackboard."""
+    """Declaration of an event.
+
+    Attributes:
+        description: Description of the event in the Thing Model.
+        to_rize: Converts the fields to RIZE's primitive and input; None if RIZE has no such event.
+        fields: Types of the fields by name.
+    """
 
     description: Schema
     to_rize: ToRize | None = None
@@ -219,14 +250,15 @@ class EventSpec:
 
 
 def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Function], Function]:
-    """Declare a method as the robot's stop.
+    """Return the decorator that declares a method as the robot's stop.
 
-    The method takes no arguments and returns when the robot stands still; it raises Failed if that isn't
-    possible.
+    The method takes no arguments, returns when the robot stands still, and raises Failed if the robot can't
+    be stopped.
 
     Args:
-        watchdog_s: Time (s) without a heartbeat of the moving program after which the robot stops by itself.
-        within_s: Time (s) within which the robot stops.
+        watchdog_s: Time in seconds without a heartbeat of the moving program after which the robot stops by
+            itself.
+        within_s: Time in seconds within which the robot stops.
     """
 
     def mark(function: Function) -> Function:
@@ -239,7 +271,7 @@ def safe_stop(*, watchdog_s: float = 1.0, within_s: float = 0.2) -> Callable[[Fu
 def sensor(
     kind: object, *, title: str, text: str = "", icon: str = "activity", rate_hz: float | None = None
 ) -> SensorSpec:
-    """Declare a sensor as a class attribute.
+    """Return the declaration of a sensor, to be assigned to a class attribute.
 
     Args:
         kind: Type of the value, or a mapping of field names to types.
@@ -261,7 +293,7 @@ def sensor(
 
 
 def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: float) -> SensorSpec:
-    """Declare a camera, which publishes images with the codec ``image``.
+    """Return the declaration of a camera, which publishes images with the codec ``image``.
 
     Args:
         title: Display name.
@@ -278,7 +310,7 @@ def picture(*, title: str, width: int, height: int, rate_hz: float, hfov_deg: fl
 
 
 def detections(*, title: str, camera: str, icon: str, rate_hz: float | None = None) -> SensorSpec:
-    """Declare a sensor that reports named boxes in pixels of a camera's image.
+    """Return the declaration of a sensor for objects detected in a camera's image, as named boxes in pixels.
 
     Args:
         title: Display name.
@@ -303,14 +335,14 @@ def event(
     choose: tuple[str, ...] = (),
     rize: ToRize | None = None,
 ) -> EventSpec:
-    """Declare an event as a class attribute.
+    """Return the declaration of an event, to be assigned to a class attribute.
 
     Args:
         text: Text of the block.
         title: Display name.
         icon: Icon of the block.
         fields: Types of the fields by name.
-        choose: Fields that the block offers as choices.
+        choose: Names of the fields by which the block filters events.
         rize: Converts the fields to RIZE's primitive and input.
     """
     block: Schema = {"category": "Events", "icon": icon, "text": {"en": text}}
@@ -333,7 +365,7 @@ class Kind:
         body: Class of the robot.
         virtual: True for a simulated robot.
         kinds: Categories, such as "mobile".
-        driver: Kind of driver.
+        driver: Kind of driver, such as "python".
         description: Sentence about the robot.
         thing_model: Generated Thing Model.
 
@@ -360,7 +392,7 @@ class Kind:
 
     @property
     def actions(self) -> dict[str, ActionSpec]:
-        """Declared actions by name of the method, in the order of the class."""
+        """Declared actions by name of the method, in the order of declaration."""
         return {
             name: getattr(member, _ACTION_ATTRIBUTE)
             for name, member in self._members()
@@ -369,17 +401,17 @@ class Kind:
 
     @property
     def sensors(self) -> dict[str, SensorSpec]:
-        """Declared sensors by name, in the order of the class."""
+        """Declared sensors by name, in the order of declaration."""
         return {name: member for name, member in self._members() if isinstance(member, SensorSpec)}
 
     @property
     def events(self) -> dict[str, EventSpec]:
-        """Declared events by name, in the order of the class."""
+        """Declared events by name, in the order of declaration."""
         return {name: member for name, member in self._members() if isinstance(member, EventSpec)}
 
     @property
     def stop(self) -> tuple[str, StopSpec]:
-        """Name of the stop method, and its declaration."""
+        """Name and declaration of the stop method. Raises DescriptionError unless there is exactly one."""
         found = [
             (name, getattr(m, _STOP_ATTRIBUTE)) for name, m in self._members() if hasattr(m, _STOP_ATTRIBUTE)
         ]
@@ -485,7 +517,7 @@ class SourceLine:
 
 
 def line_of(function: object) -> SourceLine | None:
-    """Return the line at which a function starts; None if it isn't written in Python."""
+    """Return the line at which a function is defined; None if it isn't written in Python."""
     code = getattr(inspect.unwrap(function), "__code__", None) if callable(function) else None
     return None if code is None else SourceLine(Path(code.co_filename).name, code.co_firstlineno)
 

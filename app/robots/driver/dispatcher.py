@@ -27,12 +27,12 @@ def _do_nothing() -> None:
 
 
 class Dispatcher:
-    """Queue of callbacks that the thread ``name`` runs. Thread-safe.
+    """Queue of callbacks that are run in a separate thread. Thread-safe.
 
     Args:
         name: Name of the thread.
         clock: Clock with which the thread waits.
-        tick: Called in the thread after callbacks, and when ``next_due_s`` has elapsed.
+        tick: Called in the thread after callbacks, and when the time of ``next_due_s`` has elapsed.
         next_due_s: Returns the seconds until ``tick`` is needed, or None.
         on_restart: Called in the thread before a loop that ended is started again.
     """

@@ -1,4 +1,4 @@
-"""Robot on the network: topics, commands and watchdog, created from its kind.
+"""Driver: connection of a robot to the network, with its topics, commands and watchdog.
 
 The robot's ``async def`` actions share one event loop (`EventLoop`), to which their connections belong.
 """
@@ -41,14 +41,14 @@ _log = logging.getLogger(__name__)
 
 
 class Driver:
-    """Driver of one robot, and the `Link` of the robot's class. Thread-safe.
+    """Driver of one robot, and the implementation of `Link`. Thread-safe.
 
-    The node belongs to the caller: closing the driver closes its publishers and subscribers, not the node.
+    Closing the driver closes its publishers and subscribers, but not the node, which belongs to the caller.
     Usable as a context manager.
 
     Args:
         kind: Kind of the robot.
-        name: Name of the robot, with which its topics start.
+        name: Name of the robot, which is the first level of its topics.
         node: Node for publishers and subscribers.
         clock: Clock, replaceable in tests.
 
@@ -85,10 +85,10 @@ class Driver:
     # ---- start and close -----------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Create the topics, then the robot, then publish its description.
+        """Open the topics, create the instance of the robot's class, and publish the description.
 
-        Without a master, the exceptions of ``nep`` are raised. After an exception everything is cleaned up,
-        and `start` can be called again.
+        Raises `MasterUnreachable` or another `NepError` if the network can't be used; `start` can be called
+        again afterwards.
         """
         try:
             self._create_topics()
@@ -143,7 +143,7 @@ class Driver:
         self._subscribers.append(self._node.new_sub(RIZE_COMMANDS, "json", sink=rize.process))
 
     def close(self) -> None:
-        """Stop the robot, reply to open commands, stop the threads and close the topics. Idempotent."""
+        """Stop the robot, reply to pending commands, stop the threads and close the topics. Idempotent."""
         for subscriber in self._subscribers:
             subscriber.close()
         self._subscribers.clear()
@@ -191,7 +191,7 @@ class Driver:
         self._publish(topic_of(self.name, sensor), told)
 
     def happen(self, event: str, **data: object) -> None:
-        """Publish an event; also on RIZE's blackboard, if the event has a form there.
+        """Publish an event; if it can be converted, also on RIZE's blackboard.
 
         Raises:
             KeyError: The kind has no such event.
@@ -209,7 +209,7 @@ class Driver:
             self._publish(BLACKBOARD, {"primitive": primitive, "input": dict(given), "robot": self.name})
 
     def wrong_in(self, event: str, data: Mapping[str, object]) -> Sequence[str]:
-        """Return a message for each way in which an event differs from the description; empty if it is valid.
+        """Validate the data of an event; return one sentence per problem, empty if the data are valid.
 
         Every described field must be present with a valid value; other fields are not allowed.
         """
@@ -223,35 +223,47 @@ class Driver:
         )
 
     def tell(self, leaf: str, value: object) -> None:
-        """Publish a value that is not in the description on ``/<name>/<leaf>``, such as ``state``."""
+        """Publish a value on a topic that is not in the description; see `Link.tell`."""
         topic = topic_of(self.name, leaf)
         if topic not in self._publishers:
             self._open_publisher(topic)
         self._publish(topic, value)
 
     def watchers(self, leaf: str) -> int:
-        """Return the number of subscribers of a topic of the robot."""
+        """Return the number of subscribers of a topic of the robot; 0 if the topic isn't open.
+
+        Args:
+            leaf: Last level of the topic, such as the name of a sensor.
+        """
         publisher = self._publishers.get(topic_of(self.name, leaf))
         return 0 if publisher is None else publisher.subscribers
 
     def run(self, work: Awaitable[object]) -> object:
-        """Run a coroutine in the robot's event loop and wait for the result.
+        """Run an awaitable in the robot's event loop and wait for the result.
 
         The robot's ``async def`` actions run in the same event loop.
         """
         return self._loop.run(work)
 
     def on_world(self, changed: Callable[[Mapping[str, object]], None]) -> None:
-        """Call ``changed`` with each message on ``/<name>/world``, in the thread ``<name> world``."""
+        """Call ``changed`` with the payload of each message on ``/<name>/world``, in a background thread.
+
+        The name of the thread is ``<name> world``.
+        """
         self._subscribe(topic_of(self.name, "world"), changed)
 
     def share(
         self, topic: str, changed: Callable[[Mapping[str, object]], None], *, latched: bool = False
     ) -> Callable[[Mapping[str, object]], None]:
-        """Join a topic shared by several robots; ``changed`` is called with each message, as in `on_world`.
+        """Publish and subscribe to a topic that several robots share.
+
+        Args:
+            topic: Name of the topic.
+            changed: Called with the payload of each message, in the same thread as for `on_world`.
+            latched: True to keep the last message for later subscribers.
 
         Returns:
-            A function that publishes a message; after `close` it does nothing.
+            Function that publishes a message, and does nothing after `close`.
         """
         self._open_publisher(topic, latched=latched)
         self._subscribe(topic, changed)
@@ -291,9 +303,12 @@ class Driver:
 
 
 class EventLoop:
-    """Asyncio event loop in a background thread, which the first coroutine starts. Thread-safe.
+    """Asyncio event loop in a background thread, which is started with the first awaitable. Thread-safe.
 
-    All coroutines of a robot share the loop, so that one action can use a connection opened by another.
+    All awaitables of a robot share the loop, so that one action can use a connection opened by another.
+
+    Args:
+        name: Name of the robot.
     """
 
     def __init__(self, name: str) -> None:
@@ -306,13 +321,17 @@ class EventLoop:
     def run(
         self, work: Awaitable[object], call: Call | None = None, *, within_s: float | None = None
     ) -> object:
-        """Run an awaitable and wait for it; return its result or raise its exception.
+        """Run an awaitable in the loop and wait for it; return its result or raise its exception.
 
         Args:
             work: Awaitable.
-            call: Call whose cancellation cancels the awaitable (its next ``await`` raises CancelledError).
-                Then Canceled is raised.
-            within_s: Timeout in seconds, after which the awaitable is cancelled and TimeoutError is raised.
+            call: Call whose cancellation cancels the awaitable; None if it can't be cancelled.
+            within_s: Timeout in seconds, after which the awaitable is cancelled; None for no limit.
+
+        Raises:
+            Canceled: The call was cancelled.
+            TimeoutError: The timeout has elapsed.
+            RuntimeError: The loop is closed, or the caller runs in the loop.
         """
         loop, waited = self._running_loop(work), _PendingAwaitable(work)
         self._call_soon(partial(waited.start, loop, f"{self._name}: {call.action if call else 'run'}"))
@@ -326,7 +345,7 @@ class EventLoop:
         return waited.result
 
     def close(self) -> None:
-        """Cancel running coroutines and stop the thread. A blocked loop is abandoned with a warning."""
+        """Cancel running coroutines and stop the thread; a blocked loop is abandoned with a warning."""
         with self._lock:
             self._closed = True
             loop, thread = self._loop, self._thread

@@ -1,4 +1,4 @@
-"""Driver as a process: arguments, waiting for a master, and exiting together with an owner."""
+"""Process of a driver: command line, waiting for a master, and exit together with an owner process."""
 
 from __future__ import annotations
 
@@ -32,16 +32,15 @@ _OWNER_CHECK_INTERVAL_S = 0.5
 def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
     """Run a robot of this kind until SIGTERM, Ctrl+C or the exit of the owner.
 
-    Prints the robot's model, topics and master. Waits while no master replies.
+    Prints the robot's model, topics and master. Waits until the master replies.
 
     Args:
         kind: Kind of the robot.
-        arguments: Command line (default: that of the process).
+        arguments: Command-line arguments (default: those of the process).
 
     Returns:
-        Exit code: 0 after a normal end, 1 if the robot can't be connected (its class raised Failed) or
-            described, 2 for
-        invalid arguments.
+        Exit code: 0 after a normal end; 1 if the robot can't be connected (its class raised Failed) or its
+        description is invalid.
     """
     parser = argparse.ArgumentParser(
         description=_("Run the driver of a robot: {title}.").format(title=kind.title)
@@ -64,7 +63,7 @@ def main(kind: Kind, arguments: Sequence[str] | None = None) -> int:
 
 
 def install_exception_hook() -> None:
-    """Report an invalid description as one sentence instead of a traceback.
+    """Install a `sys.excepthook` that prints an invalid description as one sentence without a traceback.
 
     Descriptions are generated while Python executes the class, before the driver can catch an exception.
     """
@@ -83,10 +82,17 @@ def install_exception_hook() -> None:
 def run(
     kind: Kind, name: str, ended: threading.Event, *, master: str | None = None, owner_pid: int | None = None
 ) -> None:
-    """Run the driver of a robot until ``ended`` is set or the owner exits; then stop the robot and leave.
+    """Run the driver of a robot until an event is set or the owner exits; then stop the robot.
 
     Progress is printed only without an owner. An owner monitors the robot over the network, and treats
     printed lines as the reason for an exit.
+
+    Args:
+        kind: Kind of the robot.
+        name: Name of the robot.
+        ended: Event that ends the driver.
+        master: Address of the master; default as for `nep.node`.
+        owner_pid: Process id of the owner; None for no owner.
     """
     owner = _owner_process(owner_pid)
     if owner_pid is not None and owner is None:

@@ -1,4 +1,4 @@
-"""Reception of a robot's messages: stops are executed immediately, everything else is queued.
+"""Reception of a robot's messages: stop commands are executed immediately, everything else is queued.
 
 The network's thread only decodes messages that may be a stop, so that large messages don't delay a stop.
 """
@@ -29,23 +29,39 @@ _log = logging.getLogger(__name__)
 
 
 class Dialect(Protocol):
-    """Interpreter of the commands of one topic."""
+    """Interface of an interpreter for the commands on one topic."""
 
     def is_stop(self, command: object) -> bool:
-        """Return True for a command that stops the robot. Thread-safe."""
+        """Return True if a command stops the robot. Thread-safe."""
 
     def stop(self, command: object) -> None:
         """Stop the robot immediately. Thread-safe."""
 
     def receive(self, command: object, publisher: int | None, epoch: int | None) -> None:
-        """Handle a command. Called in the thread of the robot's `Tasks`."""
+        """Handle a command. Called in the thread of the robot's `Tasks`.
+
+        Args:
+            command: Payload of any type.
+            publisher: Id of the publisher.
+            epoch: Value of `Tasks.epoch` when the message was received.
+        """
 
     def reject(self, wanted: str, operation: str, error: str) -> None:
-        """Reply to a command that was not decoded. Called in the thread of the robot's `Tasks`."""
+        """Reply with an error to a command that was not decoded. Called in the thread of the robot's `Tasks`.
+
+        Args:
+            wanted: Id of the command.
+            operation: Operation of the command, such as "invoke".
+            error: Error message.
+        """
 
 
 class RejectedMessages:
-    """Number of messages to one robot that were not handled, logged at increasing intervals. Thread-safe."""
+    """Counter of messages to one robot that were not handled. Logs at increasing intervals. Thread-safe.
+
+    Args:
+        robot: Name of the robot.
+    """
 
     def __init__(self, robot: str) -> None:
         self.count = 0
@@ -53,7 +69,12 @@ class RejectedMessages:
         self._lock = threading.Lock()
 
     def add(self, topic: str, reason: str) -> None:
-        """Count one message."""
+        """Count a message.
+
+        Args:
+            topic: Name of the topic.
+            reason: Reason for the log.
+        """
         with self._lock:
             self.count += 1
             count = self.count
@@ -64,13 +85,13 @@ class RejectedMessages:
 
 
 class MessageQueue:
-    """Bounded queue of messages of one topic that are decoded in another thread. Thread-safe.
+    """Bounded queue of a topic's messages, which are decoded in another thread. Thread-safe.
 
     Args:
         topic: Name of the topic.
         post: Runs a callback in the decoding thread.
         rejected: Counter of messages dropped because they are too large or the queue is full.
-        max_message_bytes: Maximum size of a message.
+        max_message_bytes: Maximum size of a message in bytes.
     """
 
     def __init__(
@@ -86,7 +107,12 @@ class MessageQueue:
         self._count = self._bytes = 0
 
     def put(self, message: Message, use: Callable[[object], object]) -> bool:
-        """Queue a message whose payload is passed to ``use``; return False if the message is too large."""
+        """Queue a message; return False if the message is too large.
+
+        Args:
+            message: Message.
+            use: Called with the payload in the decoding thread.
+        """
         size = message.size_bytes
         if size > self.max_message_bytes:
             self._rejected.add(self._topic, self.too_large_message(message))
@@ -121,7 +147,7 @@ class MessageQueue:
 
 
 class CommandReceiver:
-    """Sink of one command topic of a robot.
+    """Receiver of the messages on one command topic of a robot.
 
     Args:
         topic: Name of the topic.
@@ -147,7 +173,7 @@ class CommandReceiver:
         self._needles = sorted({json.dumps(word)[1:-1].encode() for word in stop_words if word})
 
     def process(self, messages: Sequence[Message]) -> None:
-        """Process messages. Called in the network's thread; never raises."""
+        """Process received messages. Called in the network's thread; never raises."""
         stops = [at for at, message in enumerate(messages) if self._is_stop(message)]
         older_epoch = self._tasks.epoch
         for at in stops:

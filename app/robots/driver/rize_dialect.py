@@ -28,7 +28,7 @@ _MAX_PRIMITIVES = 100
 
 @dataclass(eq=False)
 class _Group:
-    """Primitives of one command, which get one reply."""
+    """Primitives of one command, to which the driver replies once."""
 
     command: Mapping[str, object]
     open_count: int
@@ -38,7 +38,14 @@ class _Group:
 class RizeDialect:
     """Interpreter of RIZE commands for one robot.
 
-    Runs in the thread of the robot's `Tasks`; `stop` and `is_stop` may be called from any thread.
+    Runs in the thread of the robot's `Tasks`; `stop` and `is_stop` can be called from any thread.
+
+    Args:
+        robot: Description of the robot.
+        specs: Declarations of the actions by name.
+        commands: Command handler, which creates the tasks.
+        tasks: Tasks of the robot.
+        publish: Publishes a reply.
     """
 
     def __init__(
@@ -54,7 +61,7 @@ class RizeDialect:
         self._numbers = itertools.count(1)
 
     def is_stop(self, message: object) -> bool:
-        """Return True for a message whose primitives include the robot's stop. Thread-safe."""
+        """Return True if the primitives of a message include the robot's stop. Thread-safe."""
         command = as_object(message)
         return (
             self._is_for_robot(command)
@@ -70,9 +77,12 @@ class RizeDialect:
         self._tasks.stop(None)
 
     def receive(self, message: object, publisher: int | None = None, epoch: int | None = None) -> None:  # noqa: ARG002
-        """Handle one message of ``robot_action``; messages for other robots are ignored.
+        """Handle a message of ``robot_action``; messages for other robots are ignored.
 
-        ``epoch`` is `Tasks.epoch` when the message was received.
+        Args:
+            message: Payload of any type.
+            publisher: Not used.
+            epoch: Value of `Tasks.epoch` when the message was received.
         """
         command = as_object(message)
         if not self._is_for_robot(command):

@@ -1,8 +1,8 @@
-"""Conversion of the types of a Python function to the data schemas of its description.
+"""Conversion of the types in a Python declaration to the data schemas of the robot's description.
 
 A type is ``float``, ``int``, ``bool``, ``str``, :data:`Colour`, ``list``, ``tuple``, ``dict``, ``Optional``,
-a ``Literal`` or Enum, a dataclass or TypedDict. Further constraints are annotated: ``Annotated[float,
-Range(-2, 2, step=0.05, unit="m")]``.
+a ``Literal`` or Enum, a dataclass or TypedDict. Constraints are annotations: ``Annotated[float, Range(-2, 2,
+step=0.05, unit="m")]``.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class Range:
     Attributes:
         minimum: Smallest value.
         maximum: Largest value.
-        step: Step that editors offer.
+        step: Step of editors; values between steps are valid too.
         unit: Unit as in UCUM ("m", "deg", "s", "%").
-        widget: Editor, such as "slider" or "angle".
+        widget: Preferred editor, such as "slider" or "angle".
     """
 
     minimum: float | None = None
@@ -58,7 +58,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Text:
-    """Minimum and maximum length of a text in characters."""
+    """Limits for the length of a text in characters."""
 
     min_length: int = 0
     max_length: int | None = None
@@ -66,38 +66,38 @@ class Text:
 
 @dataclass(frozen=True)
 class Words:
-    """Texts shown for the values of a ``Literal``."""
+    """Texts shown for the values of a ``Literal``, by value."""
 
     shown: Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class Title:
-    """Title shown instead of the name in Python."""
+    """Display name of a parameter or field, instead of its name in Python."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Suggested:
-    """Initial value in forms and blocks. Callers must give a value anyway."""
+    """Initial value in forms and blocks, for a parameter whose value must be given."""
 
     value: object
 
 
 @dataclass(frozen=True)
 class Advanced:
-    """Marker for a parameter that forms collapse."""
+    """Marker of a parameter that forms collapse."""
 
 
 @dataclass(frozen=True)
 class _HexColour:
-    """Marker for a text that is a colour."""
+    """Marker of a text that is a colour."""
 
 
 @dataclass(frozen=True)
 class _PictureText:
-    """Marker for a text that is an image."""
+    """Marker of a text that is an image."""
 
 
 Colour: TypeAlias = Annotated[str, _HexColour()]
@@ -245,7 +245,7 @@ def _check_unit(unit: object) -> None:
 
 
 def input_types(function: Callable[..., object]) -> dict[str, object]:
-    """Return the types of an action's parameters except ``self`` and ``call``.
+    """Return the types of an action's parameters by name, without ``self`` and ``call``.
 
     Raises:
         TypeError: A parameter has no type, or is variadic or positional-only.
@@ -278,7 +278,11 @@ def input_types(function: Callable[..., object]) -> dict[str, object]:
 
 
 def return_type(function: Callable[..., object]) -> object:
-    """Return the annotated return type of a function; None if there is none, or if it is None or object."""
+    """Return the annotated return type of a function; None if there is none or it has no particular schema.
+
+    For a coroutine, the type of its result is returned. Types such as ``object`` or ``dict`` have no
+    particular schema.
+    """
     kind = get_type_hints(function, include_extras=True).get("return")
     if get_origin(kind) in {Awaitable, Coroutine}:
         kind = get_args(kind)[-1]
@@ -288,7 +292,7 @@ def return_type(function: Callable[..., object]) -> object:
 
 
 def input_schema(function: Callable[..., object]) -> Schema | None:
-    """Return the schema of an action's input (all parameters except ``self`` and ``call``), or None."""
+    """Return the object schema of an action's input; None if the action has no parameters."""
     properties: dict[str, Schema] = {}
     required = []
     parameters = inspect.signature(function).parameters
@@ -315,6 +319,10 @@ def _default_json(kind: object, default: object, name: str) -> object:
 
 
 def fields_schema(fields: Mapping[str, object]) -> Schema:
-    """Return the schema of an object with these typed fields."""
+    """Return the schema of an object.
+
+    Args:
+        fields: Types of the fields by name.
+    """
     properties = {name: {"title": name.replace("_", " "), **schema_of(kind)} for name, kind in fields.items()}
     return {"type": "object", "properties": properties}

@@ -1,7 +1,7 @@
 """Values of typed Python: inspection of types, and conversion from and to JSON.
 
-:func:`given` converts valid JSON to an argument of a function. :func:`told` converts a value of a driver to
-JSON and raises RobotValueError if the value is invalid: "the value must be a number, not 'far'".
+:func:`from_json` converts valid JSON to an argument of a function. :func:`to_json` converts a value of a
+driver to JSON and raises RobotValueError if the value is invalid: "the value must be a number, not 'far'".
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MAX_DEPTH = 40
 
 
 def split_annotated(annotation: object) -> tuple[object, tuple[object, ...]]:
-    """Split ``Annotated`` into the type and its annotations."""
+    """Split an ``Annotated`` type into the type and its annotations."""
     if get_origin(annotation) is Annotated:
         plain, *notes = get_args(annotation)
         return plain, tuple(notes)
@@ -36,7 +36,10 @@ def split_annotated(annotation: object) -> tuple[object, tuple[object, ...]]:
 
 
 def split_optional(annotation: object) -> tuple[object, bool]:
-    """Return the type inside an ``Optional``, and True if it is one; ``int | float`` counts as float."""
+    """Split an ``Optional`` type into the inner type and True; other types are returned with False.
+
+    The union ``int | float`` is returned as ``float``. Raises TypeError for other unions.
+    """
     if get_origin(annotation) not in {Union, UnionType}:
         return annotation, False
     kinds = [kind for kind in get_args(annotation) if kind is not type(None)]
@@ -79,9 +82,12 @@ def _field_type(kind: object, must: bool) -> tuple[object, bool]:
 
 
 def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], ...] | None:
-    """Return the values of a Literal or Enum as (JSON value, Python value, text); None for other types.
+    """Return the choices of a Literal or Enum type; None for other types.
 
-    An Enum with values that JSON can't represent uses its names.
+    An Enum whose values JSON can't represent is represented by the names of its members.
+
+    Returns:
+        Tuples of JSON value, Python value, and text (None for a Literal).
     """
     if get_origin(annotation) is Literal:
         return tuple((value, value, None) for value in get_args(annotation))
@@ -97,16 +103,21 @@ def choices_in(annotation: object) -> tuple[tuple[object, object, str | None], .
 
 
 def format_type(annotation: object) -> str:
-    """Format a type as written in source: ``float``, ``list[str]``, ``Pose``."""
+    """Format a type as in source code, such as ``float``, ``list[str]`` or ``Pose``."""
     if isinstance(annotation, type) and get_origin(annotation) is None:
         return annotation.__name__
     return str(annotation).replace("typing.", "")
 
 
 def from_json(annotation: object, value: object) -> object:
-    """Convert a valid JSON value to an argument of this type.
+    """Convert a valid JSON value to an argument of a function.
 
-    The constructor of a dataclass may raise ValueError.
+    Args:
+        annotation: Type of the parameter.
+        value: JSON value.
+
+    Raises:
+        ValueError: The constructor of a dataclass rejected the value.
     """
     kind, is_optional = split_optional(split_annotated(annotation)[0])
     kind = split_annotated(kind)[0]
@@ -138,7 +149,15 @@ def from_json(annotation: object, value: object) -> object:
 
 
 def to_json(annotation: object, value: object) -> object:
-    """Convert a value of this type to JSON. Raises RobotValueError if the value is invalid."""
+    """Convert a value of a driver to JSON.
+
+    Args:
+        annotation: Declared type.
+        value: Value.
+
+    Raises:
+        RobotValueError: The value doesn't match the type.
+    """
     kind, is_optional = split_optional(split_annotated(annotation)[0])
     kind = split_annotated(kind)[0]
     if value is None and is_optional:
@@ -170,10 +189,17 @@ def to_json(annotation: object, value: object) -> object:
 def fields_to_json(
     kinds: Mapping[str, object], value: object, required: Sequence[str] = ()
 ) -> dict[str, object]:
-    """Convert a value with these fields to a JSON object; other fields are kept unchanged.
+    """Convert a mapping or dataclass instance with declared fields to a JSON object.
 
-    None means unknown, except for required fields. Raises RobotValueError, which names the field that is
-    invalid or missing.
+    Undeclared fields are included. None is allowed for fields that aren't required and means unknown.
+
+    Args:
+        kinds: Declared types of the fields by name.
+        value: Value.
+        required: Names of required fields.
+
+    Raises:
+        RobotValueError: A field is invalid or missing; the error names the field.
     """
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         value = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}

@@ -1,4 +1,4 @@
-"""Thread of a robot's stop function. The thread is started in advance and runs nothing else."""
+"""Thread that runs a robot's stop function. The thread is started in advance and runs nothing else."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _log = logging.getLogger(__name__)
 
 
 class StopThread:
-    """Runs the stop function of one robot. Thread-safe.
+    """Thread that runs the stop function of one robot. Thread-safe.
 
     Runs are numbered from 1. Stops requested while the function is running share that run.
 
     Args:
         name: Name of the robot.
         stop: Stop function of the robot.
-        ended: Called in this thread with the number of a run and its error message, or None.
+        ended: Called in this thread after each run, with its number and its error message, or None.
         clock: Clock with which the thread waits.
     """
 
@@ -49,11 +49,14 @@ class StopThread:
 
     @property
     def requested_run(self) -> int:
-        """Number of the newest reserved run; 0 before the first."""
+        """Number of the newest run that was reserved; 0 before the first."""
         return self._requested
 
     def reserve(self) -> int:
-        """Return the number of the run that serves a stop requested now; `wake` starts that run."""
+        """Reserve a run for a stop requested now and return its number; `wake` starts the run.
+
+        If a run is reserved or running, its number is returned.
+        """
         with self._lock:
             if self._requested == self._finished:
                 self._requested += 1
@@ -64,7 +67,7 @@ class StopThread:
         self._wake.set()
 
     def close(self) -> None:
-        """Stop the thread. A stop function that doesn't return is abandoned."""
+        """Stop the thread. A stop function that doesn't return within 0.5 s is abandoned."""
         self._is_closing = True
         self._wake.set()
         if self._thread.ident is not None:

@@ -1,4 +1,4 @@
-"""Task of a robot, and the replies to it."""
+"""Task: execution of an action, and the replies that report its state."""
 
 from __future__ import annotations
 
@@ -14,9 +14,15 @@ State: TypeAlias = Literal["accepted", "running", "succeeded", "failed", "cancel
 
 @dataclass(frozen=True)
 class TaskReply:
-    """State of a task. ``error`` is a message for the user.
+    """Reply that reports the state of a task.
 
-    An accepted task may have to wait for other actions (`waits_for`), or have replaced them (`replaces`).
+    Attributes:
+        state: State of the task.
+        output: Result of the action.
+        feedback: Progress of the action.
+        error: Message for the user; None if there is no error.
+        waits_for: Names of the actions that an accepted task waits for.
+        replaces: Names of the actions that an accepted task has replaced.
     """
 
     state: State
@@ -28,14 +34,18 @@ class TaskReply:
 
     @property
     def is_final(self) -> bool:
-        """True if no further reply follows."""
+        """True if this is the last reply to a command."""
         return self.state in {"succeeded", "failed", "canceled"}
 
 
 class ProgramId(NamedTuple):
-    """Requesting program: the name in ``from``, and the id of the command's publisher.
+    """Id of the program that requested an action.
 
-    Names can be forged; only both together identify the program that must stay alive.
+    Names can be forged; only the pair identifies the program that must keep sending heartbeats.
+
+    Attributes:
+        name: Name in the member ``from`` of the command.
+        publisher: Id of the command's publisher.
     """
 
     name: str
@@ -46,29 +56,29 @@ class ProgramId(NamedTuple):
 class Task:
     """Execution of an action.
 
-    `run` is called with the :class:`Call` in a separate thread, `answer` in the thread of the robot's
-    `Tasks`.
+    `run` is called in a separate thread, `reply` in the thread of the robot's `Tasks`.
 
     Attributes:
         id: Id of the command.
         action: Name of the action.
         run: Function of the action.
-        answer: Called with each reply.
-        uses: Resources of the action.
-        on_busy: "queue", "replace" or "reject".
-        timeout_s: Maximum duration.
+        reply: Called with each reply.
+        uses: Names of the resources that the action occupies.
+        on_busy: "queue", "replace" or "reject" when a resource is in use.
+        timeout_s: Maximum duration in seconds.
         cancellable: False if the action can't be cancelled.
         title: Display name.
-        program: Program that must stay alive while the task is running; with `goes_on`, also afterwards.
+        program: Program that must stay alive while the task is running; with `continues_after_success`, also
+            afterwards.
         publisher: Id of the command's publisher, even if the command named no program.
-        goes_on: True for a speed, which continues after success.
-        epoch: `Tasks.epoch` when the command was received. After a later stop, the task isn't run.
-        call: Running call.
+        continues_after_success: True for an action that continues after success, such as a speed.
+        epoch: Value of `Tasks.epoch` when the command was received. The task isn't run after a later stop.
+        call: Running call; None before the task has started.
         thread: Thread of the running call.
-        due_s: Time at which the time limit elapses.
-        ending: Reply to send when the task ends.
-        answered: True once the final reply was sent, even if the function is still running.
-        stopped: True if a stop of the robot ended the task.
+        deadline_s: Time on the clock at which the time limit elapses.
+        final_reply: Reply to send when the task ends, if it was cancelled, replaced, stopped or timed out.
+        has_replied: True once the final reply was sent, even if the function is still running.
+        is_stopped: True if a stop of the robot ended the task.
     """
 
     id: str
@@ -92,13 +102,17 @@ class Task:
     is_stopped: bool = False
 
     def request_end(self, how: TaskReply) -> None:
-        """Ask the running function to end. ``how`` is the final reply, whatever the function returns."""
+        """Cancel the running function.
+
+        Args:
+            how: Final reply, unless an earlier call has set one; the result of the function is ignored.
+        """
         self.final_reply = self.final_reply or how
         if self.call is not None:
             self.call.cancel()
 
     def finish(self, answer: TaskReply) -> None:
-        """Send the final reply, unless one was already sent."""
+        """Send the final reply, unless a final reply was already sent."""
         if not self.has_replied:
             self.has_replied = True
             self.reply(answer)

@@ -1,9 +1,9 @@
 """Execution of a robot's tasks: order, policies for resources in use, cancel, stop, watchdog.
 
 All decisions are made in one supervised thread, ``<name> commands`` (`Dispatcher`); each running task has a
-separate thread. A stop waits for neither: `Tasks.stop` cancels the running calls in the caller's thread and
-wakes the thread of the stop function (`StopThread`). Commands received before a stop are not executed after
-it.
+separate thread. A stop waits for none of these threads: `Tasks.stop` cancels the running calls in the
+caller's thread and wakes the thread of the stop function (`StopThread`). Commands received before a stop are
+not executed after it.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from nep.i18n import _, lazy, ngettext, number
 from nep.text import bounded_str
 
 HEARTBEAT_INTERVAL_S = 0.5
-"""Maximum interval of heartbeats while a task is running or queued."""
+"""Interval of heartbeats in seconds while a task is running or queued."""
 STOP_REPLY_TIMEOUT_S = 0.5
-"""Maximum time until the reply to a stop, even if a function keeps running.
+"""Maximum time in seconds until the reply to a stop, even if a function is still running.
 
-The ``within_s`` of the robot applies if it is longer. This is well below the time after which Studio treats a
+A longer ``within_s`` of the robot takes precedence. This is well below the time after which Studio treats a
 robot as silent (`app.core.run.control.STOP_TIMEOUT_S`).
 """
 _GRACE_S = 1.0
-"""Time for a function to clean up after it was cancelled, timed out or replaced."""
+"""Time in seconds for a function to clean up after it was cancelled, replaced or timed out."""
 _MAX_QUEUED = 50
 _MAX_RUNNING = 50
-"""Maximum number of running actions. Actions without resources run in parallel, each in its own thread."""
+"""Maximum number of running actions. Actions without resources run in parallel, each in a separate thread."""
 STOP_LABEL = lazy("the stop function")
 NO_SUCH_TASK = lazy("no running task has this id")
 _MAX_PENDING_STOPS = 2_000
@@ -43,10 +43,12 @@ _log = logging.getLogger(__name__)
 
 
 class Watchdog:
-    """Detects programs that no longer send heartbeats while the robot acts for them. Has no thread.
+    """Detector of programs that no longer send heartbeats while the robot executes their actions.
+
+    The watchdog has no thread: the caller polls it with `check_expired`.
 
     Args:
-        patience_s: Maximum time between heartbeats; None disables the watchdog.
+        patience_s: Maximum time between heartbeats in seconds; None disables the watchdog.
     """
 
     def __init__(self, patience_s: float | None) -> None:
@@ -57,34 +59,44 @@ class Watchdog:
     def record_heartbeat(self, program: ProgramId, now: float, *, watch: bool) -> None:
         """Record a heartbeat.
 
-        ``watch`` is True if further ones are expected (the program requested an action).
+        Args:
+            program: Sender of the heartbeat.
+            now: Time on the clock.
+            watch: True to monitor the program from now on, because it has requested an action.
         """
         if self.patience_s is not None and (watch or program in self._heard):
             self._heard[program] = now
 
     def record_start(self, task: Task) -> None:
-        """Record that a task uses its resources, so that an earlier motion of them no longer continues."""
+        """Record that a task has started, which ends earlier motions that use the same resources."""
         for used in task.uses:
             self._going_on.pop(used, None)
 
     def record_success(self, task: Task) -> None:
-        """Record that a task succeeded. After a speed, its resources continue to move."""
+        """Record that a task has succeeded, after which its motion may continue.
+
+        See `Task.continues_after_success`.
+        """
         if task.continues_after_success and task.program is not None:
             self._going_on |= dict.fromkeys(task.uses, task.program)
 
     def reset(self) -> None:
-        """Remove all programs, because the robot was stopped."""
+        """Remove all programs after a stop of the robot."""
         self._heard.clear()
         self._going_on.clear()
 
     def deadlines(self) -> list[float]:
-        """Return the times at which programs count as silent."""
+        """Return the times on the clock at which the monitored programs count as silent."""
         return [] if self.patience_s is None else [seen + self.patience_s for seen in self._heard.values()]
 
     def check_expired(self, now: float, acting: Collection[ProgramId | None]) -> bool:
-        """Return True if the robot must stop; ``acting`` are the programs of running and queued tasks.
+        """Return True if a silent program has a task or a continuing motion, so that the robot must stop.
 
-        Silent programs without a task are removed: they may have ended long ago.
+        All silent programs are removed; those without a task may have ended long ago.
+
+        Args:
+            now: Time on the clock.
+            acting: Programs of running and queued tasks.
         """
         if self.patience_s is None:
             return False
@@ -95,10 +107,10 @@ class Watchdog:
 
 
 class _PendingStop(NamedTuple):
-    """Stop that has not been replied to."""
+    """Stop whose requester waits for the reply."""
 
     run: int
-    """Number of the run of the stop function that the stop waits for."""
+    """Number of the run of the stop function that serves this stop."""
     limit_s: float
     reply: Callable[[TaskReply], None]
 
@@ -110,12 +122,12 @@ class Tasks:
         name: Name of the robot.
         stop: Stop function of the robot.
         clock: Clock.
-        within_s: Time within which the robot stops.
-        watchdog_s: Maximum time between heartbeats of a program; None disables the watchdog.
-        beat: Called twice a second in the thread of the tasks while a task is running or queued or a stop has
-            not succeeded, with the actions that keep running although they were asked to end and a message
-            about them; and once more when the last one has ended. A failed stop of the watchdog is included
-            until a stop succeeds, because there is no other reply to it.
+        within_s: Time in seconds within which the robot stops.
+        watchdog_s: Maximum time between heartbeats of a program in seconds; None disables the watchdog.
+        beat: Sends a heartbeat. Called every `HEARTBEAT_INTERVAL_S` while a task is running or queued or a
+            stop has not succeeded. Arguments: names of cancelled actions whose functions are still running,
+            and a message about them or about a failed stop of the watchdog, to which there is no other reply.
+            Called once more when the last of these functions has ended.
     """
 
     def __init__(
@@ -159,7 +171,7 @@ class Tasks:
         self._dispatcher.start()
 
     def call_soon(self, what: Callable[[], object]) -> None:
-        """Run a callback in the thread of the tasks."""
+        """Run a callback in the thread of the tasks. Thread-safe."""
         self._dispatcher.post(what)
 
     @property
@@ -174,15 +186,17 @@ class Tasks:
 
     @property
     def epoch(self) -> int:
-        """Number of stops so far. Commands received in an earlier epoch are not executed."""
+        """Number of stops so far. Commands received before the last stop are not executed."""
         return self._epoch
 
     def stop(self, answer: Callable[[TaskReply], None] | None, why: str = "stopped") -> None:
-        """Stop the robot immediately and end all tasks. Thread-safe; does not block. Starts a new `epoch`.
+        """Stop the robot immediately, end all tasks and increment `epoch`. Thread-safe; does not block.
 
-        ``answer`` is called in the thread of the tasks when the robot stands still and every function has
-        ended. Functions that don't end within STOP_ANSWER_S are named in the reply, and no task is accepted
-        until they have ended.
+        Args:
+            answer: Called in the thread of the tasks when the robot stands still and every function has
+                ended. Functions that don't end within STOP_ANSWER_S are named in the reply, and no task is
+                accepted until they have ended. None for no reply.
+            why: Reason in the replies to the tasks.
         """
         with self._lock:
             self._epoch += 1
@@ -200,7 +214,7 @@ class Tasks:
             self._stop_thread.wake()
 
     def close(self) -> None:
-        """Stop the robot, end all tasks and join the threads. A function that never ends is abandoned."""
+        """Stop the robot, end all tasks and join the threads; a function that doesn't end is abandoned."""
         stopped = threading.Event()
 
         def take(answer: TaskReply) -> None:
@@ -217,7 +231,8 @@ class Tasks:
     def submit(self, task: Task) -> None:
         """Run a task as soon as its resources are free.
 
-        If they are in use, the task is rejected or replaces other tasks, as its ``on_busy`` requires.
+        If resources are in use, the task waits, is rejected, or replaces other tasks, according to its
+        `on_busy`.
         """
         if task.epoch is not None and task.epoch < self._epoch:
             self._send_reply(task.finish, _stopped_reply())
@@ -261,9 +276,10 @@ class Tasks:
         self._start_ready()
 
     def cancel(self, wanted: Callable[[Task], bool]) -> str | None:
-        """End the tasks for which ``wanted`` returns True.
+        """Cancel tasks; return None on success, else an error message.
 
-        Return None if there were any, else an error message.
+        Args:
+            wanted: Returns True for a task to cancel.
         """
         found = [task for task in (*self._running, *self._queue) if wanted(task)]
         if not found:
@@ -277,9 +293,11 @@ class Tasks:
         return None
 
     def record_heartbeat(self, program: ProgramId, *, watch: bool) -> None:
-        """Record a heartbeat.
+        """Record a heartbeat of a program.
 
-        ``watch`` is True if further ones are expected (the program requested an action).
+        Args:
+            program: Sender of the heartbeat.
+            watch: True to monitor the program from now on, because it has requested an action.
         """
         self._watchdog.record_heartbeat(program, self._clock.now(), watch=watch)
 
@@ -545,7 +563,12 @@ def _stopped_reply() -> TaskReply:
 
 
 def still_moving_message(name: str, actions: Sequence[str]) -> str:
-    """Return the message about functions that keep running although they were asked to end."""
+    """Return the error message about cancelled functions that are still running.
+
+    Args:
+        name: Name of the robot.
+        actions: Names of the functions' actions.
+    """
     why = ngettext("{actions} is still running", "{actions} are still running", len(actions))
     told = ", ".join(_(STOP_LABEL) if each == STOP_LABEL else each for each in actions)
     return _(MAY_MOVE_MESSAGE).format(robot=name, why=why.format(actions=told))

@@ -1,4 +1,4 @@
-"""Sensors of the virtual Pepper, and its movements, which brake when their action is cancelled."""
+"""Sensors of the virtual Pepper, and helpers for its actions, whose movements brake on cancellation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nep.i18n import _
 _HEAD_ANGLES = {"ahead": (0.0, START_PITCH), "left": (50.0, START_PITCH), "right": (-50.0, START_PITCH)}
 _HEAD_ANGLES |= {"up": (0.0, -25.0), "down": (0.0, 30.0)}
 FEEDBACK_INTERVAL_S = 0.2
-"""Interval between feedback messages in seconds."""
+"""Interval in seconds between two feedback messages of an action."""
 
 TouchablePart: TypeAlias = Literal["head", "left_hand", "right_hand"]
 
@@ -47,9 +47,9 @@ def _face_event(text: str, title: str, rize_word: str) -> EventSpec:
 
 
 class SensorDeclarations:
-    """Declarations of sensors and events.
+    """Declarations of the sensors and events of the virtual Pepper.
 
-    :class:`~app.robots.virtual.simulation.Simulation` publishes them.
+    :class:`~app.robots.virtual.simulation.Simulation` publishes their values.
     """
 
     battery = battery_sensor()
@@ -87,7 +87,7 @@ class SensorDeclarations:
 
 
 class SimulatedActions(SensorDeclarations):
-    """Simulation of the virtual Pepper, and the helpers of its actions."""
+    """Base class of the virtual Pepper: owns the simulation and provides helpers for actions."""
 
     start_room: ClassVar[Room] = Room()
 

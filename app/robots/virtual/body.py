@@ -1,4 +1,4 @@
-"""Body of the virtual Pepper in its room: movements advanced in time steps, without clock and threads."""
+"""Simulated body of the virtual Pepper, advanced in time steps, without clock and threads."""
 
 from __future__ import annotations
 
@@ -21,16 +21,21 @@ _SECONDS_PER_CHARACTER = 0.06
 _MIN_SPEECH_S = 0.6
 _MAX_STEP_S = 0.02
 MIN_TOUCH_S = 0.3
-"""Minimum duration of a touch, so that programs that poll notice a tap."""
+"""Minimum duration of a touch in seconds, so that programs that poll notice a tap."""
 HEARD_DISPLAY_S = 4.0
-"""Time for which the room shows what the user said to the robot."""
+"""Time in seconds for which the drawing shows a word that the user said to the robot."""
 _DRAIN_PER_S = 1 / 180  # % of the battery, standing
 _DRAIN_MOVING_PER_S = 1 / 60
 
 
 @dataclass(frozen=True)
 class BodyEvent:
-    """Event in the robot's description, with its data."""
+    """Event to publish.
+
+    Attributes:
+        event: Name of the event in the robot's description.
+        data: Fields of the event.
+    """
 
     event: str
     data: dict[str, object]
@@ -38,7 +43,14 @@ class BodyEvent:
 
 @dataclass
 class Speech:
-    """Text being spoken; ``done`` is True after the last word."""
+    """Text being spoken.
+
+    Attributes:
+        text: Text.
+        duration_s: Total duration in seconds.
+        spoken_s: Time in seconds since the start.
+        done: True after the last word, or if the speech was interrupted.
+    """
 
     text: str
     duration_s: float
@@ -47,12 +59,17 @@ class Speech:
 
     @classmethod
     def from_text(cls, text: str, speed_percent: float = 100.0) -> Speech:
-        """Return a speech with a duration that depends on the length of the text."""
+        """Return a speech whose duration depends on the length of the text.
+
+        Args:
+            text: Text.
+            speed_percent: Speed relative to normal speech.
+        """
         return cls(text, max(_MIN_SPEECH_S, len(text) * _SECONDS_PER_CHARACTER) * 100.0 / speed_percent)
 
     @property
     def word(self) -> str:
-        """Word being spoken now."""
+        """Word that is currently spoken; "" for an empty text."""
         words = self.text.split()
         place = int(len(words) * min(0.999, self.spoken_s / self.duration_s))
         return words[place] if words else ""
@@ -60,7 +77,7 @@ class Speech:
 
 @dataclass
 class Body:
-    """State of the body. Not thread-safe: hold the owner's lock around every call."""
+    """Simulated body in its room. Not thread-safe: hold the owner's lock around every call."""
 
     room: Room = field(default_factory=Room)
     x: float = START_POSE[0]
@@ -79,19 +96,19 @@ class Body:
     emotion: str = "neutral"
     battery: float = 84.4
     touched: dict[str, float] = field(default_factory=dict)
-    """Touched places, and the duration of each touch in seconds."""
+    """Durations of the current touches in seconds, by touched part such as "head"."""
     last_word: str = ""
     since_last_word_s: float = HEARD_DISPLAY_S
-    """Seconds since the robot heard `heard`."""
+    """Time in seconds since the robot heard the word in `last_word`."""
     volume: int = 60
     language: str = "en"
     is_lifted: bool = False
-    """True while the user lifts the robot, so that its base doesn't move."""
+    """True while the user has lifted the robot, so that its base doesn't move."""
     events: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _base: Motion | None = field(default=None, repr=False)
     _is_turning: bool = field(default=False, repr=False)
     sound: Sound | None = None
-    """Sound being played."""
+    """Sound that is being played, or None."""
     _sounds: int = field(default=0, repr=False)
     _speech: Speech | None = field(default=None, repr=False)
     _waves: list[Wave] = field(default_factory=list, repr=False)
@@ -100,11 +117,21 @@ class Body:
     # ---- commands ---------------------------------------------------------------------------
 
     def walk(self, distance: float, speed: float) -> Motion:
-        """Start to drive straight; backwards if the distance is negative."""
+        """Start driving straight.
+
+        Args:
+            distance: Distance in m; negative to drive backwards.
+            speed: Speed in m/s.
+        """
         return self._start(Motion.walk(distance, speed), turning=False)
 
     def turn(self, angle_deg: float, speed_deg: float) -> Motion:
-        """Start to turn on the spot; to the left if the angle is positive."""
+        """Start turning on the spot.
+
+        Args:
+            angle_deg: Angle in degrees, positive to the left.
+            speed_deg: Turning speed in °/s.
+        """
         return self._start(Motion.turn(angle_deg, speed_deg), turning=True)
 
     def _start(self, motion: Motion, *, turning: bool) -> Motion:
@@ -114,13 +141,13 @@ class Body:
         return motion
 
     def speak(self, text: str, speed_percent: float = 100.0) -> Speech:
-        """Start to speak; a current speech or sound ends."""
+        """Start speaking a text; a current speech or sound ends."""
         self.stop_audio()
         self._speech = Speech.from_text(text, speed_percent)
         return self._speech
 
     def stop_audio(self) -> None:
-        """Stop speech and sound."""
+        """Stop the current speech and sound."""
         if self._speech is not None:
             self._speech.done = True
             self._speech = None
@@ -129,26 +156,38 @@ class Body:
             self.sound = None
 
     def play(self, title: str, notes: Notes) -> Sound:
-        """Start to play notes; a current speech or sound ends."""
+        """Start playing a sound; a current speech or sound ends.
+
+        Args:
+            title: Display name of the sound.
+            notes: Notes to play.
+        """
         self.stop_audio()
         self._sounds += 1
         self.sound = Sound(self._sounds, title, notes)
         return self.sound
 
     def wave(self, side: str) -> Wave:
-        """Start to wave with the left or right hand."""
+        """Start waving with a hand.
+
+        Args:
+            side: "left" or "right".
+        """
         made = Wave(self.arms[side], self.elbows[side])
         self._waves.append(made)
         return made
 
     def stand(self) -> None:
-        """Lower the arms and look straight ahead."""
+        """Lower the arms and turn the head to its start position."""
         for joint in (*self.arms.values(), *self.elbows.values(), self.head_yaw):
             joint.set_target(0.0)
         self.head_pitch.set_target(START_PITCH)
 
     def halt(self) -> None:
-        """Stop everything: the base brakes in the next steps, all other movements end immediately."""
+        """Stop everything: the base brakes in the next steps, all other movements end immediately.
+
+        The emotion becomes neutral.
+        """
         if self._base is not None:
             self._base.halt()
         for wave in self._waves:
@@ -158,12 +197,12 @@ class Body:
         self.emotion = "neutral"
 
     def hold_joints(self) -> None:
-        """Hold head and arms at their current angles."""
+        """Stop head and arms at their current angles."""
         for joint in self._joints():
             joint.hold()
 
     def reset(self, room: Room) -> None:
-        """Stop everything and return to the start position in this room."""
+        """Stop everything, enter a room, and return to the start position or the nearest free one."""
         self.halt()
         if self._base is not None:
             self._base.block()
@@ -179,17 +218,17 @@ class Body:
 
     @property
     def are_joints_at_target(self) -> bool:
-        """True when head and arms have reached their targets."""
+        """True if head and arms have reached their targets."""
         return all(joint.is_at_target for joint in self._joints())
 
     @property
     def speech(self) -> str | None:
-        """Text in the speech bubble."""
+        """Text that is being spoken, or None."""
         return None if self._speech is None else self._speech.text
 
     @property
     def spoken_fraction(self) -> float:
-        """Spoken part of the text, 0 to 1."""
+        """Spoken fraction of the text, 0 to 1."""
         return 0.0 if self._speech is None else min(1.0, self._speech.spoken_s / self._speech.duration_s)
 
     @property
@@ -199,19 +238,24 @@ class Body:
 
     @property
     def is_still(self) -> bool:
-        """True when nothing moves."""
+        """True if neither base nor joints move."""
         return not self.is_rolling and not self._waves and self.are_joints_at_target
 
     @property
     def distance(self) -> float:
-        """Distance from the edge of the base to the next obstacle ahead, at most 5 m."""
+        """Distance in m from the edge of the base to the next obstacle ahead, at most 5 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(MAX_DISTANCE_M, max(0.0, ahead))
 
     # ---- the user's actions ------------------------------------------------------------------------
 
     def touch(self, place: str, *, down: bool) -> None:
-        """Start or end a touch; a tap lasts at least `TOUCH_LEAST_S`."""
+        """Start or end a touch, which lasts at least `MIN_TOUCH_S`.
+
+        Args:
+            place: Touched part, such as "head".
+            down: True to start the touch, False to end it.
+        """
         if down:
             self._ending_touches.discard(place)
             if place not in self.touched:
@@ -230,29 +274,37 @@ class Body:
                 self.events.append(BodyEvent("released", {"place": place}))
 
     def set_lifted(self, *, held: bool) -> None:
-        """Lift the robot or put it down. Interrupted movements continue afterwards."""
+        """Lift the robot or put it down; interrupted movements continue after that.
+
+        Args:
+            held: True to lift the robot.
+        """
         self.is_lifted = held
 
     def carry(self, x: float, y: float) -> None:
-        """Move the robot to a place if that is free. Walls limit the movement."""
+        """Move the lifted robot to a position in m, limited by walls; it stays in place if blocked."""
         place = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
         if place is not None:
             self.set_position(*place)
 
     def set_position(self, x: float, y: float) -> None:
-        """Set the position of the robot."""
+        """Set the position of the robot in m; overlapping balls are pushed aside."""
         self.x, self.y = x, y
         self.room = self.room.with_pushed_ball(x, y, RADIUS)
 
     def hear(self, word: str) -> None:
-        """Process a word that the user said."""
+        """Process a word that the user said to the robot."""
         self.last_word, self.since_last_word_s = word, 0.0
         self.events.append(BodyEvent("heard", {"word": word}))
 
     # ---- time -------------------------------------------------------------------------------------
 
     def step(self, seconds: float) -> None:
-        """Advance the simulation in small steps, so that the robot can't pass through objects."""
+        """Advance the simulation in steps that are small enough to detect collisions.
+
+        Args:
+            seconds: Duration in seconds.
+        """
         while seconds > 1e-9:
             dt = min(seconds, _MAX_STEP_S)
             seconds -= dt
@@ -260,7 +312,7 @@ class Body:
 
     @property
     def recent_word(self) -> str:
-        """Word heard recently, or ""."""
+        """Word that the robot heard within the last `HEARD_DISPLAY_S` seconds, or ""."""
         return self.last_word if self.since_last_word_s < HEARD_DISPLAY_S else ""
 
     def _step(self, dt: float) -> None:

@@ -1,4 +1,4 @@
-"""Camera of the virtual robot: renders the room as seen from its head, with 320 x 240 pixels."""
+"""Camera of virtual robots: renders the room in perspective, with 320 x 240 pixels."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BOOKS = ("#b5594e", "#4e79b8", "#d7a94a", "#5f8f63", "#8a6aa8", "#d4d0c8")
 
 
 def lens_of(body: Body) -> Lens:
-    """Return the camera's current position and orientation."""
+    """Return the current camera model of the virtual Pepper, whose camera is in its head."""
     yaw = body.theta_deg + body.head_yaw.angle
     x = body.x + EYE_FORWARD * math.cos(math.radians(yaw))
     y = body.y + EYE_FORWARD * math.sin(math.radians(yaw))
@@ -28,7 +28,11 @@ def lens_of(body: Body) -> Lens:
 
 
 class Camera:
-    """Renderer for one room. Parts that never move are rendered once."""
+    """Renderer for one room. The textures of walls, floor and ceiling are created once.
+
+    Args:
+        room: Room, whose walls never change.
+    """
 
     def __init__(self, room: Room) -> None:
         self._floor = scenery.floor(room)
@@ -41,7 +45,15 @@ class Camera:
         self._light = _vignette(320, 240)
 
     def picture(self, room: Room, lens: Lens) -> Picture:
-        """Render the view: uint8 (240, 320, 3), BGR."""
+        """Render the view of a camera.
+
+        Args:
+            room: Current state of the room.
+            lens: Camera model.
+
+        Returns:
+            BGR image, uint8 of shape (240, 320, 3).
+        """
         canvas = Canvas(lens)
         self._paint_shell(canvas, room)
         self._paint_shadows(canvas, room)
@@ -146,7 +158,7 @@ def _distance(thing: _Drawable, lens: Lens) -> float:
 
 
 def right_vector(lens: Lens, x: float, y: float) -> Matrix:
-    """Return the horizontal unit vector to the right of the line from the camera to a place."""
+    """Return the horizontal unit vector to the right, as seen by the camera when facing a point in m."""
     dx, dy = x - lens.position[0], y - lens.position[1]
     length = math.hypot(dx, dy) or 1.0
     return np.array([dy / length, -dx / length, 0.0])

@@ -1,4 +1,4 @@
-"""Drawing of textures on parallelograms in the room, in the perspective of the camera, with OpenCV."""
+"""Drawing of textured parallelograms in the perspective of the virtual camera, with OpenCV."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ _SHIFT = 4  # fractional bits of polygon corners
 
 
 class Texture:
-    """Image (height, width, 3 or 4: BGR and straight alpha) with mipmap levels."""
+    """Image with mipmap levels.
+
+    Args:
+        picture: Image of shape (height, width, 3) in BGR, or (height, width, 4) with straight alpha.
+    """
 
     def __init__(self, picture: Picture) -> None:
         self.has_alpha = picture.shape[2] == 4
@@ -29,7 +33,11 @@ class Texture:
             self.levels.append(picture)
 
     def level_for(self, shrink: float) -> Picture:
-        """Return the mipmap level for ``shrink`` texels of the full image per pixel."""
+        """Return the mipmap level for a scale.
+
+        Args:
+            shrink: Number of texels of the full image per screen pixel.
+        """
         level = round(np.log2(max(1.0, shrink)))
         return self.levels[min(int(level), len(self.levels) - 1)]
 
@@ -41,14 +49,23 @@ def _premultiply_alpha(picture: Picture) -> Picture:
 
 
 class Canvas:
-    """Image being rendered with the painter's algorithm, from far to near."""
+    """Image that is rendered with the painter's algorithm: draw distant objects first.
+
+    Args:
+        lens: Camera model.
+    """
 
     def __init__(self, lens: Lens) -> None:
         self.lens = lens
         self.picture: Picture = np.zeros((lens.height, lens.width, 3), dtype=np.uint8)
 
     def fill(self, points: Matrix, colour: tuple[int, int, int]) -> None:
-        """Draw a polygon in room coordinates in one colour."""
+        """Draw a polygon in one colour.
+
+        Args:
+            points: Corners in room coordinates, shape (n, 3).
+            colour: Colour as BGR.
+        """
         outline = self.lens.outline(points)
         if len(outline) >= 3:
             cv2.fillConvexPoly(self.picture, _to_fixed_point(outline), colour, cv2.LINE_AA, _SHIFT)
@@ -56,7 +73,14 @@ class Canvas:
     def draw_texture(
         self, texture: Texture, corner: Sequence[float], across: Sequence[float], along: Sequence[float]
     ) -> None:
-        """Draw a texture on a parallelogram: its upper left `corner` and its sides in metres."""
+        """Draw a texture on a parallelogram.
+
+        Args:
+            texture: Texture.
+            corner: Upper left corner in room coordinates.
+            across: Vector of the upper side in m.
+            along: Vector of the left side in m.
+        """
         start, right, down = (np.asarray(vector, dtype=np.float64) for vector in (corner, across, along))
         outline = self.lens.outline(np.stack([start, start + right, start + right + down, start + down]))
         box = self._clipped_bounds(outline)

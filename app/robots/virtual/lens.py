@@ -1,4 +1,4 @@
-"""Pinhole model of the virtual camera: points in the room to pixels."""
+"""Pinhole model of the virtual camera: projection of points in the room to pixels."""
 
 from __future__ import annotations
 
@@ -16,9 +16,15 @@ NEAR_PLANE_M = 0.06
 
 @dataclass(frozen=True)
 class Lens:
-    """Camera at ``place`` (m).
+    """Pinhole camera model.
 
-    ``yaw_deg`` is positive to the left, ``pitch_deg`` positive down.
+    Attributes:
+        position: Position x, y, z in m.
+        yaw_deg: Direction in degrees, positive to the left.
+        pitch_deg: Inclination in degrees, positive downwards.
+        width: Width of the image in pixels.
+        height: Height of the image in pixels.
+        hfov_deg: Horizontal field of view in degrees.
     """
 
     position: tuple[float, float, float]
@@ -35,26 +41,30 @@ class Lens:
 
     @cached_property
     def rotation(self) -> Matrix:
-        """Rotation from room to camera coordinates; rows: right, down, forward."""
+        """Rotation matrix from room to camera coordinates, with the rows right, down and forward."""
         yaw, up = math.radians(self.yaw_deg), math.radians(-self.pitch_deg)
         forward = np.array([math.cos(yaw) * math.cos(up), math.sin(yaw) * math.cos(up), math.sin(up)])
         right = np.array([math.sin(yaw), -math.cos(yaw), 0.0])
         return np.stack([right, np.cross(forward, right), forward])
 
     def to_camera(self, points: Matrix) -> Matrix:
-        """Transform points (n, 3) from room to camera coordinates: right, down, forward in metres."""
+        """Transform points (n, 3) from room to camera coordinates: right, down and forward in m."""
         seen: Matrix = (points - np.asarray(self.position)) @ self.rotation.T
         return seen
 
     def to_pixels(self, seen: Matrix) -> Matrix:
-        """Project camera points (n, 3) in front of the camera to pixels (n, 2)."""
+        """Project points (n, 3) in camera coordinates, all in front of the camera, to pixels (n, 2)."""
         scale = self.focal / seen[:, 2]
         return np.stack([seen[:, 0] * scale + self.width / 2, seen[:, 1] * scale + self.height / 2], axis=1)
 
     def outline(self, points: Matrix) -> Matrix:
-        """Return the pixels (n, 2) of the part of a flat polygon in front of the camera.
+        """Project a flat polygon to pixels, clipped to the space in front of the camera.
 
-        Empty if there is none.
+        Args:
+            points: Corners in room coordinates, shape (m, 3).
+
+        Returns:
+            Pixels of shape (n, 2); n is 0 if nothing is in front of the camera.
         """
         clipped = _clip_to_near_plane(self.to_camera(points))
         return self.to_pixels(clipped) if len(clipped) else np.empty((0, 2))
@@ -62,7 +72,14 @@ class Lens:
     def texture_to_pixels(
         self, corner: Matrix, across: Matrix, along: Matrix, size: tuple[int, int]
     ) -> Matrix:
-        """Return the homography from a texture (width, height) on a parallelogram in the room to pixels."""
+        """Return the homography from the pixels of a texture on a parallelogram in the room to image pixels.
+
+        Args:
+            corner: Upper left corner in room coordinates.
+            across: Vector of the upper side in m.
+            along: Vector of the left side in m.
+            size: Width and height of the texture in pixels.
+        """
         columns = [across / size[0], along / size[1], corner - np.asarray(self.position)]
         seen = self.rotation @ np.stack(columns, axis=1)
         half = np.array([[self.focal, 0, self.width / 2], [0, self.focal, self.height / 2], [0, 0, 1]])

@@ -1,6 +1,6 @@
-"""Movements of the virtual body as state machines advanced in time steps, without clock and threads.
+"""Movements of the virtual body as state machines that are advanced in time steps, without clock and threads.
 
-Advance a movement until it is ``done``; ``halt`` makes it brake.
+Call ``step`` until ``done`` is True; ``halt`` makes a movement brake.
 """
 
 from __future__ import annotations
@@ -16,11 +16,16 @@ TURN_BRAKING = 4000.0
 
 @dataclass
 class Motion:
-    """Movement by ``amount`` (m or °, signed) with limited speed and acceleration.
+    """Movement with limited speed and acceleration.
 
     Attributes:
-        moved: Amount moved so far.
-        blocked: True if an obstacle ended the movement.
+        amount: Signed distance in m or angle in degrees.
+        speed: Maximum speed in m/s or °/s.
+        acceleration: Acceleration in m/s² or °/s².
+        braking: Deceleration after `halt`.
+        moved: Signed distance or angle covered so far.
+        done: True after the end of the movement.
+        is_blocked: True if an obstacle ended the movement.
     """
 
     amount: float
@@ -35,17 +40,27 @@ class Motion:
 
     @classmethod
     def walk(cls, distance: float, speed: float) -> Motion:
-        """Return a straight movement; distance in m, speed in m/s."""
+        """Return a straight movement.
+
+        Args:
+            distance: Distance in m; negative for backwards.
+            speed: Speed in m/s.
+        """
         return cls(distance, speed, WALK_ACCELERATION, WALK_BRAKING)
 
     @classmethod
     def turn(cls, angle_deg: float, speed_deg: float) -> Motion:
-        """Return a turn on the spot, to the left if positive; angle in °, speed in °/s."""
+        """Return a turn on the spot.
+
+        Args:
+            angle_deg: Angle in degrees, positive to the left.
+            speed_deg: Turning speed in °/s.
+        """
         return cls(angle_deg, speed_deg, TURN_ACCELERATION, TURN_BRAKING)
 
     @property
     def remaining(self) -> float:
-        """Remaining amount, signed."""
+        """Remaining distance or angle, signed."""
         return self.amount - self.moved
 
     def halt(self) -> None:
@@ -60,12 +75,16 @@ class Motion:
         self._velocity = 0.0
 
     def pause(self) -> bool:
-        """Pause the movement immediately; return False if it is braking and must not be paused."""
+        """Set the speed to 0 and return True if the movement may be paused; False while it brakes."""
         self._velocity = 0.0
         return not self._is_halting
 
     def step(self, dt: float) -> float:
-        """Advance by ``dt`` seconds and return the signed distance."""
+        """Advance the movement and return the signed distance or angle covered.
+
+        Args:
+            dt: Duration in seconds.
+        """
         if self.done:
             return 0.0
         if self._is_halting:
@@ -87,7 +106,15 @@ class Motion:
 
 @dataclass
 class Joint:
-    """Angle that approaches its target with limited speed (°/s) within its limits (°)."""
+    """Joint that approaches its target angle with limited speed.
+
+    Attributes:
+        speed: Maximum speed in °/s.
+        low: Smallest angle in degrees.
+        high: Largest angle in degrees.
+        angle: Current angle in degrees.
+        target: Target angle in degrees.
+    """
 
     speed: float
     low: float
@@ -96,11 +123,11 @@ class Joint:
     target: float = 0.0
 
     def set_target(self, target: float) -> None:
-        """Set the target, clamped to the limits."""
+        """Set the target angle in degrees, clamped to the limits."""
         self.target = min(max(target, self.low), self.high)
 
     def hold(self) -> None:
-        """Set the target to the current angle."""
+        """Stop the joint at its current angle."""
         self.target = self.angle
 
     @property
@@ -109,7 +136,7 @@ class Joint:
         return self.angle == self.target
 
     def step(self, dt: float) -> None:
-        """Advance by ``dt`` seconds."""
+        """Advance the joint by ``dt`` seconds."""
         way = self.target - self.angle
         reach = self.speed * dt
         self.angle = self.target if abs(way) <= reach else self.angle + math.copysign(reach, way)
@@ -117,7 +144,7 @@ class Joint:
 
 @dataclass
 class Wave:
-    """Greeting with one arm: up, three waves with the elbow, down."""
+    """Waving of one arm: raise it, move the elbow three times, lower it."""
 
     arm: Joint
     elbow: Joint
@@ -127,7 +154,10 @@ class Wave:
     )
 
     def step(self) -> None:
-        """Set the next pose as target once both joints have arrived; the body advances the joints."""
+        """Set the target angles of the next pose once both joints have arrived.
+
+        The body advances the joints.
+        """
         if self.done or not (self.arm.is_at_target and self.elbow.is_at_target):
             return
         if not self._poses:
@@ -138,7 +168,7 @@ class Wave:
         self.elbow.set_target(elbow)
 
     def halt(self) -> None:
-        """Stop the arm at its current angles."""
+        """Stop the arm at its current angles and end the wave."""
         self.arm.hold()
         self.elbow.hold()
         self.done = True

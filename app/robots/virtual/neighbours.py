@@ -1,4 +1,4 @@
-"""Positions of the virtual robots that share a room."""
+"""Positions of the other virtual robots in the shared room."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ from app.robots.driver.call import Clock
 from app.robots.virtual.room import OtherRobot
 
 PRESENCE_TIMEOUT_S = 1.5
-"""Time without messages after which a robot counts as gone."""
+"""Time in seconds without messages after which a robot counts as gone."""
 IDLE_PUBLISH_INTERVAL_S = 0.2
-"""Interval of position messages of a robot that doesn't move."""
+"""Interval in seconds of the position messages of a robot that doesn't move."""
 MAX_COUNT = 12
 
 
 class Neighbours:
-    """Other robots in the room. Not thread-safe: hold the owner's lock around every call."""
+    """Other robots in the shared room. Not thread-safe: hold the owner's lock around every call.
+
+    Args:
+        name: Name of this robot.
+        clock: Monotonic clock.
+        began_ns: Start time of this robot (ns since 1970); default: now.
+    """
 
     def __init__(self, name: str, clock: Clock, began_ns: int | None = None) -> None:
         self._name, self._clock = name, clock
@@ -27,7 +33,7 @@ class Neighbours:
         self._told_s = -math.inf
 
     def receive(self, message: Mapping[str, object]) -> None:
-        """Process a position message; invalid messages and those of this robot are ignored."""
+        """Process a position message; invalid messages and messages of this robot are ignored."""
         other = _parse_position(message)
         if other is None or other.name == self._name:
             return
@@ -37,13 +43,20 @@ class Neighbours:
         self._seen[other.name] = (other, self._clock.now(), began if isinstance(began, int) else 0)
 
     def present_robots(self) -> tuple[OtherRobot, ...]:
-        """Return the robots that are currently present."""
+        """Return the other robots that are currently in the room."""
         since = self._clock.now() - PRESENCE_TIMEOUT_S
         self._seen = {name: seen for name, seen in self._seen.items() if seen[1] >= since}
         return tuple(other for other, _at, _began in self._seen.values())
 
     def must_give_way(self, x: float, y: float, radius: float, ignored: Collection[str] = ()) -> bool:
-        """Return True if this robot overlaps another one (not ``ignored``) that was there first."""
+        """Return True if this robot overlaps a robot that was started earlier, and therefore must move away.
+
+        Args:
+            x: Position of this robot in m.
+            y: Position of this robot in m.
+            radius: Radius of this robot in m.
+            ignored: Names of robots to ignore.
+        """
         return any(
             other.name not in ignored
             and math.hypot(other.x - x, other.y - y) < other.radius + radius
@@ -52,7 +65,14 @@ class Neighbours:
         )
 
     def publish_position(self, me: OtherRobot, publish: Callable[[Mapping[str, object]], None]) -> None:
-        """Publish the position of this robot: immediately if it changed, otherwise at intervals."""
+        """Publish the position of this robot: immediately if it has changed, otherwise at intervals.
+
+        The interval is `IDLE_PUBLISH_INTERVAL_S`.
+
+        Args:
+            me: This robot with its current position.
+            publish: Publishes a message.
+        """
         now = self._clock.now()
         if me != self._told or now - self._told_s >= IDLE_PUBLISH_INTERVAL_S:
             self._told, self._told_s = me, now

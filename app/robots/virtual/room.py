@@ -1,7 +1,6 @@
 """Room of the virtual robots: walls, furniture and movable objects.
 
-Lengths are in metres; x grows to the east, y to the north, z up. Angles are in degrees, counter-clockwise, 0
-is east.
+Lengths are in metres; x points east, y north and z up. Angles are in degrees, counter-clockwise from east.
 """
 
 from __future__ import annotations
@@ -19,11 +18,15 @@ WALLS: tuple[Wall, ...] = ("north", "south", "east", "west")
 
 @dataclass(frozen=True)
 class Opening:
-    """Flat object on a wall.
+    """Door, window or other flat object on a wall.
 
     Attributes:
+        kind: "door", "window", "board" or "picture".
+        wall: Wall of the object.
         at: x or y of the centre.
+        width: Width in m.
         bottom: Height of the lower edge above the floor.
+        height: Height of the object itself in m.
     """
 
     kind: str
@@ -36,7 +39,17 @@ class Opening:
 
 @dataclass(frozen=True)
 class Box:
-    """Furniture aligned with the walls, which blocks robots and hides objects behind it."""
+    """Piece of furniture aligned with the walls, which blocks robots and hides objects behind it.
+
+    Attributes:
+        kind: "table" or "shelf".
+        x: x of the centre.
+        y: y of the centre.
+        width: Size along x.
+        depth: Size along y.
+        height: Size along z.
+        name: Unique name.
+    """
 
     kind: str
     x: float
@@ -65,13 +78,13 @@ class Ball:
 
     @property
     def z(self) -> float:
-        """Height of the centre."""
+        """Height of the centre above the floor."""
         return self.radius
 
 
 @dataclass(frozen=True)
 class Person:
-    """Standing person who looks towards the robot."""
+    """Standing person who looks towards the camera."""
 
     name: str
     x: float
@@ -81,7 +94,7 @@ class Person:
 
     @property
     def face_z(self) -> float:
-        """Height of the centre of the face."""
+        """Height of the centre of the face above the floor."""
         return self.height - 0.5 * self.face_height
 
     @property
@@ -97,10 +110,13 @@ class Person:
 
 @dataclass(frozen=True)
 class Marker:
-    """ArUco card (dictionary 4x4, 50); ``size`` is that of the printed square without its white border.
+    """ArUco card (dictionary 4x4, 50).
 
-    A card on a wall faces one direction (``facing_deg``); one that stands in the room (None) is visible from
-    everywhere.
+    Attributes:
+        id: Number of the marker.
+        size: Side length of the printed square, without its white border.
+        facing_deg: Direction of a card on a wall; None for a card that stands in the room and is visible from
+            everywhere.
     """
 
     id: int
@@ -112,13 +128,13 @@ class Marker:
 
     @property
     def name(self) -> str:
-        """Name by which the robot reports the marker."""
+        """Unique name, such as "marker 7", which detections use too."""
         return f"marker {self.id}"
 
 
 @dataclass(frozen=True)
 class OtherRobot:
-    """Another robot in the room: an upright cylinder that blocks this one and is visible to it."""
+    """Another robot in the room: an upright cylinder that blocks this robot and is visible to its camera."""
 
     name: str
     x: float
@@ -135,7 +151,7 @@ _Round: TypeAlias = Person | OtherRobot
 
 @dataclass(frozen=True)
 class Room:
-    """Everything around the robot at one moment. Immutable."""
+    """State of the room at one moment: walls, furniture, objects and other robots. Immutable."""
 
     x_min: float = -2.5
     x_max: float = 3.0
@@ -160,13 +176,15 @@ class Room:
 
     @property
     def things(self) -> tuple[Thing, ...]:
-        """Movable objects, which have unique names."""
+        """Movable objects, all of which have unique names."""
         return (*self.balls, *self.people, *self.markers, *self.boxes)
 
     def thing(self, name: str) -> Thing | None:
-        """Return the object with this name, or the first one of this kind.
+        """Return an object by name or kind; None if there is none.
 
-        A name is, for example, ``ball 2``; kinds are ``ball``, ``person``, ``face`` and ``marker``.
+        Args:
+            name: Name, such as ``ball 2``, or a kind (``ball``, ``person``, ``face`` or ``marker``) for the
+                first object of this kind.
         """
         named = next((thing for thing in self.things if thing.name == name), None)
         kinds: dict[str, Sequence[Thing]] = {
@@ -178,9 +196,16 @@ class Room:
         return named or next(iter(kinds.get(name, ())), None)
 
     def is_free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
-        """Return True if a disc on the floor is free of obstacles, except balls, which roll away.
+        """Return True if a disc on the floor doesn't overlap obstacles.
 
-        If the position ``before`` overlaps an obstacle, movements away from the obstacle are allowed.
+        Balls are no obstacles: they roll away.
+
+        Args:
+            x: Centre of the disc.
+            y: Centre of the disc.
+            radius: Radius of the disc.
+            before: Previous position. If it overlaps an obstacle, positions farther from the obstacle are
+                free.
         """
         if not (
             self.x_min + radius <= x <= self.x_max - radius
@@ -201,7 +226,7 @@ class Room:
         )
 
     def nearest_free(self, x: float, y: float, radius: float) -> tuple[float, float]:
-        """Return the free position nearest to a point, or the point itself if there is none."""
+        """Return the free position of a disc nearest to a point, or the point itself if there is none."""
         x, y = self.clamped_position(x, y, radius)
         for away in range(60):
             for turn in range(1 if away == 0 else 16):
@@ -214,7 +239,7 @@ class Room:
         return x, y
 
     def distance_ahead(self, x: float, y: float, theta_deg: float) -> float:
-        """Return the distance to the nearest wall, person, robot or furniture in a direction."""
+        """Return the distance from a point to the nearest wall, person, robot or furniture in a direction."""
         dx, dy = math.cos(math.radians(theta_deg)), math.sin(math.radians(theta_deg))
         rounds: tuple[_Round, ...] = (*self.people, *self.other_robots)
         hits = [
@@ -225,7 +250,7 @@ class Room:
         return min(hits)
 
     def is_hidden(self, eye: tuple[float, float, float], target: tuple[float, float, float]) -> bool:
-        """Return True if furniture or a robot is between two points."""
+        """Return True if furniture or a robot blocks the line of sight between two points (x, y, z)."""
         ex, ey, ez = eye
         dx, dy, dz = target[0] - ex, target[1] - ey, target[2] - ez
         length = math.hypot(dx, dy)
@@ -242,9 +267,14 @@ class Room:
         return False
 
     def with_moved(self, name: str, x: float, y: float) -> Room:
-        """Return the room with an object moved, within the walls; unchanged if the object doesn't exist.
+        """Return the room with an object moved; unchanged if the object doesn't exist.
 
-        A marker near a wall is attached to the wall.
+        The position is limited to the room. A marker near a wall is attached to the wall.
+
+        Args:
+            name: Name of the object.
+            x: New position.
+            y: New position.
         """
         thing = self.thing(name)
         match thing:
@@ -267,7 +297,7 @@ class Room:
         return self
 
     def with_pushed_ball(self, x: float, y: float, radius: float) -> Room:
-        """Return the room after a disc at (x, y) has pushed overlapping balls aside."""
+        """Return the room after a disc at (x, y) has pushed aside the balls that it overlaps."""
         room = self
         for ball in self.balls:
             away_x, away_y = ball.x - x, ball.y - y
@@ -298,9 +328,15 @@ class Room:
     def carried_position(
         self, x: float, y: float, radius: float, at: tuple[float, float]
     ) -> tuple[float, float] | None:
-        """Return where a body at position ``at`` ends up when it is carried to (x, y); None if it is blocked.
+        """Return the position that a carried robot reaches; None if obstacles block it.
 
-        The body stops at walls and slides along obstacles.
+        The robot stops at walls and slides along obstacles.
+
+        Args:
+            x: Target position.
+            y: Target position.
+            radius: Radius of the robot.
+            at: Current position of the robot.
         """
         place = self.clamped_position(x, y, radius)
         for to in (place, (place[0], at[1]), (at[0], place[1])):
@@ -311,7 +347,14 @@ class Room:
     def clamped_position(
         self, x: float, y: float, half: float, deep: float | None = None
     ) -> tuple[float, float]:
-        """Return the nearest position at which an object of this half size is within the walls."""
+        """Return the nearest position at which an object is completely within the walls.
+
+        Args:
+            x: Centre of the object.
+            y: Centre of the object.
+            half: Half of the size along x.
+            deep: Half of the size along y (default: `half`).
+        """
         deep = half if deep is None else deep
         return (
             min(max(x, self.x_min + half), self.x_max - half),

@@ -1,8 +1,8 @@
 """Replicated map of the objects in the shared room: a last-writer-wins register for each object.
 
-Each object has the time (ns since 1970) of its last change. A participant that changes an object publishes
-the whole map on `TOPIC`; receivers merge newer entries. So all participants converge to the same room in any
-order of messages, without an owner (ADR 0022).
+Each object has the time of its last change. A participant that changes an object publishes the whole map on
+`TOPIC`; receivers merge newer entries. All participants therefore converge to the same room, whatever the
+order of messages, and no participant owns the room (ADR 0022).
 """
 
 from __future__ import annotations
@@ -28,7 +28,16 @@ _MAX_COORDINATE_M = 100.0
 
 @dataclass(frozen=True, slots=True)
 class MapEntry:
-    """Object in the map: kind, position (m), ``gone`` if it was removed, and the time of the change (ns)."""
+    """Entry of an object in the map.
+
+    Attributes:
+        name: Unique name.
+        kind: One of `KINDS`.
+        x: Position in m.
+        y: Position in m.
+        changed_ns: Time of the last change (ns since 1970).
+        gone: True if the object was removed.
+    """
 
     name: str
     kind: str
@@ -39,12 +48,12 @@ class MapEntry:
 
     @property
     def merge_key(self) -> tuple[int, bool, float, float]:
-        """Merge key: of two entries for the same object, the greater one wins."""
+        """Merge key: of two entries for the same object, the entry with the greater key wins."""
         return self.changed_ns, self.gone, self.x, self.y
 
 
 def kind_of(thing: Thing) -> str:
-    """Return the kind of an object, as in maps and drawings."""
+    """Return the kind of an object in maps and drawings, such as "ball"."""
     match thing:
         case Ball():
             return "ball"
@@ -57,7 +66,12 @@ def kind_of(thing: Thing) -> str:
 
 
 class RoomMap:
-    """Objects of the room. Not thread-safe: hold the owner's lock around every call."""
+    """Objects of the shared room. Not thread-safe: hold the owner's lock around every call.
+
+    Args:
+        start: Room at the start (default: `Room()`).
+        clock_ns: Returns the time (ns since 1970).
+    """
 
     def __init__(self, start: Room | None = None, clock_ns: Callable[[], int] = time.time_ns) -> None:
         self.start = start if start is not None else Room()
@@ -72,12 +86,12 @@ class RoomMap:
     # -- local changes ------------------------------------------------------------
 
     def move(self, name: str, x: float, y: float) -> bool:
-        """Move an object within the walls; return True if anything changed."""
+        """Move an object, limited to the room; return True if its position has changed."""
         moved = self.room().with_moved(name, x, y)
         return self.update_positions(moved)
 
     def update_positions(self, room: Room) -> bool:
-        """Copy the positions of all objects in a room; return True if anything changed."""
+        """Update the positions of all objects from a room; return True if any position has changed."""
         changed = False
         for thing in room.things:
             known = self._things.get(thing.name)
@@ -87,7 +101,7 @@ class RoomMap:
         return changed
 
     def add(self, kind: str, x: float, y: float) -> str | None:
-        """Add an object; return its name, or None if the limit for this kind is reached."""
+        """Add an object and return its name; None if there are too many objects of this kind."""
         there = {each.name for each in self._things.values() if not each.gone}
         free = [name for name in _names(kind) if name not in there]
         if not free:
@@ -105,7 +119,7 @@ class RoomMap:
         return True
 
     def restore_start(self) -> None:
-        """Restore the initial state; objects that were added are removed."""
+        """Restore the room at the start; added objects are removed."""
         first = {thing.name: thing for thing in self.start.things}
         for known in list(self._things.values()):
             thing = first.get(known.name)
@@ -123,7 +137,11 @@ class RoomMap:
     # -- replication ------------------------------------------------------------------------------
 
     def merge(self, message: Mapping[str, object]) -> bool:
-        """Merge newer entries of another map; return True if any changed. Invalid entries are ignored."""
+        """Merge newer entries of another participant's map; return True if the map has changed.
+
+        Args:
+            message: Payload created by `RoomMap.message`; invalid entries are ignored.
+        """
         told = message.get("things")
         changed = False
         for thing in _parse_entries(told if isinstance(told, Sequence) and not isinstance(told, str) else ()):
@@ -137,13 +155,13 @@ class RoomMap:
         return changed
 
     def message(self) -> dict[str, object]:
-        """Return the whole map as it is published and saved."""
+        """Return the whole map as a payload for publishing and saving."""
         return {"things": [asdict(thing) for thing in self._things.values()]}
 
     # -- conversion --------------------------------------------------------------------------------
 
     def room(self) -> Room:
-        """Return the room with every object at its current place."""
+        """Return the room with all objects at their current positions."""
         balls, people, markers, boxes = [], [], [], []
         for made in filter(None, map(self._create_thing, self._things.values())):
             match made:

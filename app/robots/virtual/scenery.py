@@ -1,4 +1,4 @@
-"""Textures of the room: walls, floor, furniture and people, rendered once at start."""
+"""Textures of the room's walls, floor, ceiling and objects, created once at the start."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ FIGURE_ASPECT_RATIO = FIGURE_SIZE_PX[0] / FIGURE_SIZE_PX[1]  # of its height
 
 
 def bgr(colour: str) -> Colour:
-    """Convert "#rrggbb" to a colour in the order of OpenCV."""
+    """Convert a colour "#rrggbb" to a BGR tuple."""
     return int(colour[5:7], 16), int(colour[3:5], 16), int(colour[1:3], 16)
 
 
 def gradient(height: int, width: int, top: str, bottom: str) -> Picture:
-    """Return an image with a vertical gradient."""
+    """Return an image with a vertical gradient between two colours ("#rrggbb")."""
     part = np.linspace(0.0, 1.0, height)[:, None, None]
     rows = np.array(bgr(top)) * (1 - part) + np.array(bgr(bottom)) * part
     return np.repeat(rows, width, axis=1).astype(np.uint8)
@@ -40,7 +40,7 @@ def _paint_rect(picture: Picture, left: float, top: float, right: float, bottom:
 
 
 def wall(room: Room, side: Wall) -> Texture:
-    """Return a wall with its openings as seen from inside."""
+    """Return the texture of a wall with its openings, as seen from inside."""
     length = room.y_max - room.y_min if side in {"east", "west"} else room.x_max - room.x_min
     width, height = round(length * PIXELS_PER_M), round(room.height * PIXELS_PER_M)
     picture = gradient(height, width, "#b9bdc0", "#d5d6d4")
@@ -131,7 +131,7 @@ def _paint_picture(picture: Picture, left: float, top: float, right: float, bott
 
 
 def floor(room: Room) -> Texture:
-    """Return a floor of wooden boards along the x axis, darker near the walls."""
+    """Return the texture of a floor with wooden boards along the x axis, darker near the walls."""
     width, depth = (
         round((room.x_max - room.x_min) * PIXELS_PER_M),
         round((room.y_max - room.y_min) * PIXELS_PER_M),
@@ -156,12 +156,12 @@ def floor(room: Room) -> Texture:
 
 
 def ceiling() -> Texture:
-    """Return a bright ceiling."""
+    """Return the texture of a bright ceiling."""
     return Texture(gradient(64, 64, "#dfe1e1", "#d3d5d5"))
 
 
 def shadow() -> Texture:
-    """Return a soft round shadow for the floor."""
+    """Return the texture of a soft round shadow on the floor."""
     y, x = np.mgrid[-1:1:64j, -1:1:64j]
     alpha = np.clip(1.0 - np.hypot(x, y), 0.0, 1.0) ** 1.2 * 150
     picture = np.zeros((64, 64, 4), dtype=np.uint8)
@@ -171,7 +171,11 @@ def shadow() -> Texture:
 
 
 def marker(number: int) -> Texture:
-    """Return an ArUco card: the printed square and a white border of one module."""
+    """Return the texture of an ArUco card: the printed square and a white border of one module.
+
+    Args:
+        number: Number of the marker.
+    """
     square = cv2.aruco.generateImageMarker(
         cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50), number, 6 * 24
     )
@@ -184,7 +188,7 @@ MARKER_CARD_SCALE = 8 / 6  # the card is this much wider than its printed square
 
 
 class _Painter:
-    """Draws shapes on a transparent image; positions are fractions of the width and height of the figure."""
+    """Painter of shapes on a transparent image; positions are fractions of the image's width and height."""
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width * _SUPERSAMPLING, height * _SUPERSAMPLING
@@ -226,7 +230,7 @@ class _Painter:
 
 
 def person() -> Texture:
-    """Return a person, from head to feet."""
+    """Return the texture of a person from head to feet."""
     paint = _Painter(*FIGURE_SIZE_PX)
     for x in (0.40, 0.60):  # legs and shoes
         paint.shape([(x - 0.1, 0.62), (x + 0.1, 0.62), (x + 0.075, 0.97), (x - 0.075, 0.97)], "#3b4658")
@@ -267,7 +271,12 @@ def _paint_head(paint: _Painter) -> None:
 
 
 def robot(small: bool, *, faces: bool) -> Texture:
-    """Return another robot, the large white or the small green one, from the front or from behind."""
+    """Return the texture of another robot.
+
+    Args:
+        small: True for the small green robot, False for the large white one.
+        faces: True for the view from the front, False from behind.
+    """
     paint = _Painter(*(FIGURE_SIZE_PX if not small else (400, 300)))
     (_paint_small_robot if small else _paint_large_robot)(paint, faces=faces)
     return Texture(paint.done())
@@ -309,7 +318,11 @@ def _paint_small_robot(paint: _Painter, *, faces: bool) -> None:
 
 
 def ball(colour: str) -> Texture:
-    """Return a shiny ball that fills the image."""
+    """Return the texture of a shiny ball that fills the image.
+
+    Args:
+        colour: Colour in the form "#rrggbb".
+    """
     side = 128
     y, x = np.mgrid[-1:1:128j, -1:1:128j]
     radius = np.hypot(x, y)

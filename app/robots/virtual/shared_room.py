@@ -1,4 +1,4 @@
-"""Connection of a virtual robot to the room it shares with others."""
+"""Synchronization of a virtual robot with the room it shares with other robots."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from app.robots.virtual.room import OtherRobot, Room
 from app.robots.virtual.room_map import ROBOTS_TOPIC, TOPIC, RoomMap
 
 ARRIVAL_PERIOD_S = 3.0
-"""Time after its start in which a robot moves away from a place where another robot already stood."""
+"""Time in seconds after the start in which a robot moves away from a position that another robot occupies."""
 
 
 class RoomBody(Protocol):
-    """Part of the interface of a body that is used here."""
+    """Interface of the body that `SharedRoom` synchronizes."""
 
     room: Room
     x: float
@@ -26,17 +26,25 @@ class RoomBody(Protocol):
 
     @property
     def is_still(self) -> bool:
-        """True if nothing moves."""
+        """True if the robot doesn't move."""
 
     def set_position(self, x: float, y: float) -> None:
-        """Set the position."""
+        """Set the position of the robot in m."""
 
     def reset(self, room: Room) -> None:
-        """Stop everything and return to the start position in this room."""
+        """Stop everything, enter a room, and return to the start position."""
 
 
 class SharedRoom:
-    """Synchronizes the room of a body with the other robots; ``lock`` guards the body."""
+    """Synchronization of the room of one robot with the other robots.
+
+    Args:
+        link: Connection to the network.
+        clock: Monotonic clock.
+        body: Body of this robot.
+        lock: Lock that guards the body.
+        like: Size and appearance of this robot, as seen by other robots.
+    """
 
     def __init__(
         self, link: Link, clock: Clock, body: RoomBody, lock: AbstractContextManager[object], like: OtherRobot
@@ -63,7 +71,10 @@ class SharedRoom:
     # -- call with the lock held ------------------------------------------------------------------------
 
     def update_body(self) -> None:
-        """Update the room of the body and the other robots in it."""
+        """Update the room of the body with changes by other robots. Call this with the lock held.
+
+        A robot that was just started moves away from a position that another robot occupies.
+        """
         body, others = self._body, self._neighbours.present_robots()
         if self._map.revision != self._revision:
             self._revision = self._map.revision
@@ -77,20 +88,25 @@ class SharedRoom:
                 self._start = body.x, body.y
 
     def update_map(self) -> None:
-        """Publish the positions of objects that the body has pushed."""
+        """Record the positions of objects that the body has pushed, for `publish_changes`.
+
+        Call this with the lock held.
+        """
         if self._map.update_positions(self._body.room):
             self._revision, self._is_new = self._map.revision, True
 
     def move(self, name: str, x: float, y: float) -> None:
-        """Move an object on behalf of the user."""
+        """Move an object for the user. Call this with the lock held."""
         self._is_new = self._map.move(name, x, y) or self._is_new
         self.update_body()
 
     def return_to_start(self, together: object) -> None:
         """Move the body to its start position; the objects in the room are not moved.
 
-        ``together`` are the names of the robots that return at the same time, whose positions become free.
-        Other robots at the start position are avoided.
+        If another robot is there, the nearest free position is used. Call this with the lock held.
+
+        Args:
+            together: Names of the robots that return at the same time, whose current positions become free.
         """
         self.update_body()
         names = together if isinstance(together, list) else []
@@ -102,7 +118,7 @@ class SharedRoom:
         body.set_position(*room.nearest_free(*self._start, self._like.radius))
 
     def restore_start(self) -> Room:
-        """Restore the initial state of the room and return it."""
+        """Restore the room at the start and return it. Call this with the lock held."""
         self._map.restore_start()
         self._is_new = True
         self.update_body()
@@ -111,7 +127,10 @@ class SharedRoom:
     # -- call without the lock -------------------------------------------------------------------------
 
     def publish_changes(self) -> None:
-        """Publish the changes of the room. Call this after every step."""
+        """Publish the position of the body, and the objects if they have changed.
+
+        Call this after every step, without holding the lock.
+        """
         with self._lock:
             body = self._body
             me = replace(

@@ -1,4 +1,4 @@
-"""Simulation of the virtual Pepper: a thread for the body, and one for the camera."""
+"""Simulation of the virtual Pepper, with one thread for the body and one for the camera."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _SMALL_STEP_S = 0.004  # used while a stop waits for the body to stand still
 _LOST_AFTER_S = 0.5
 _JOIN_TIMEOUT_S = 2.0
 ROBOT_ITSELF = "robot"
-"""Name with which the user moves the robot itself."""
+"""Name in ``move`` messages for the robot instead of an object."""
 TOUCHABLE_PARTS = ("head", "left_hand", "right_hand")
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class _View:
-    """View of a room from one position, reused until the room or the position changes."""
+    """Cached view from one position, reused until the room or the position changes."""
 
     room: Room
     lens: Lens
@@ -47,7 +47,18 @@ class _View:
 
 
 class Simulation:
-    """Body with its lock and two threads; publishes on ``link``."""
+    """Simulation of the virtual Pepper in two threads, which publishes its sensors, events and state.
+
+    Attributes:
+        body: Body, guarded by `changed`.
+        changed: Condition that is notified after each step.
+        seen: Newest detections by name of the sensor.
+
+    Args:
+        body: Body in its room.
+        link: Connection to the network.
+        clock: Monotonic clock.
+    """
 
     def __init__(self, body: Body, link: Link, clock: Clock) -> None:
         self.body = body
@@ -80,7 +91,12 @@ class Simulation:
             thread.join(_JOIN_TIMEOUT_S)
 
     def wait_for(self, true: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until a condition on the body is true; return False on timeout."""
+        """Wait until a condition on the body is true; return False on timeout.
+
+        Args:
+            true: Condition, called with the lock held.
+            timeout_s: Timeout in seconds.
+        """
         limit = self._clock.now() + timeout_s
         with self.changed:
             while self._clock.now() < limit:
@@ -113,7 +129,12 @@ class Simulation:
             self._shared.publish_changes()
 
     def publish_step(self, happenings: list[BodyEvent], step: int) -> None:
-        """Publish events, the drawing, and the sensor values due at this step."""
+        """Publish events, the state, and the values of the sensors that are due at a step.
+
+        Args:
+            happenings: Events since the last step.
+            step: Number of the step.
+        """
         for happening in happenings:
             self._link.happen(happening.event, **happening.data)
             if happening.event in {"touched", "released"}:
@@ -143,7 +164,11 @@ class Simulation:
                 self.capture(publish=is_watched)
 
     def capture(self, *, publish: bool) -> None:
-        """Render one image, detect objects, and publish both."""
+        """Render an image, detect objects, and publish the detections.
+
+        Args:
+            publish: True to publish the image too.
+        """
         with self.changed:
             room, lens = self.body.room, lens_of(self.body)
         if self._view is None or (self._view.room, self._view.lens) != (room, lens):
@@ -189,7 +214,9 @@ class Simulation:
     def apply_change(self, change: Mapping[str, object]) -> None:
         """Apply a change of the world by the user.
 
-        Changes are touch, move, say, hold, reset, start, and a simulated event.
+        Args:
+            change: Payload of a message on ``/<name>/world``: touch, move, say, hold, reset, start, or a
+                simulated event.
         """
         place, moved, word = change.get("touch"), change.get("move"), change.get("say")
         x, y = finite_float(change.get("x")), finite_float(change.get("y"))
@@ -233,7 +260,15 @@ class Simulation:
 
 
 class Ticker:
-    """Iterator over regular times until an event is set. If it is late, times are skipped."""
+    """Iterator that waits for the next tick of a fixed period and stops when an event is set.
+
+    Yields the current time in seconds. Missed ticks are skipped.
+
+    Args:
+        clock: Monotonic clock.
+        ended: Event that ends the iteration.
+        period_s: Period in seconds.
+    """
 
     def __init__(self, clock: Clock, ended: threading.Event, period_s: float) -> None:
         self._clock, self._ended, self._period_s = clock, ended, period_s
@@ -251,12 +286,16 @@ class Ticker:
 
 
 def parse_event(change: Mapping[str, object]) -> tuple[str, dict[str, object]]:
-    """Return name and data of a simulated event, such as ``{"happen": "bumped", "side": "front"}``."""
+    """Return the name and the data of a simulated event.
+
+    Args:
+        change: Message such as ``{"happen": "bumped", "side": "front"}``.
+    """
     return bounded_str(change["happen"]), {name: value for name, value in change.items() if name != "happen"}
 
 
 def is_valid_event(link: Link, event: str, data: Mapping[str, object]) -> bool:
-    """Return True if a simulated event matches the description; otherwise log the differences."""
+    """Return True if a simulated event matches the description; otherwise log the problems."""
     wrong = link.wrong_in(event, data)
     if wrong:
         _log.warning("%s: it can't notice '%s': %s", link.name, quotable(event), "; ".join(wrong))
@@ -266,7 +305,7 @@ def is_valid_event(link: Link, event: str, data: Mapping[str, object]) -> bool:
 def drawing_state(body: Body) -> dict[str, object]:
     """Return the state of the body for drawing, in metres and degrees.
 
-    Head pitch is positive down; arms hang at 0 and point up at 180.
+    The head pitch is positive downwards; hanging arms are at 0 and raised arms at 180 degrees.
     """
     return {
         "x": round(body.x, 3),
@@ -293,7 +332,7 @@ def drawing_state(body: Body) -> dict[str, object]:
 
 
 def room_state(room: Room) -> dict[str, object]:
-    """Return the room and its objects for drawing."""
+    """Return the room and its objects for drawing, as members of the state message."""
     return {
         "objects": _objects(room),
         "room": {

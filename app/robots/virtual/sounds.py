@@ -1,4 +1,4 @@
-"""Sounds and tones of a virtual robot, advanced in time steps."""
+"""Sounds and tones of the virtual Pepper, advanced in time steps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 Notes: TypeAlias = Sequence[tuple[float, float]]
-"""Sequence of notes, each with frequency in hertz (0 for a pause) and duration in seconds."""
+"""Sequence of notes, each a pair of frequency in Hz (0 for a pause) and duration in seconds."""
 SoundName: TypeAlias = Literal["beep", "bell", "cheer", "buzzer", "whistle"]
 
 SOUNDS: Mapping[SoundName, Notes] = {
@@ -21,7 +21,15 @@ SOUNDS: Mapping[SoundName, Notes] = {
 
 @dataclass
 class Sound:
-    """Sound being played; ``done`` is True after the last note. ``number`` identifies the sound."""
+    """Sound being played.
+
+    Attributes:
+        number: Number by which Studio distinguishes sounds.
+        title: Display name.
+        notes: Notes of the sound.
+        played_s: Time in seconds since the start.
+        done: True after the last note, or if the sound was stopped.
+    """
 
     number: int
     title: str
@@ -40,7 +48,7 @@ class Sound:
         self.done = self.done or self.played_s >= self.duration_s
 
     def drawing_state(self) -> dict[str, object]:
-        """Return the state for Studio. ``played`` is the progress from 0 to 1."""
+        """Return the sound for the state message. ``played`` is the progress from 0 to 1."""
         return {
             "number": self.number,
             "title": self.title,

@@ -1,7 +1,7 @@
-"""Object detection of virtual robots: colours, red balls, markers, faces.
+"""Object detection of virtual robots: colours, balls, markers, faces.
 
-Faces are located by the geometry of the camera instead of the pixels, because a cascade classifier uses a
-third of a core. A face is detected only if most of it is in the image and nothing hides it.
+The position of faces is computed from the room instead of the image, because a cascade classifier needs a
+third of a CPU core. A face is detected only if most of it is in the image and nothing hides it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,13 @@ _MIN_SATURATION, _MIN_VALUE = 95, 60
 
 @dataclass(frozen=True)
 class Detection:
-    """Detected object: name, confidence (0 to 1), and box x, y, width, height in pixels."""
+    """Detected object.
+
+    Attributes:
+        name: Name of the object.
+        confidence: Confidence from 0 to 1.
+        box: x, y, width and height in pixels.
+    """
 
     name: str
     confidence: float
@@ -47,7 +53,12 @@ class Detection:
 
 
 def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
-    """Return the message with detections. Its ``name`` is that of the largest one, or null."""
+    """Return the payload of a detection sensor; its ``name`` is the name of the largest object, or null.
+
+    Args:
+        found: Detected objects.
+        lens: Camera model, for the size of the image.
+    """
     listed = sorted(found, key=lambda one: -one.box[2] * one.box[3])
     return {
         "count": len(listed),
@@ -61,14 +72,14 @@ def message(found: Iterable[Detection], lens: Lens) -> dict[str, object]:
 
 
 class ObjectDetector:
-    """Detects balls, markers and faces."""
+    """Detector of balls, markers and faces."""
 
     def __init__(self) -> None:
         dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
         self._markers = cv2.aruco.ArucoDetector(dictionary)
 
     def balls(self, picture: Picture) -> list[Detection]:
-        """Return the round red regions of an image."""
+        """Detect red balls: round red regions of an image."""
         hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
         low, high = (
             cv2.inRange(hsv, (0, 135, 60), (7, 255, 255)),
@@ -85,7 +96,7 @@ class ObjectDetector:
         return found
 
     def markers(self, picture: Picture) -> list[Detection]:
-        """Return the ArUco cards (dictionary 4x4, 50) in an image."""
+        """Detect ArUco cards (dictionary 4x4, 50) in an image."""
         corners, ids, _ = self._markers.detectMarkers(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY))
         # OpenCV returns None for no markers, unlike its annotations say.
         numbers = [int(one) for one in np.asarray(ids).ravel()] if len(corners) else []
@@ -95,7 +106,7 @@ class ObjectDetector:
         ]
 
     def faces(self, room: Room, lens: Lens) -> list[Detection]:
-        """Return the faces of people who look at the camera, the largest first."""
+        """Return the visible faces of the people in a room, the largest first."""
         found = [_face(room, person, lens) for person in room.people]
         return sorted((each for each in found if each is not None), key=lambda one: -one.box[2] * one.box[3])
 
@@ -129,7 +140,7 @@ def _box_of(points: ArrayLike) -> tuple[int, int, int, int]:
 
 
 def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
-    """Return the head movement that centres a pixel: degrees to the left, degrees down."""
+    """Return the head movement that centres a pixel, in degrees to the left and degrees down."""
     left = -np.degrees(np.arctan2(pixel[0] - lens.width / 2, lens.focal))
     down = np.degrees(np.arctan2(pixel[1] - lens.height / 2, lens.focal))
     return float(left), float(down)
@@ -137,7 +148,13 @@ def angles_to(lens: Lens, pixel: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class ColourPatch:
-    """Largest region of a colour: ``x`` from -1 (left) to 1, ``area`` as a fraction of the image."""
+    """Largest region of a colour in an image.
+
+    Attributes:
+        name: Name of the colour.
+        x: Horizontal position of the centre from -1 (left) to 1 (right).
+        area: Fraction of the image.
+    """
 
     name: str
     x: float
@@ -145,7 +162,7 @@ class ColourPatch:
 
 
 def colours_in(picture: Picture) -> dict[str, ColourPatch]:
-    """Return the colours that fill at least 0.4 % of a BGR image in one region."""
+    """Return the largest region of each colour by name, if it fills at least 0.4 % of a BGR image."""
     height, width = picture.shape[:2]
     hsv = cv2.cvtColor(picture, cv2.COLOR_BGR2HSV)
     found = {}

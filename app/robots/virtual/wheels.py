@@ -1,4 +1,4 @@
-"""Body of the virtual two-wheeled robot: speeds advanced in time steps, without clock and threads."""
+"""Simulated body of the virtual two-wheeled robot, advanced in time steps, without clock and threads."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _MAX_STEP_S = 0.01
 _DRAIN_PER_S, _DRAIN_MOVING_PER_S = 1 / 300, 1 / 90
 _BUMPER_ANGLE_DEG = 50.0
 PRESS_DURATION_S = 0.3
-"""Time for which a bumper stays pressed after the user pressed it."""
+"""Time in seconds for which a bumper stays pressed after the user has pressed it."""
 
 
 @dataclass
 class WheelBody:
-    """Position and speeds of the robot. Not thread-safe: hold the owner's lock around every call."""
+    """Simulated body in its room. Not thread-safe: hold the owner's lock around every call."""
 
     room: Room = field(default_factory=Room)
     x: float = START_POSE[0]
@@ -38,37 +38,43 @@ class WheelBody:
     events: deque[BodyEvent] = field(default_factory=lambda: deque(maxlen=200))
     _target: tuple[float, float] = (0.0, 0.0)
     is_lifted: bool = False
-    """True while the user lifts the robot, so that it doesn't move."""
+    """True while the user has lifted the robot, so that it doesn't move."""
     driven_m: float = 0.0
-    """Metres rolled, forwards and backwards."""
+    """Total distance rolled in m, forwards and backwards."""
     _pressed_s: float = 0.0
 
     def drive(self, speed: float, turn_speed: float) -> None:
-        """Set the target speed (m/s, positive forwards) and turning speed (°/s, positive to the left).
+        """Set the target speeds.
 
-        0, 0 brakes.
+        Args:
+            speed: Speed in m/s, positive forwards.
+            turn_speed: Turning speed in °/s, positive to the left. If both speeds are 0, the robot brakes.
         """
         self._target = (speed, turn_speed)
 
     @property
     def is_still(self) -> bool:
-        """True if nothing moves and the target speeds are 0."""
+        """True if the robot doesn't move and the target speeds are 0."""
         return self._target == (0.0, 0.0) and self.speed == 0.0 and self.turn_speed == 0.0
 
     @property
     def distance(self) -> float:
-        """Distance from the edge of the robot to the next obstacle ahead, at most 4 m."""
+        """Distance in m from the edge of the robot to the next obstacle ahead, at most 4 m."""
         ahead = self.room.distance_ahead(self.x, self.y, self.theta_deg) - RADIUS
         return min(MAX_DISTANCE_M, max(0.0, ahead))
 
     def press(self, side: str) -> None:
-        """Press a bumper. The robot stops as after a collision."""
+        """Press a bumper for `PRESS_DURATION_S`; the robot stops as after a collision.
+
+        Args:
+            side: "left", "right", "front" or "back".
+        """
         self.speed, self.turn_speed, self._target = 0.0, 0.0, (0.0, 0.0)
         self.pressed_bumper, self._pressed_s = side, PRESS_DURATION_S
         self.events.append(BodyEvent("bump", {"side": side}))
 
     def reset(self, room: Room) -> None:
-        """Stop and return to the start position in this room."""
+        """Stop, enter a room, and return to the start position or the nearest free one."""
         self.room, self._target, self.speed, self.turn_speed = room, (0.0, 0.0), 0.0, 0.0
         self.x, self.y = room.nearest_free(*START_POSE[:2], RADIUS)
         self.theta_deg, self.light, self.pressed_bumper, self.is_lifted = (
@@ -79,22 +85,30 @@ class WheelBody:
         )
 
     def set_lifted(self, *, held: bool) -> None:
-        """Lift the robot or put it down. The commanded speeds apply again afterwards."""
+        """Lift the robot or put it down; the target speeds apply again after that.
+
+        Args:
+            held: True to lift the robot.
+        """
         self.is_lifted = held
 
     def carry(self, x: float, y: float) -> None:
-        """Move the robot to a place if that is free. Walls limit the movement."""
+        """Move the lifted robot to a position in m, limited by walls; it stays in place if blocked."""
         place = self.room.carried_position(x, y, RADIUS, (self.x, self.y))
         if place is not None:
             self.set_position(*place)
 
     def set_position(self, x: float, y: float) -> None:
-        """Set the position of the robot."""
+        """Set the position of the robot in m; overlapping balls are pushed aside."""
         self.x, self.y = x, y
         self.room = self.room.with_pushed_ball(x, y, RADIUS)
 
     def step(self, seconds: float) -> None:
-        """Advance the simulation in small steps, so that the robot can't pass through objects."""
+        """Advance the simulation in steps that are small enough to detect collisions.
+
+        Args:
+            seconds: Duration in seconds.
+        """
         while seconds > 1e-9:
             dt = min(seconds, _MAX_STEP_S)
             seconds -= dt

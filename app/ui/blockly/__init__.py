@@ -1,4 +1,4 @@
 """Widget with the web page of the block editor, and the messages between window and page.
 
-`view` has the widget, `bridge` the calls in both directions; the page itself is `app/blocks/editor/`.
+`view` contains the widget, `bridge` the calls in both directions; the page itself is `app/blocks/editor/`.
 """

@@ -14,12 +14,16 @@ from app.core.storage import deep_json
 
 Json = dict[str, object]
 CLIPBOARD_PREFIX = '{"nepStudio":'
-"""Prefix of copied blocks in the clipboard's text (`clipboard.ts`)."""
+"""Prefix of the clipboard's text if it contains copied blocks; the same as in `clipboard.ts`."""
 MAX_CLIPBOARD_CHARS = 5_000_000
 
 
 class BlocklyBridge(QObject):
-    """QWebChannel object ``bridge`` of the page. The page calls its slots; its signals notify the view."""
+    """Object that the page accesses as ``bridge``: the page calls the slots, and the signals notify the view.
+
+    Args:
+        begin: Returns the settings for `beginning`.
+    """
 
     told = Signal(str, str)  # to the page: a command and its JSON
     page_ready = Signal()
@@ -54,12 +58,12 @@ class BlocklyBridge(QObject):
         self._begin = begin
 
     def send_command(self, command: str, payload: object) -> None:
-        """Send a command to the page. The page sends no reply."""
+        """Send a command with a JSON payload to the page, which sends no reply."""
         self.told.emit(command, deep_json.dumps(payload, ascii=True))
 
     @Slot(result=str)
     def beginning(self) -> str:
-        """Return the theme, language and motion settings that the page needs before its first paint."""
+        """Return theme, language and motion settings as JSON, which the page needs before its first paint."""
         return deep_json.dumps(self._begin(), ascii=True)
 
     @Slot()
@@ -137,9 +141,9 @@ class BlocklyBridge(QObject):
 
     @Slot(result=str)
     def copied(self) -> str:
-        """Return the serialized blocks on the system clipboard.
+        """Return the serialized blocks on the system clipboard; "" if it contains anything else.
 
-        Return "" for other contents, which the page must not read.
+        The page must not read other contents of the clipboard.
         """
         text = QGuiApplication.clipboard().text()
         return text if text.startswith(CLIPBOARD_PREFIX) and len(text) <= MAX_CLIPBOARD_CHARS else ""

@@ -11,7 +11,7 @@ _RELEASE_EVENTS = (QEvent.Type.MouseButtonPress, QEvent.Type.FocusOut)
 
 
 class HeldKeys:
-    """Holds key presses between a command that focuses a field and the page's reply.
+    """Buffer for key presses between a command that focuses a field and the page's reply.
 
     Commands and keys reach the page by different channels, and keys are faster: letters typed immediately
     after *Find a block* would arrive while the page is still busy, and go to its canvas.
@@ -23,12 +23,15 @@ class HeldKeys:
         self._kept: list[QEvent] | None = None
 
     def hold(self) -> None:
-        """Start to hold all key presses."""
+        """Start buffering key presses."""
         if self._kept is None:
             self._kept = []
 
     def hold_event(self, event: QEvent) -> bool:
-        """Return True if the event was held. A click or loss of focus releases the held keys."""
+        """Buffer a key press and return True; return False for other events and while buffering is off.
+
+        A click or the loss of focus sends the buffered keys.
+        """
         if self._kept is None:
             return False
         if event.type() in _KEYS:
@@ -39,7 +42,7 @@ class HeldKeys:
         return False
 
     def release(self) -> None:
-        """Send the held keys to the page in the order they were pressed."""
+        """Stop buffering and send the buffered keys to the page, in the order in which they were pressed."""
         kept, self._kept = self._kept or [], None
         for event in kept:
             keyboard = self._keyboard()
@@ -47,5 +50,5 @@ class HeldKeys:
                 QCoreApplication.sendEvent(keyboard, event)
 
     def discard_all(self) -> None:
-        """Discard the held keys because the page they were typed for no longer exists."""
+        """Stop buffering and discard the buffered keys, after the page for which they were typed was lost."""
         self._kept = None

@@ -41,7 +41,7 @@ _DISABLED_ATTRIBUTES = (
 
 
 class BlocklyPage(QWebEnginePage):
-    """Page that loads only the editor; errors of its scripts are logged."""
+    """Page that can only navigate within the editor; errors of its scripts are logged."""
 
     def acceptNavigationRequest(
         self, url: QUrl | str, _kind: QWebEnginePage.NavigationType, _is_main: bool
@@ -60,7 +60,13 @@ class BlocklyPage(QWebEnginePage):
 
 
 class BlocklyWeb:
-    """Web view with its page, profile, channel and request filter, all owned by one widget."""
+    """Web view of the editor with its page, profile, channel and request filter.
+
+    Args:
+        bridge: Object that the page can access.
+        background: Background colour before the first paint.
+        owner: Widget that owns the view and the profile.
+    """
 
     def __init__(self, bridge: BlocklyBridge, background: QColor, owner: QWidget) -> None:
         register_scheme()
@@ -84,21 +90,21 @@ class BlocklyWeb:
         profile.setParent(owner)
 
     def start(self) -> None:
-        """Load the editor; also used to reload it after its process was killed."""
+        """Load the editor's page, for the first time or after the page's process was terminated."""
         self.page.load(QUrl(PAGE_URL))
 
     def close(self) -> None:
-        """Schedule deletion of the view, its page and then the profile in the event loop."""
+        """Delete the view with its page, and then the profile, when control returns to the event loop."""
         self.view.deleteLater()
         self._profile.deleteLater()
 
     def keyboard(self) -> QObject | None:
-        """Return the widget that receives key presses while the page has the focus."""
+        """Return the widget that receives key presses while the page has the focus; None before it exists."""
         return focus_proxy(self.view)
 
 
 class BlocklyHost(QWidget):
-    """Container of the page, which is created on the first show and restarted whenever its process dies."""
+    """Widget that contains the page, creates it on the first show, and reloads it when its process dies."""
 
     ready = Signal()  # the page is loaded (again, after its process died)
     recovered = Signal()  # the page's process died and every behaviour was restored, without its undo stack
@@ -133,13 +139,15 @@ class BlocklyHost(QWidget):
 
     @property
     def web(self) -> BlocklyWeb | None:
-        """Web view, or None before the first show. For tools and tests."""
+        """Web view, or None before the first show. Used by tools and tests."""
         return self._web
 
     def set_theme(self, tokens: Mapping[str, object], dark: bool) -> None:
-        """Set the design tokens: the parsed token file, or `Theme.blockly_tokens()`.
+        """Set the colours and sizes of the page; program and undo stack are preserved.
 
-        Program and undo stack are kept.
+        Args:
+            tokens: Design tokens: the parsed token file, or `Theme.blockly_tokens()`.
+            dark: True for the dark theme.
         """
         self._theme = {"tokens": dict(tokens), "dark": dark}
         if isinstance(tokens.get("reducedMotion"), bool):
@@ -149,7 +157,7 @@ class BlocklyHost(QWidget):
         self._send_command("theme", self._theme)
 
     def set_reduced_motion(self, reduced: bool) -> None:
-        """Replace the animated glow of running blocks with a steady one."""
+        """Select a steady glow for running blocks if ``reduced`` is True, else an animated one."""
         if reduced != self._reduced_motion:
             self._reduced_motion = reduced
             self._send_command("motion", {"reduced": reduced})
@@ -165,7 +173,7 @@ class BlocklyHost(QWidget):
         ...
 
     def _send_command(self, command: str, payload: object) -> None:
-        # Commands without a page are dropped; `_page_came` sends the complete state to a later page.
+        # Commands without a page are dropped; `_on_page_loaded` sends the complete state to a later page.
         if self._up:
             self._bridge.send_command(command, payload)
 

@@ -1,4 +1,4 @@
-"""Parsers for JSON from the block editor's page. Malformed input results in an empty value."""
+"""Parsers for JSON from the block editor's page, which return an empty value for malformed input."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from nep.text import bounded_str
 
 
 def parse_strings(text: str) -> tuple[str, ...]:
-    """Return the strings of a JSON list."""
+    """Parse a JSON list of strings."""
     return tuple(map(bounded_str, _parse_list(text)))
 
 
 def parse_string_pairs(text: str) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of strings, such as robot and sensor, of a JSON list of lists."""
+    """Parse a JSON list of string pairs, such as robot and sensor; other items are dropped."""
     found = (each for each in _parse_list(text) if isinstance(each, list) and len(each) == 2)
     return tuple((bounded_str(first), bounded_str(second)) for first, second in found)
 
 
 def decode_data_url(text: str) -> bytes:
-    """Return the decoded bytes of a base64 ``data:`` URL."""
+    """Decode a base64 ``data:`` URL."""
     try:
         return b64decode(text.partition(",")[2].encode("ascii", "replace"))
     except binascii.Error:

@@ -1,7 +1,7 @@
 """URL scheme ``app://blocks/…``, which serves the block editor's page from the resources and nothing else.
 
-`register_scheme` must run before the first view or profile is created. Qt recommends to call it before the
-QApplication is created; it is called later because importing Qt WebEngine takes long.
+`register_scheme` must be called before the first view or profile is created. Qt recommends calling it before
+the QApplication is created; Studio calls it later, because importing Qt WebEngine takes long.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _FONT_WEIGHTS = {"Regular": 400, "Medium": 500, "SemiBold": 600, "Bold": 700}
 
 
 def register_scheme() -> None:
-    """Register ``app:`` as a secure scheme. Call it before the first view. Idempotent."""
+    """Register ``app:`` as a secure scheme. Call this before the first view is created. Idempotent."""
     if QWebEngineUrlScheme.schemeByName(QByteArray(SCHEME)).name() == SCHEME:
         return
     scheme = QWebEngineUrlScheme(QByteArray(SCHEME))
@@ -48,9 +48,13 @@ def register_scheme() -> None:
 
 
 def content(path: str, folder: Path | None = None) -> tuple[str, bytes] | None:
-    """Return media type and bytes of a path such as ``/editor.js``; None if it does not exist.
+    """Return the media type and the content of a file of the page; None if the file doesn't exist.
 
     Paths can't leave the editor's folder, except to the bundled fonts under ``/fonts/``.
+
+    Args:
+        path: Path in the URL, such as ``/editor.js``.
+        folder: Folder with the resources (default: `app.resources.folder()`).
     """
     root = resources.folder() if folder is None else folder
     if path == "/fonts.css":
@@ -85,7 +89,7 @@ def _qwebchannel() -> bytes:
 
 
 class SchemeHandler(QWebEngineUrlSchemeHandler):
-    """Serves ``app://blocks/…``; rejects any other host, method or path."""
+    """Handler that serves ``app://blocks/…`` and rejects any other host, method or path."""
 
     def requestStarted(self, job: QWebEngineUrlRequestJob) -> None:
         url = job.requestUrl()
@@ -106,7 +110,8 @@ class SchemeHandler(QWebEngineUrlSchemeHandler):
 class RequestBlocker(QWebEngineUrlRequestInterceptor):
     """Request interceptor that blocks everything except local content.
 
-    Blocked requests are recorded for tests.
+    Attributes:
+        blocked: URLs of the first 100 blocked requests, for tests.
     """
 
     def __init__(self, parent: QObject | None = None) -> None:

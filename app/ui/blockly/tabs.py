@@ -1,4 +1,4 @@
-"""State of the open behaviours in the block editor, independent of whether the page is loaded."""
+"""Open behaviours of the block editor, independent of whether the page is loaded."""
 
 from __future__ import annotations
 
@@ -9,7 +9,14 @@ from app.core.documents.workspace_json import EMPTY, WorkspaceJson
 
 @dataclass
 class Tab:
-    """State of one behaviour: its newest program, and the run state of its blocks."""
+    """Open behaviour in the block editor.
+
+    Attributes:
+        key: Key of the behaviour.
+        program: Latest workspace.
+        generation: Number that changes when the program is replaced, for the detection of outdated edits.
+        states: Newest payload of each state of the blocks, such as highlights, by name of the command.
+    """
 
     key: str
     program: WorkspaceJson
@@ -21,7 +28,10 @@ class Tab:
 class Tabs:
     """Open behaviours, exactly one of which is shown.
 
-    The first tab has the key "" and is an empty placeholder until a real behaviour is opened.
+    The first tab has the key "" and is an empty placeholder until a behaviour is opened.
+
+    Attributes:
+        shown: Tab that is shown.
     """
 
     def __init__(self) -> None:
@@ -33,7 +43,11 @@ class Tabs:
         return self._tabs.get(key)
 
     def show(self, key: str, program: WorkspaceJson) -> str | None:
-        """Show a tab. ``program`` is used only if the tab is new.
+        """Show a tab, which is created if necessary.
+
+        Args:
+            key: Key of the behaviour.
+            program: Workspace for a new tab; not used for an existing one.
 
         Returns:
             The key of the placeholder if it was removed, else None.
@@ -46,29 +60,31 @@ class Tabs:
         return ""
 
     def close(self, key: str) -> bool:
-        """Remove a tab. Return False if it doesn't exist."""
+        """Remove a tab; return False if it doesn't exist. The placeholder replaces the shown tab."""
         gone = self._tabs.pop(key, None)
         if gone is not None and gone is self.shown:
             self.shown = self._create_tab("", WorkspaceJson.from_blocks(EMPTY))
         return gone is not None
 
     def replace(self, program: WorkspaceJson) -> None:
-        """Replace the program of the shown tab. Pending edits of the old program will be ignored."""
+        """Replace the program of the shown tab; `tab_for_edit` rejects later edits of the old program."""
         self._generations += 1
         self.shown.generation = self._generations
         self.shown.program = program
         self.shown.states.clear()
 
     def tab_for_edit(self, key: str, generation: int) -> Tab | None:
-        """Return the tab that an edit belongs to, or None.
+        """Return the tab to which an edit belongs; None if the tab was closed or its program was replaced.
 
-        It is None if the tab was closed or its program replaced in the meantime.
+        Args:
+            key: Key of the behaviour.
+            generation: Value of `Tab.generation` when the edited program was loaded.
         """
         tab = self._tabs.get(key)
         return tab if tab is not None and tab.generation == generation else None
 
     def mark_unloaded(self) -> None:
-        """Mark all tabs as not loaded because the page was lost."""
+        """Mark all tabs as not loaded after the page was lost."""
         for tab in self._tabs.values():
             tab.is_loaded = False
 

@@ -1,7 +1,7 @@
 """Block editor widget.
 
-The view always has the newest program. Its page is loaded on the first show, and its process may die; a new
-page receives the complete state.
+The view always stores the latest programs. The page is loaded on the first show; if its process dies, the
+view sends the complete state to a new page.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from nep import i18n
 _PIXELS_PER_INCH = 96.0  # CSS pixels
 _MIN_MARGIN_INCH = 0.45
 PAGE_EDIT_ACTIONS = {"cut": "Cut", "copy": "Copy", "paste": "Paste", "selectAll": "SelectAll"}
-"""Actions of `QWebEnginePage.WebAction` for editing text fields of the page, by command."""
+"""Names of `QWebEnginePage.WebAction` members for editing text fields of the page, by command."""
 IS_TEXT_FIELD_FOCUSED_JS = (
     "(e => !!e && (e.isContentEditable || /^(INPUT|TEXTAREA)$/.test(e.tagName)))(document.activeElement)"
 )
-"""JavaScript expression that is true if a text field of the page has the focus."""
+"""JavaScript expression that is true while a text field of the page has the focus."""
 
 
 class BlocklyView(BlocklyHost):
-    """Editor of behaviours, which shows one at a time, each in its own tab.
+    """Editor of behaviours, one of which is shown at a time, each in a separate tab.
 
-    All methods may be called at any time, also before the page is loaded. Before the first `show_tab` there
-    is one behaviour, with the key "".
+    All methods can be called at any time, also before the page is loaded. Before the first `show_tab` there
+    is one empty behaviour, with the key "".
     """
 
     changed = Signal(str, object)  # key of a tab and its newest program (WorkspaceJson), 150 ms after an edit
@@ -54,11 +54,12 @@ class BlocklyView(BlocklyHost):
     blocks_dragged_outside = Signal(object, str)
     # picture of the dragged blocks: a PNG, and its device pixels per screen pixel
     drag_picture_rendered = Signal(bytes, float)
-    # position where blocks were dropped outside the page; without `bring_blocks` they return to their place
+    # position where blocks were dropped outside the page; without `move_dragged_blocks` they return to
+    # their place
     blocks_dropped_outside = Signal(QPoint)
     # number of blocks brought into the shown tab, "moved", "copied" or "added", and key of their former tab
     blocks_transferred = Signal(int, str, str)
-    backpack_requested = Signal(str)  # backpack operation as JSON: `BackpackKeeper`
+    backpack_requested = Signal(str)  # backpack operation as JSON: `BackpackController`
 
     def __init__(self, parent: QWidget | None = None, *, language: str = "") -> None:
         super().__init__(parent, language or i18n.language())
@@ -107,18 +108,20 @@ class BlocklyView(BlocklyHost):
 
     @property
     def workspace(self) -> Mapping[str, object]:
-        """Newest program of the shown tab. Edits of the last 150 ms may be missing; see `flush`."""
+        """Latest program of the shown tab. Edits of the last 150 ms may be missing; see `flush`."""
         return self._tabs.shown.program.blocks
 
     def workspace_of(self, key: str) -> Mapping[str, object] | None:
-        """Return the newest program of a tab, or None if there is no such tab."""
+        """Return the latest program of a tab, or None if there is no such tab."""
         tab = self._tabs[key]
         return tab.program.blocks if tab is not None else None
 
     def show_tab(self, key: str, workspace: Mapping[str, object]) -> None:
-        """Show the behaviour with this key, with its own undo stack, zoom and scroll position.
+        """Show a behaviour, with its undo stack, zoom and scroll position.
 
-        ``workspace`` is used only if the tab is new.
+        Args:
+            key: Key of the behaviour.
+            workspace: Program for a new tab; not used for an existing one.
         """
         gone = self._tabs.show(key, WorkspaceJson.from_blocks(workspace))
         self._send_tab()
@@ -126,7 +129,7 @@ class BlocklyView(BlocklyHost):
             self._send_command("close", gone)
 
     def close_tab(self, key: str) -> None:
-        """Close a tab and discard its undo stack. If it was shown, an empty behaviour replaces it."""
+        """Close a tab and discard its undo stack. An empty behaviour replaces the shown tab."""
         was_shown = key == self._tabs.shown.key
         if self._tabs.close(key):
             if was_shown:
@@ -134,7 +137,7 @@ class BlocklyView(BlocklyHost):
             self._send_command("close", key)
 
     def load(self, workspace: Mapping[str, object]) -> None:
-        """Replace the program of the shown tab with another document.
+        """Replace the program of the shown tab by another document.
 
         Clears the undo stack and discards pending edits of the old program.
         """
@@ -148,7 +151,7 @@ class BlocklyView(BlocklyHost):
         self._send_command("change", workspace)
 
     def flush(self, done: Callable[[WorkspaceJson], None]) -> None:
-        """Fetch pending edits of the shown tab, then call `done` with the newest program.
+        """Fetch pending edits of the shown tab, then call `done` with the latest program.
 
         `done` is called exactly once, even if the page is not loaded or dies. Other tabs have no pending
         edits: they were flushed when another tab was shown.
@@ -161,9 +164,12 @@ class BlocklyView(BlocklyHost):
         self._bridge.send_command("flush", self._tokens)
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Render all blocks of the shown tab as "png" or "svg", on a white or transparent background.
+        """Render all blocks of the shown tab as an image.
 
-        `done` is called exactly once, with b"" if there are no blocks or no page.
+        Args:
+            kind: "png" or "svg".
+            white: True for a white background, False for a transparent one.
+            done: Called exactly once with the image; with b"" if there are no blocks or no page.
         """
         if not self._up:
             done(b"")
@@ -173,9 +179,13 @@ class BlocklyView(BlocklyHost):
         self._bridge.send_command("picture", {"token": self._tokens, "kind": kind, "white": white})
 
     def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
-        """Render all blocks of the shown tab as a PDF with the title on each page.
+        """Render all blocks of the shown tab as a PDF with title and date on each page.
 
-        `done` is called exactly once, with b"" if there are no blocks or no page.
+        Args:
+            title: Title.
+            date: Formatted date.
+            layout: Page size and margins.
+            done: Called exactly once with the PDF; with b"" if there are no blocks or no page.
         """
         if not self._up:
             done(b"")
@@ -205,15 +215,20 @@ class BlocklyView(BlocklyHost):
         self._bridge.send_command("pages", {"token": token, "title": title, "date": date, **settings})
 
     def set_toolbox_pinned(self, pinned: bool | None) -> None:
-        """Set whether the flyout stays open after use. None decides by the available space."""
+        """Set when the flyout is open.
+
+        Args:
+            pinned: True to keep the flyout open after use, False to close it, None to decide by the available
+                space.
+        """
         self._pinned = pinned
         self._send_command("pin", pinned)
 
     def set_definitions(self, definitions: Mapping[str, object]) -> None:
-        """Set the block definitions (`app.blocks.editor_definitions`). Equal definitions are ignored.
+        """Set the block definitions (see `editor_definitions`). Equal definitions are ignored.
 
-        The program, its undo stack and the open category are kept. The change is deferred while a block is
-        dragged.
+        The program, its undo stack and the open category are preserved. The change is deferred while a block
+        is dragged.
         """
         if definitions == self._definitions:
             return
@@ -223,33 +238,40 @@ class BlocklyView(BlocklyHost):
     # -- state of the shown tab's blocks ----------------------------------------------------------
 
     def highlight(self, ids: Sequence[str]) -> None:
-        """Highlight exactly these blocks. Fast enough for 30 calls per second."""
+        """Highlight the blocks with these ids and no others. Fast enough for 30 calls per second."""
         self._set_state("highlight", list(ids))
 
     def mark_stopped(self, ids: Sequence[str]) -> None:
-        """Outline the blocks at which the program stopped."""
+        """Outline the blocks with these ids, at which the program stopped."""
         self._set_state("stopped", list(ids))
 
     def set_errors(self, errors: Mapping[str, str]) -> None:
-        """Show an error at each of these blocks, as a map from block id to sentence."""
+        """Set the errors shown at blocks, as messages by block id."""
         self._set_state("errors", dict(errors))
 
     def set_warnings(self, warnings: Mapping[str, str]) -> None:
-        """Show a warning at each of these blocks, as a map from block id to sentence."""
+        """Set the warnings shown at blocks, as messages by block id."""
         self._set_state("warnings", dict(warnings))
 
     def show_value(self, id: str, words: str) -> None:
-        """Show a value at a block of the program or the flyout until the next click."""
+        """Show a value at a block until the next click.
+
+        Args:
+            id: Id of a block of the program or in the flyout.
+            words: Value as text.
+        """
         self._send_command("value", [id, words])
 
     def set_absent(self, ids: Sequence[str]) -> None:
-        """Show these blocks dimmed and dashed because their robot is not connected."""
+        """Dim the blocks with these ids, because their robot is not connected."""
         self._set_state("absent", list(ids))
 
     def set_live_values(self, values: Mapping[str, str], old: Collection[str] = ()) -> None:
-        """Set the displayed values of sensor blocks, by block id or by ``<robot>/<property>[/<field>]``.
+        """Set the displayed values of sensor blocks. This is not an edit of the program.
 
-        This is not an edit of the program. Values whose key is in ``old`` are stale and shown dimmed.
+        Args:
+            values: Formatted values by block id or by ``<robot>/<property>[/<field>]``.
+            old: Keys of stale values, which are dimmed.
         """
         live: Json = {"values": dict(values), "old": sorted(old)}
         if live != self._live:
@@ -257,21 +279,25 @@ class BlocklyView(BlocklyHost):
             self._send_command("live", self._live)
 
     def set_variable_values(self, values: Mapping[str, Mapping[str, object]]) -> None:
-        """Set the displayed values of variables, as a map from id to `VariableValue.to_json`."""
+        """Set the displayed values of variables, as results of `VariableValue.to_json` by id."""
         if values != self._values:
             self._values = dict(values)
             self._send_command("values", self._values)
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Edit a variable: ``{"do": "new" | "rename" | "delete" | "watch" | "show", …}``."""
+        """Edit a variable, or change its display.
+
+        Args:
+            edit: Operation such as ``{"do": "new" | "rename" | "delete" | "watch" | "show", …}``.
+        """
         self._send_command("variable", dict(edit))
 
     def set_alarms(self, alarms: Mapping[str, tuple[str, str]]) -> None:
         """Set the problems of robots shown in the toolbox.
 
         Args:
-            alarms: Status of the dot and sentence by robot name. Other robots have a dot for connected or
-                disconnected.
+            alarms: Pairs of status (colour of the dot) and message by robot name. The dots of other robots
+                show whether the robot is connected.
         """
         states: Json = {name: {"status": status, "words": words} for name, (status, words) in alarms.items()}
         if states != self._alarms:
@@ -279,15 +305,19 @@ class BlocklyView(BlocklyHost):
             self._send_command("alarms", states)
 
     def set_backpack(self, items: Sequence[Mapping[str, object]]) -> None:
-        """Set the contents of the backpack, newest first, as maps with ``id``, ``at`` and ``block``."""
+        """Set the contents of the backpack.
+
+        Args:
+            items: Mappings with ``id``, ``at`` and ``block``, newest first.
+        """
         self._backpack = [dict(item) for item in items]
         self._send_command("backpack", self._backpack)
 
     def set_first_step(self, first: str, robot: bool) -> None:
-        """Show a hint on the empty canvas to drag the block ``first`` there.
+        """Set the hint on the empty canvas, which suggests dragging a first block there.
 
         Args:
-            first: Type of the block.
+            first: Type of the suggested block.
             robot: True if a robot is connected.
         """
         state: Json = {"first": first, "robot": robot}
@@ -296,12 +326,10 @@ class BlocklyView(BlocklyHost):
             self._send_command("begin", state)
 
     def point_at(self, block: str, name: str = "", then: str = "") -> None:
-        """Highlight the category of a block type, then the block; "" ends the highlighting.
-
-        The highlighting also ends when a block of this type is added.
+        """Highlight the category of a block type and then its block, until such a block is added.
 
         Args:
-            block: Type of the block.
+            block: Type of the block; "" ends the highlighting.
             name: Label of the block.
             then: Hint where to put the block.
         """
@@ -316,32 +344,39 @@ class BlocklyView(BlocklyHost):
         self._send_command("undo", None)
 
     def undo_deletion(self) -> None:
-        """Restore the blocks that were deleted last, even if other edits followed."""
+        """Restore the most recently deleted blocks, even if other edits followed."""
         self._send_command("undelete", None)
 
     def move_dragged_blocks(self) -> None:
-        """Move the blocks dragged last from their tab into the shown one."""
+        """Move the most recently dragged blocks from their tab into the shown one."""
         self._send_command("bring", None)
 
     def undo_block_move(self) -> None:
-        """Undo the last `bring_blocks` in both tabs."""
+        """Undo the last `move_dragged_blocks` in both tabs."""
         self._send_command("giveBack", None)
 
     def redo(self) -> None:
-        """Redo the edit that was undone last in the shown tab."""
+        """Redo the most recently undone edit in the shown tab."""
         self._send_command("redo", None)
 
     def edit(self, what: str) -> None:
-        """Apply "copy", "cut", "paste" or "duplicate" to the selected block, and focus the page.
+        """Apply an editing command to the selected block and focus the page.
 
         Has no effect if the page already has the focus, because the page has handled the key itself.
+
+        Args:
+            what: "copy", "cut", "paste" or "duplicate".
         """
         if self.web is not None and not self._has_focus():
             self.setFocus()
             self._send_command("edit", what)
 
     def edit_from_menu(self, what: str) -> None:
-        """Apply "cut", "copy", "paste" or "selectAll" to the page's focused text field, else to blocks."""
+        """Apply an editing command to the page's focused text field, or to the selected block.
+
+        Args:
+            what: "cut", "copy", "paste" or "selectAll".
+        """
         if self.web is None:
             return
         page = self.web.page
@@ -372,7 +407,7 @@ class BlocklyView(BlocklyHost):
         self._send_command("fit", None)
 
     def open_find(self) -> None:
-        """Open the bar for finding blocks in the shown program."""
+        """Open the find bar for blocks in the shown program."""
         self._request_field("find")
 
     def open_search(self) -> None:

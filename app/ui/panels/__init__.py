@@ -1,5 +1,5 @@
-"""Panels of Studio. Each module binds one ``PANEL``; to add a panel, add a module.
+"""Panels of Studio: each module defines one ``PANEL``. To add a panel, add a module.
 
-`base` has the base class. A panel's name is that of its module, because saved layouts contain it. Its parts
-are in a package of the same name. Panels don't import each other.
+`base` contains the base class. A panel's name is the name of its module, because saved layouts contain
+it. The parts of a panel are in a package of the same name. Panels don't import each other.
 """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class AlertsPanel(PanelWidget):
-    """List of active alerts, most severe first."""
+    """Panel with the active alerts, most severe first."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Alerts"))

@@ -29,10 +29,10 @@ def remaining_text(seconds: float) -> str:
 
 
 class ArmedStrip(QWidget):
-    """Strip at the top of every panel that can send messages."""
+    """Strip at the top of a panel that sends messages: switch for arming, and the armed targets."""
 
     for_replay = False
-    """Set to True in subclasses whose targets can be sent while a recording is shown."""
+    """True if sending can be armed while a recording is open; overridden in subclasses."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__()
@@ -115,11 +115,11 @@ class ArmedStrip(QWidget):
         return _("Sending is off")
 
     def arm(self) -> str:
-        """Arm sending. Return the reason if that is not possible, else ""."""
+        """Arm sending. Return the reason if that is not possible, or "" on success."""
         return self.acting.arm()
 
     def summary_text(self) -> str:
-        """Return a summary of the sent messages; panels that show it themselves override this."""
+        """Return a summary of the sent messages, or "" for none; overridden in subclasses."""
         return ""
 
     def token_text(self, target: Target) -> str:
@@ -163,7 +163,7 @@ class ArmedStrip(QWidget):
 
 
 class ArmedMinutes(Menu):
-    """Menu to choose the time after which sending is disarmed."""
+    """Menu for choosing the time after which sending is disarmed automatically."""
 
     def __init__(self, theme: Theme, parent: QWidget, acting: SessionActing) -> None:
         super().__init__(theme, parent, _("Stays armed for"))

@@ -29,7 +29,14 @@ ANY_TYPE = "*"
 
 
 class ShowToast(Protocol):
-    """Signature of the function that shows a toast for some seconds."""
+    """Signature of the function that shows a toast for some seconds.
+
+    Args:
+        words: Text of the toast, such as "Copied robots.Pepper.pose.y".
+        button: Text of the button; "" for no button.
+        run: Called when the button is clicked.
+        until: The toast closes early once this function returns True.
+    """
 
     def __call__(
         self,
@@ -46,18 +53,20 @@ class ShowToast(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PanelContext:
-    """Functions of the window that a panel may use.
+    """Session, theme and functions of the window for use by panels.
 
     Attributes:
-        open_topic: Show a topic in the panel that fits its message type.
-        toast: Confirm an action of the user.
-        run: Run a command of the window by its id (`app.ui.shell.commands.table`).
-        files: Open and save dialogs.
-        keys_to_question: Give the keyboard focus to the question of a running behaviour, if any.
-        plot: Plot a field of a topic; with an empty path, ask for the field.
-        open_beside: Show a topic in an additional panel.
-        why: Open the connection doctor for a panel and a topic; "" stands for any topic.
-        panels: Return the visible panels.
+        session: Session that the window shows.
+        theme: Theme of the window.
+        open_topic: Shows a topic in the panel that fits its message type.
+        toast: Shows a short message that disappears after some seconds.
+        run: Runs a command of the window by its id (`app.ui.shell.commands.table`).
+        files: Dialogs for opening and saving files.
+        focus_question: Gives the keyboard focus to the question of a running behaviour, if there is one.
+        plot: Plots a field of a topic; with an empty path, asks for the field.
+        open_to_side: Shows a topic in an additional panel.
+        open_doctor: Opens the connection doctor for a panel and a topic; "" stands for any topic.
+        panels: Returns the visible panels.
     """
 
     session: Session
@@ -78,10 +87,10 @@ class Blocker:
     """Reason why a panel does not show new data, with a button that resolves it.
 
     Attributes:
-        sentence: The reason.
-        fix: Instruction for the user; may be empty.
+        message: Sentence that states the reason.
+        fix: Instruction for the user, or "".
         button: Text of the button, such as "Resume".
-        run: Action of the button.
+        run: Called when the button is clicked.
     """
 
     message: str
@@ -91,7 +100,12 @@ class Blocker:
 
 
 def paused_blocker(panel: str, go_on: Callable[[], object]) -> Blocker:
-    """Return the hindrance of a paused panel; `panel` is its title, and `go_on` resumes it."""
+    """Return the reason for a paused panel.
+
+    Args:
+        panel: Title of the panel.
+        go_on: Resumes the panel.
+    """
     return Blocker(
         _("{panel} is paused and doesn't show new data.").format(panel=panel),
         "",
@@ -101,7 +115,13 @@ def paused_blocker(panel: str, go_on: Callable[[], object]) -> Blocker:
 
 
 def filter_blocker(panel: str, words: str, clear: Callable[[], object]) -> Blocker:
-    """Return the hindrance of a panel with a filter; `words` is the filter's text and `panel` the title."""
+    """Return the reason for a panel whose filter hides data.
+
+    Args:
+        panel: Title of the panel.
+        words: Text of the filter.
+        clear: Clears the filter.
+    """
     return Blocker(
         _("{panel} only shows entries with “{words}”.").format(panel=panel, words=words),
         "",
@@ -111,7 +131,7 @@ def filter_blocker(panel: str, words: str, clear: Callable[[], object]) -> Block
 
 
 def numbered_title(title: str, number: int) -> str:
-    """Return a numbered title, such as "Plot 2"; the number 1 is left out."""
+    """Format a title with its number, such as "Plot 2"; the number 1 is omitted."""
     return title if number < 2 else _("{panel} {number}").format(panel=title, number=number)
 
 
@@ -124,8 +144,8 @@ class Panel:
         title: Title, wrapped in `lazy`.
         icon: Name of a Lucide icon.
         accepts: Codecs of the topics that the panel can show, such as "image", or `ANY_TYPE`.
-        make: Factory of the widget.
-        several: Several panels of this kind may be open, each with its own topic.
+        make: Creates the widget of the panel.
+        allows_multiple: True if several panels of this kind can be open, each with its own topic.
     """
 
     name: str
@@ -137,16 +157,21 @@ class Panel:
 
 
 class PanelWidget(QWidget):
-    """Base class of the contents of a panel.
+    """Base class of the widget in a panel.
 
-    The title bar of the dock shows `title` and `subtitle` (or the widget of `replaces_title`), then
-    `header_widgets`; its "more" menu contains `more_actions`. `title_changed` is emitted when title or
-    subtitle change.
+    The title bar of the dock shows `title` and `subtitle` (or the widget returned by `title_widget`),
+    followed by `header_widgets`; its "more" menu contains `more_actions`.
+
+    Signals:
+        title_changed: The title or the subtitle changed.
     """
 
     title_changed = Signal()
     shows_video = False
-    """True if `refresh` should run 60 times a second, so that no frame of a 30 fps video is skipped."""
+    """True if `refresh` should run 60 times a second instead of 30.
+
+    Otherwise, frames of a 30 fps video would be skipped.
+    """
 
     def __init__(self, context: PanelContext, title: str) -> None:
         super().__init__()
@@ -163,9 +188,10 @@ class PanelWidget(QWidget):
         self.theme.changed.connect(self.theme_changed)
 
     def make_page_stack(self, *pages: QWidget) -> QStackedWidget:
-        """Fill the panel, without margins, with a stack of `pages`; the first one is visible.
+        """Fill the panel with a stack of pages, of which the first one is visible.
 
-        Return the stack.
+        Returns:
+            The stack.
         """
         stack = QStackedWidget()
         for page in pages:
@@ -189,7 +215,10 @@ class PanelWidget(QWidget):
         return self._subtitle
 
     def header_widgets(self) -> Sequence[QWidget]:
-        """Return the widgets of the title bar: chips next to the title (`place` is "start"), then buttons."""
+        """Return the widgets for the title bar: chips, then buttons.
+
+        The property "place" of the chips is set to "start", so that the dock places them next to the title.
+        """
         for chip in self.chips:
             chip.setProperty("place", "start")
         return [*self.chips, *self.header]
@@ -199,11 +228,16 @@ class PanelWidget(QWidget):
         return None
 
     def more_actions(self) -> Sequence[QAction]:
-        """Return the panel's actions for the "more" menu, where they precede those of the dock."""
+        """Return the panel's actions for the "more" menu, which lists them before the actions of the dock."""
         return ()
 
     def set_title(self, title: str, subtitle: str | None = None) -> None:
-        """Set title and subtitle, and emit `title_changed` if they differ. None keeps the subtitle."""
+        """Set title and subtitle, and emit `title_changed` if one of them differs.
+
+        Args:
+            title: Title without a number.
+            subtitle: Subtitle; None leaves the current one.
+        """
         wanted = (title, self._subtitle if subtitle is None else subtitle)
         if wanted != (self._title, self._subtitle):
             self._title, self._subtitle = wanted
@@ -214,9 +248,10 @@ class PanelWidget(QWidget):
         """Show the current state of the session; called 30 times a second while the panel is visible."""
 
     def badge(self) -> tuple[str, str] | None:
-        """Return count and status for the tab while another panel covers this one; None if nothing is new.
+        """Return text and status of the badge on the panel's tab, or None for no badge.
 
-        Called on every tick while the panel shares its dock, so it must return quickly when nothing changed.
+        The badge is shown while another panel covers this one. This is called on every tick while the panel
+        shares its dock, so it must return quickly if nothing changed.
         """
         return None
 
@@ -241,18 +276,18 @@ class PanelWidget(QWidget):
         """Reset the panel after the session switched between the live network and a recording."""
 
     def show_topic(self, name: str) -> None:
-        """Show a topic; only for panels that accept topics."""
+        """Show a topic. Called only for panels that accept topics."""
 
     def focus_filter(self) -> bool:
         """Move the focus to the filter (key `/`); return False if there is none."""
         return False
 
     def blockers(self) -> Sequence[Blocker]:
-        """Return the reasons within this panel why new data is hidden, such as pause or filter."""
+        """Return the reasons why the panel itself hides new data, such as a pause or a filter."""
         return ()
 
     def awaited_topic(self) -> str:
-        """Return the topic from which no message has arrived yet; "" if the panel is not waiting for one."""
+        """Return the topic whose first message the panel is waiting for, or ""."""
         return ""
 
     def doctor_action(self, topic: str = "") -> EmptyAction:
@@ -266,7 +301,7 @@ class PanelWidget(QWidget):
         return {}
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        """Restore the state from `save_state`; invalid entries are ignored."""
+        """Restore a state returned by `save_state`; invalid entries are ignored."""
 
     def suspendables(self) -> Iterable[Suspendable | None]:
         """Return watches and streams to suspend while the panel is hidden; None entries are skipped."""

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 REFRESH_INTERVAL_S = 0.1
-"""Interval of updates that are not triggered by a new image or detection, such as the frame rate."""
+"""Interval in s between updates without a new image or detection, for example of the frame rate."""
 
 
 class CameraPanel(OneRobotPanel):
-    """Camera of the chosen robot, or of the first robot that has one."""
+    """Panel with the camera of the selected robot, or of the first robot that has a camera."""
 
     shows_video = True
 
@@ -88,7 +88,10 @@ class CameraPanel(OneRobotPanel):
         return (picture, None if silent_s is None else int(silent_s * 2), *found)
 
     def robot_to_show(self) -> RobotLink | None:
-        """Return the chosen robot if it has a camera, else the first connected robot with a camera."""
+        """Return the selected robot if it has a camera, else the first connected one with a camera.
+
+        Return None if no connected robot has a camera.
+        """
         fleet = self.session.fleet
         shown = fleet.current
         there = [shown, *fleet.connected] if shown is not None and shown.is_connected else fleet.connected

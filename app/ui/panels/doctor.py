@@ -28,14 +28,19 @@ from nep.programs.doctor import Finding, report_text, sort_findings
 STATUS = {"error": "error", "warning": "warn", "info": "info", "ok": "ok"}
 BAD_SEVERITIES = frozenset({"error", "warning"})
 WAIT_REPORT_S = 2.0
-"""Waiting time in s after which a panel without messages is reported."""
+"""Time in s that a panel waits for messages before the doctor reports it."""
 MAX_TOPICS = 500
-"""Maximum number of topics in the list of missing topics."""
+"""Maximum number of topics to choose from, and to search for a similar name."""
 
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """Button of a finding: its text and action."""
+    """Button of a finding.
+
+    Attributes:
+        words: Text of the button.
+        run: Called when the button is clicked.
+    """
 
     text: str
     run: Callable[[], object]
@@ -44,7 +49,7 @@ class NextStep:
 
 
 class DoctorPanel(PanelWidget):
-    """List of findings, most severe first, below the choice of the missing topic."""
+    """Panel with a field for the topic whose messages are missing, and the findings, most severe first."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Connection doctor"))
@@ -103,7 +108,11 @@ class DoctorPanel(PanelWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def check_panel(self, asker: PanelWidget | None) -> None:
-        """Include findings about this panel. The caller sets the topic of the doctor before."""
+        """Report findings about a panel too. The topic of the doctor must be set before.
+
+        Args:
+            asker: Panel that shows no new data; None for no panel.
+        """
         if self._asker is not None:
             self._asker.destroyed.disconnect(self._clear_asker)
         self._asker = asker

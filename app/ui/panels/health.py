@@ -172,4 +172,4 @@ def _age_text(age_s: float) -> str:
 
 
 PANEL = Panel("health", lazy("Health"), "heart", (), HealthPanel)
-"""Panel with a robot's responses, its reported state and its way of stopping."""
+"""Panel that shows if a robot responds, the state that it reports, and how it is stopped."""

@@ -1,4 +1,4 @@
-"""Base class of tables that combine the rows of Studio's own network and of other networks."""
+"""Base class of tables with the rows of Studio's own network and of other networks."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Row = TypeVar("Row")
 
 
 class NetworkTable(TablePanel[Row]):
-    """Table panel with a line below the table that reports unreachable networks."""
+    """Table panel with a line below the table that names unreachable networks."""
 
     def __init__(self, context: PanelContext, words: TableTexts, icon: str) -> None:
         super().__init__(context, words, icon)
@@ -34,14 +34,11 @@ class NetworkTable(TablePanel[Row]):
         self._others.triggered.connect(lambda _on=False: context.run(BROWSE_COMMAND))
 
     def has_other_networks(self) -> bool:
-        """Return True if other networks are shown as well."""
+        """Return True if the table shows other networks in addition to Studio's own."""
         return bool(self.session.networks.selected)
 
     def show_networks(self) -> None:
-        """Update the line with unreachable networks.
-
-        The network column is shown if there are several networks.
-        """
+        """Update the line with unreachable networks and the visibility of the network column."""
         self.networks.set_messages([lost_message(each) for each in self.session.networks.selected])
         if self._networks_seen != len(self.session.networks.selected):
             self._networks_seen = len(self.session.networks.selected)
@@ -74,14 +71,17 @@ class NetworkLine(QWidget):
         self.hide()
 
     def set_messages(self, sentences: Sequence[str]) -> None:
-        """Show the sentences, one per line; the widget is hidden if all are empty."""
+        """Show sentences, one per line. The widget is hidden if all of them are empty."""
         said = "\n".join(filter(None, sentences))
         self.words.setText(said)
         show_when(self, bool(said))
 
 
 def are_own_nodes(nodes: Iterable[str]) -> bool:
-    """Return True if all nodes are Studio's own on another network. ROS names nodes after the process."""
+    """Return True if all nodes belong to this Studio, given their names on another network.
+
+    On ROS, the names of nodes contain the process id. Return False if `nodes` is empty.
+    """
     process = f"{NODE_NAME}_{os.getpid()}_"
     names = [name.lstrip("/") for name in nodes]
     return bool(names) and all(name == NODE_NAME or name.startswith(process) for name in names)

@@ -10,14 +10,21 @@ from nep.i18n import _
 
 
 class NoRobotState:
-    """Switches an `EmptyState` between "no robot" and "robot is starting"."""
+    """Controller of an empty state that says "no robot" or "robot is starting".
+
+    Args:
+        empty: Empty state to change.
+        title: Title without a robot.
+        text: Text without a robot.
+        actions: Actions without a robot.
+    """
 
     def __init__(self, empty: EmptyState, title: str, text: str, actions: Sequence[EmptyAction] = ()) -> None:
         self._empty, self._title, self._text, self._actions = empty, title, text, tuple(actions)
         self._coming: tuple[str, ...] = ()
 
     def set_starting(self, coming: tuple[str, ...]) -> None:
-        """Set the robots that are being started; call on every refresh without a robot."""
+        """Set the names of the robots that are starting; call on every refresh without a robot."""
         if coming == self._coming:
             return
         self._coming = coming

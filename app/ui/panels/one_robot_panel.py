@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 
 
 class OneRobotPanel(PanelWidget):
-    """Panel of one robot: the one that the user chose, else the first.
+    """Base class of panels that show one robot: the selected one, else the first.
 
-    A robot that disconnects stays visible until another one is available. The base class calls
-    `fleet_changed` when robots connect, disconnect or are chosen, `show_robot` when another robot has to be
-    shown, and `refresh_robot` on every refresh.
+    A robot that disconnects stays visible until another one is available. Subclasses implement
+    `fleet_changed`, which is called when robots connect, disconnect or are selected, `show_robot`, which is
+    called before another robot is shown, and `refresh_robot`, which is called on every refresh.
     """
 
     def __init__(self, context: PanelContext, title: str) -> None:
@@ -46,7 +46,7 @@ class OneRobotPanel(PanelWidget):
         self.refresh_robot(fleet.link(self._robot) if self._robot else None)
 
     def switch_to(self, link: RobotLink) -> None:
-        """Show another robot and watch its topics."""
+        """Switch to a robot and watch its topics."""
         self.dispose()
         self._robot, self._shown, self._revision = (
             link.name,
@@ -59,22 +59,22 @@ class OneRobotPanel(PanelWidget):
     # -- overridden by subclasses -------------------------------------------------------------------------
 
     def robot_to_show(self) -> RobotLink | None:
-        """Return the robot to show; None keeps the current one."""
+        """Return the robot to show; None leaves the current one."""
         fleet = self.session.fleet
         return fleet.current or fleet.link(self._robot)
 
     def rebuild_key(self, link: RobotLink) -> object:
-        """Return a value that changes when the panel's widgets must be rebuilt by `show_robot`."""
+        """Return a value that changes when `show_robot` must build the panel's widgets again."""
         return link.name
 
     def fleet_changed(self) -> None:
-        """Called after robots connected, disconnected or were chosen."""
+        """Handle that robots connected, disconnected or were selected."""
 
     def show_robot(self, link: RobotLink) -> None:
         """Build the widgets for a robot."""
 
     def refresh_robot(self, link: RobotLink | None) -> None:
-        """Show the current state of the robot; None before the first robot connected."""
+        """Update the panel to the current state of the robot; None before the first robot connects."""
 
     def suspendables(self) -> Iterable[Suspendable | None]:
         return (self._watch,)

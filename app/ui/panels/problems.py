@@ -40,7 +40,17 @@ NO_PROBLEMS = lazy("No problems.\nIf something needs fixing, it appears here.")
 
 
 class ProblemRow(QWidget):
-    """Row of a problem: icon, block, sentence with its subject in bold, and buttons with fixes."""
+    """Row of a problem: icon, sentence with its subject in bold, and a button for each fix.
+
+    Args:
+        line: Problem with its fixes.
+        large: True for large text.
+
+    Signals:
+        pressed: Id of the block with the problem.
+        fix: Action of the fix to apply.
+        stepped: Number of rows by which to move the focus.
+    """
 
     pressed = Signal(str)
     fix_requested = Signal(str)
@@ -113,7 +123,7 @@ class ProblemRow(QWidget):
 
 
 class ProblemsPanel(PanelWidget):
-    """Panel with the problems of the active behaviour and their number."""
+    """Panel with the problems of the active behaviour."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Problems"))

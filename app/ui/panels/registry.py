@@ -1,4 +1,4 @@
-"""Registry of all panels of Studio and of installed plug-ins, imported on first use."""
+"""Registry of the panels of Studio and of installed plug-ins, which are imported on first use."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from nep.system.plugins import discover
 
 
 class PanelRegistry(Mapping[str, Panel]):
-    """Mapping of panel names to panels, imported on first access.
+    """Mapping of panel names to panels.
 
-    The start page needs no panel, and importing all modules takes time.
+    All panel modules are imported on the first access, because this takes time and the start page needs
+    none.
     """
 
     @cached_property
@@ -23,7 +24,7 @@ class PanelRegistry(Mapping[str, Panel]):
         return discover(panels.__name__, "PANEL", Panel)
 
     def steps(self) -> Sequence[Callable[[], object]]:
-        """Return callables that import the panel modules one by one, which takes a few milliseconds each."""
+        """Return functions that import one panel module each, to divide the import into short steps."""
         names = [info.name for info in pkgutil.iter_modules(panels.__path__, f"{panels.__name__}.")]
         return [*(partial(importlib.import_module, name) for name in names), lambda: self._panels]
 

@@ -15,7 +15,13 @@ from nep.i18n import _
 
 
 class RowAction(NamedTuple):
-    """Action in a row's context menu."""
+    """Action in the context menu of a row.
+
+    Attributes:
+        text: Text in the menu.
+        icon: Name of the icon.
+        run: Called when the user selects the action.
+    """
 
     text: str
     icon: str
@@ -30,7 +36,12 @@ def fill_menu(menu: Menu, theme: Theme, actions: Iterable[RowAction]) -> Menu:
 
 
 def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
-    """Return the actions for a topic; `key` is its name with the network (`key_of`)."""
+    """Return the context menu actions for a topic.
+
+    Args:
+        context: Functions of the window.
+        key: Key of the topic: its name with the network, as returned by `key_of`.
+    """
     network, name = split_key(key)
     actions = [
         RowAction(_("Show messages"), "list-tree", lambda: show_messages(context, key)),
@@ -49,7 +60,7 @@ def topic_actions(context: PanelContext, key: str) -> list[RowAction]:
 
 
 def service_actions(context: PanelContext, name: str) -> list[RowAction]:
-    """Return the actions for a service of Studio's own network."""
+    """Return the context menu actions for a service of Studio's own network."""
     return [
         RowAction(_("Call service"), "play", lambda: context.run(f"service.call:{name}")),
         copy_action(context, name),
@@ -57,7 +68,13 @@ def service_actions(context: PanelContext, name: str) -> list[RowAction]:
 
 
 def node_actions(context: PanelContext, network: str, name: str) -> list[RowAction]:
-    """Return the actions for a node; `network` is "" for Studio's own network."""
+    """Return the context menu actions for a node.
+
+    Args:
+        context: Functions of the window.
+        network: Network of the node; "" for Studio's own network.
+        name: Name of the node.
+    """
     actions: list[RowAction] = []
     if not network:
         actions.append(RowAction(_("New alarm"), "bell", lambda: context.run(f"alarm.node:{name}")))
@@ -75,12 +92,12 @@ def copy_action(context: PanelContext, name: str) -> RowAction:
 
 
 def show_messages(context: PanelContext, key: str) -> None:
-    """Show the messages of a topic. The topic then no longer counts as new."""
+    """Show the messages of a topic and mark the topic as no longer new."""
     context.session.mark_seen(key)
     context.open_topic(key)
 
 
 def has_fields(context: PanelContext, key: str) -> bool:
-    """Return True unless the topic contains images, which have no fields to plot."""
+    """Return False for topics with images, which have no fields to plot, else True."""
     topic = context.session.topic(key)
     return topic is None or topic.codec != "image"

@@ -45,7 +45,12 @@ class SensorRow(QWidget):
         self.setAccessibleName(self.title)
 
     def show_value(self, value: object, now: float) -> None:
-        """Show the newest value. Repaints only if the text changes."""
+        """Show the newest value of the sensor. The row is repainted only if its text changes.
+
+        Args:
+            value: Newest value.
+            now: Monotonic time in s.
+        """
         reading = reading_text(self.sensor, value)
         if value is True:
             self._yes_s = now

@@ -27,7 +27,7 @@ SENDERS = {
     "image": ("mouse-pointer-click", lazy("Image")),
     "switch": ("triangle-alert", lazy("Studio")),
 }
-"""Icon and name of each kind of sender."""
+"""Icon and name of each kind of sender, by id."""
 MAX_TIP_CHARS = 1000
 STATE_UPDATE_TICKS = 6  # refreshes at 30 Hz
 
@@ -154,7 +154,7 @@ class SentPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def repeat(self) -> None:
-        """Send the selected entry again if its target is armed."""
+        """Send the selected entry again. Show a confirmation if necessary, or the reason on failure."""
         record = self.selected()
         why_not = self.acting.repeat(record.number) if record is not None else ""
         if why_not:
@@ -179,7 +179,11 @@ class SentPanel(PanelWidget):
         self.refresh()
 
     def show_row(self, key: str) -> None:
-        """Show the topic or the service of an entry in its panel."""
+        """Show the topic or service of an entry in the panel for it.
+
+        Args:
+            key: Key of the entry.
+        """
         record = self.acting.sent.get(int(key))
         if record is None or not record.name:
             return

@@ -26,7 +26,14 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True)
 class TableTexts:
-    """Texts of a table panel, such as "Topics" and "Filter topics", each wrapped in `lazy`."""
+    """Texts of a table panel, each wrapped in `lazy`.
+
+    Attributes:
+        title: Title of the panel, such as "Topics".
+        filter: Placeholder of the filter, such as "Filter topics".
+        no_matches: Title of the empty state if no row matches the filter.
+        clear_filter_hint: Text of the empty state if no row matches the filter.
+    """
 
     title: str
     filter: str
@@ -40,8 +47,8 @@ class TablePanel(PanelWidget, Generic[Row]):
     """Panel with one table. Subclasses implement `make_model`, `make_table`, `rebuild` and `open_row`.
 
     Attributes:
-        pages: Stack of the table and the empty state; `show_table` switches between them.
-        empty: Empty state.
+        pages: Stack of the table and the empty state; `show_table` selects the page.
+        empty: Empty state, shown without rows.
         line: Separator between the table and `foot`.
         foot: Short text below the table.
     """
@@ -106,11 +113,16 @@ class TablePanel(PanelWidget, Generic[Row]):
             menu.popup(at)
 
     def filter_words(self) -> list[str]:
-        """Return the words of the filter. Matching rows contain all of them."""
+        """Return the words of the filter. A row matches if it contains all of them."""
         return self.filter.text().casefold().split()
 
     def show_table(self, any_rows: bool, filtered: bool) -> None:
-        """Show the table if there are `any_rows`, else the empty state, which depends on `filtered`."""
+        """Show the table or the empty state.
+
+        Args:
+            any_rows: True if the table has rows.
+            filtered: True if the filter is not empty; the empty state then offers to clear it.
+        """
         self.pages.setCurrentIndex(0 if any_rows else 1)
         self.doctor.setVisible(not any_rows and not filtered)
         if any_rows:
@@ -134,7 +146,7 @@ class TablePanel(PanelWidget, Generic[Row]):
             self.update_empty_state()
 
     def missing_topic(self) -> str:
-        """Return the topic that was typed into the filter but does not exist, else ""."""
+        """Return the name of a topic that was typed into the filter but does not exist, or ""."""
         return ""
 
     def blockers(self) -> list[Blocker]:
@@ -142,7 +154,7 @@ class TablePanel(PanelWidget, Generic[Row]):
         return [filter_blocker(self.title(), words, self.filter.clear)] if words else []
 
     def update_empty_state(self) -> None:
-        """Set the texts of `empty` for a table without rows, depending on the state of the master."""
+        """Set the texts of the empty state for a table without rows while a master is running."""
         raise NotImplementedError
 
     def focus_filter(self) -> bool:

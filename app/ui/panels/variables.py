@@ -1,4 +1,4 @@
-"""Variables panel: variables of the behaviour with their current or final values."""
+"""Variables panel: variables of the behaviour with their current values, or the last ones after a run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,13 @@ ICONS = {"number": "hash", "text": "quote", "boolean": "toggle-left", "list": "l
 class VariableRow:
     """Row of a variable, or of an item of a list.
 
-    Items are counted from 1; `value` is None before the first run.
+    Attributes:
+        variable: Variable of the row.
+        value: Current value; None before the first run.
+        opened: True if the list is expanded.
+        item: Number of the item, counted from 1; 0 for the variable itself.
+        fresh: True for a moment after the value changed.
+        over: True if the run has ended.
     """
 
     variable: Variable
@@ -53,12 +59,12 @@ class VariableRow:
 
     @property
     def key(self) -> str:
-        """Stable key of the row."""
+        """Key that identifies the row across updates of the table."""
         return f"{self.variable.id} {self.item}"
 
     @property
     def value_text(self) -> str:
-        """Value formatted as short text."""
+        """Value as short text; "" before the first run."""
         if self.value is None:
             return ""
         if self.item:
@@ -70,7 +76,7 @@ class VariableRow:
 
 
 def name_cell(row: VariableRow) -> Cell:
-    """Return the cell with the variable's name and the icon of its type; lists have an arrow."""
+    """Return the cell with name and type icon of the variable; lists have an arrow for expanding."""
     if row.item:
         return Cell(str(row.item), role="textTertiary", indent=INDENT)
     kind = row.value.kind if row.value is not None else ""
@@ -82,7 +88,7 @@ def name_cell(row: VariableRow) -> Cell:
 
 
 def value_cell(row: VariableRow) -> Cell:
-    """Return the cell with the value, highlighted while new and grey after the run has ended."""
+    """Return the cell with the value, highlighted after a change and grey after the end of the run."""
     if row.is_new and not row.item:
         return Cell(row.value_text, role="changed", tint="changedTint")
     return Cell(row.value_text, role="textSecondary" if row.has_ended else "text")
@@ -106,7 +112,16 @@ def rows_of(
     fresh: Collection[str] = (),
     over: bool = False,
 ) -> list[VariableRow]:
-    """Return the rows in sort order. Each list whose id is in `opened` is followed by its first items."""
+    """Return the rows of the table, sorted.
+
+    Args:
+        variables: Variables of the behaviour.
+        values: Values by variable id.
+        opened: Ids of expanded lists, which are followed by the rows of their first items.
+        order: Sort order of the variables.
+        fresh: Ids of variables whose value has just changed.
+        over: True if the run has ended.
+    """
     rows: list[VariableRow] = []
     heads = [
         VariableRow(each, values.get(each.id), each.id in opened, is_new=each.id in fresh, has_ended=over)
@@ -123,7 +138,7 @@ def rows_of(
 
 
 class VariablesPanel(TablePanel[VariableRow]):
-    """Panel with the table of variables. Actions are in the context menu of a variable."""
+    """Panel with the table of variables. The context menu of a variable contains the actions."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, TABLE_TEXTS, "variable")

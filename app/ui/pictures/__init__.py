@@ -1,4 +1,4 @@
-"""Widgets that display images, fitted or zoomed, with annotations and detections.
+"""Widgets that display images, fitted to the view or zoomed, with annotations and detections.
 
-Used by the panels Image and Camera; images are decoded by `app.core.messages`.
+Used by the panels Image and Camera; `app.core.messages` decodes the images.
 """

@@ -1,4 +1,4 @@
-"""Painters of image annotations (points, lines, areas, circles, texts) and of the colour bar."""
+"""Painting of image annotations (points, lines, areas, circles, texts) and of the colour bar."""
 
 from __future__ import annotations
 
@@ -27,8 +27,11 @@ def paint_annotations(
     """Paint annotations over an image.
 
     Args:
+        painter: Painter in view coordinates.
+        theme: Theme, for the fonts.
         shares: Transform from image fractions to the view.
         scale: Width of an image pixel in the view.
+        drawn: Annotations.
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -94,12 +97,12 @@ def _colour(colour: Colour) -> QColor:
 
 
 def bar_label(value: float) -> str:
-    """Format the value at an end of a colour bar."""
+    """Format a value of the colour bar with four significant digits."""
     return number(value, ".4g")
 
 
 def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: ColourScale) -> None:
-    """Paint the colour scale at the upper right of the view, unless the view is too low."""
+    """Paint the colour bar at the upper right of the view; nothing if the view is not high enough."""
     font = theme.font("small")
     line = paint.height_of(font)
     high = min(BAR_SIZE.height(), view.height() - 2 * BAR_MARGIN - 2 * line - 40)
@@ -118,6 +121,6 @@ def paint_colour_bar(painter: QPainter, theme: Theme, view: QRectF, scale: Colou
 
 
 def bar_image(scale: ColourScale) -> QImage:
-    """Return the 256 colours of the scale as an image, with the last one at the top."""
+    """Return the 256 colours of a scale as an image one pixel wide, with the last colour at the top."""
     colours = scale.colours[::-1].copy()
     return QImage(colours.data, 1, 256, 3, QImage.Format.Format_RGB888).copy()

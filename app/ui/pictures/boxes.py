@@ -1,4 +1,4 @@
-"""Bounding boxes of detections, and the assignment of detections to images."""
+"""Bounding boxes of detections, and the association of detections with images."""
 
 from __future__ import annotations
 
@@ -26,7 +26,14 @@ BOX_TEXT_COLOUR = "#1C1B19"
 
 @dataclass(frozen=True, slots=True)
 class DetectionBox:
-    """Bounding box of a detection: label, confidence (0 to 1 or None), rectangle in image fractions."""
+    """Bounding box of a detected object.
+
+    Attributes:
+        label: Label of the box.
+        confidence: Confidence from 0 to 1; None if unknown.
+        rect: Rectangle in fractions of the image.
+        sensor_index: Index of the sensor, which selects the colour.
+    """
 
     label: str
     confidence: float | None
@@ -35,7 +42,12 @@ class DetectionBox:
 
 
 def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
-    """Return the bounding boxes in a value of detections; malformed items are skipped."""
+    """Return the bounding boxes in the value of a detection sensor; malformed items are skipped.
+
+    Args:
+        detections: Value of the sensor.
+        kind: Index of the sensor, which selects the colour.
+    """
     if not isinstance(detections, Mapping):
         return ()
     width, height = _number(detections.get("width")), _number(detections.get("height"))
@@ -55,7 +67,12 @@ def boxes_of(detections: object, kind: int = 0) -> tuple[DetectionBox, ...]:
 
 
 def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
-    """Return the bounding boxes of all detections in this camera's images, with one colour per sensor."""
+    """Return the bounding boxes of all detections in a camera's images, with one colour per sensor.
+
+    Args:
+        link: Robot.
+        topic: Topic of the camera.
+    """
     cameras = {sensor.name for sensor in link.robot.sensors if sensor.topic == topic}
     found: list[DetectionBox] = []
     detecting = [sensor for sensor in link.robot.sensors if sensor.kind == "detections"]
@@ -66,12 +83,12 @@ def boxes_in_camera(link: RobotLink, topic: str) -> tuple[DetectionBox, ...]:
 
 
 def camera_of(link: RobotLink) -> Sensor | None:
-    """Return the first camera of a robot, or None."""
+    """Return the first camera of a robot, or None if the robot has no camera."""
     return next((sensor for sensor in link.robot.sensors if sensor.is_image and sensor.topic), None)
 
 
 def robot_of_camera(session: Session, topic: str) -> RobotLink | None:
-    """Return the robot whose camera publishes the topic, or None."""
+    """Return the robot whose camera publishes on a topic, or None if there is none."""
     for link in session.fleet.links:
         if any(sensor.is_image and sensor.topic == topic for sensor in link.robot.sensors):
             return link
@@ -79,7 +96,14 @@ def robot_of_camera(session: Session, topic: str) -> RobotLink | None:
 
 
 def paint_box(painter: QPainter, theme: Theme, place: QRectF, box: DetectionBox) -> None:
-    """Paint a bounding box around ``place`` (in view pixels), with its label upright above it."""
+    """Paint a bounding box with an upright label above it.
+
+    Args:
+        painter: Painter in view coordinates.
+        theme: Theme, for the font.
+        place: Rectangle of the box in view coordinates.
+        box: Bounding box.
+    """
     colour = QColor(BOX_COLOURS[box.sensor_index % len(BOX_COLOURS)])
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setBrush(Qt.BrushStyle.NoBrush)

@@ -1,4 +1,4 @@
-"""Image view whose pixels can be clicked. Drags and double clicks don't count as clicks."""
+"""Image view whose pixels can be clicked."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ BUTTONS: dict[Qt.MouseButton, Button] = {
 
 
 class ClickablePicture(ZoomablePicture):
-    """Image view that emits `clicked` with a `PicturePoint`.
+    """Image view that emits `clicked` with a `PicturePoint` when the user clicks a pixel.
 
-    The point is that of the press. It is emitted after the double-click interval, or immediately when another
-    place is clicked. On the keyboard, the arrow keys move a cursor by a pixel, with Shift by ten, and Enter
-    clicks.
+    The signal is emitted after the double-click interval, or immediately if the user clicks elsewhere. Drags
+    and double clicks don't count as clicks. On the keyboard, the arrow keys move a cursor by one pixel (with
+    Shift by ten), and Enter clicks.
     """
 
     clicked = Signal(object)
@@ -52,11 +52,12 @@ class ClickablePicture(ZoomablePicture):
 
     @property
     def accepts_clicks(self) -> bool:
-        """True if clicks are emitted. Pending clicks are discarded when it changes."""
+        """True if clicks are emitted. Setting another value discards a pending click."""
         return self._takes_clicks
 
     @accepts_clicks.setter
     def accepts_clicks(self, takes: bool) -> None:
+        """True if clicks are emitted. Setting another value discards a pending click."""
         if takes != self._takes_clicks:
             self._takes_clicks = takes
             self.discard_click()

@@ -1,7 +1,7 @@
 """Placement of an image in its view: zoom, position, rotation and mirroring. Independent of widgets.
 
-Positions in the image are fractions of its received width and height, 0 to 1 from the upper left corner;
-positions in the view are in logical pixels.
+Positions in the image are fractions of the size of the received image, from 0 to 1 starting at the upper left
+corner; positions in the view are in logical pixels.
 """
 
 from __future__ import annotations
@@ -23,7 +23,9 @@ class PicturePlacement:
     Attributes:
         zoom: Logical pixels per image pixel, or None to fit the view.
         centre: Point at the centre of the view, as fractions of the rotated image.
-        turned: Clockwise rotation in degrees.
+        rotation_deg: Clockwise rotation in degrees.
+        is_flipped_horizontally: True if the image is mirrored horizontally.
+        is_flipped_vertically: True if the image is mirrored vertically.
     """
 
     zoom: float | None = None
@@ -35,13 +37,17 @@ class PicturePlacement:
     # -- geometry -----------------------------------------------------------------------------------------
 
     def rotated_size(self, picture: QSizeF) -> QSizeF:
-        """Return the size of the rotated image."""
+        """Return the size of the rotated image in image pixels."""
         return picture.transposed() if self.rotation_deg % 180 else picture
 
     def fit_zoom(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> float:
         """Return the zoom that fits the image into the view.
 
-        With ``fill``, up to a tenth of the image may be cut off at the edges.
+        Args:
+            view: Size of the view.
+            picture: Size of the image.
+            fill: True to fill the view instead, if the shapes of view and image are similar; the edges of the
+                image are cut off.
         """
         seen = self.rotated_size(picture)
         across, down = view.width() / max(1.0, seen.width()), view.height() / max(1.0, seen.height())
@@ -51,9 +57,9 @@ class PicturePlacement:
         return scale
 
     def area(self, view: QSizeF, picture: QSizeF, *, fill: bool = False) -> QRectF:
-        """Return the rectangle of the rotated image in the view.
+        """Return the rectangle of the rotated image in the view; arguments as for `fit_zoom`.
 
-        The rectangle may exceed the view, but leaves no gap that a different position would avoid.
+        The rectangle may exceed the view. It leaves a gap only if the image is smaller than the view.
         """
         scale = self.zoom if self.zoom is not None else self.fit_zoom(view, picture, fill=fill)
         seen = self.rotated_size(picture) * scale
@@ -72,16 +78,22 @@ class PicturePlacement:
         return transform
 
     def to_view(self, area: QRectF) -> QTransform:
-        """Return the transform from the image (in fractions) to the view."""
+        """Return the transform from fractions of the image to the view.
+
+        Args:
+            area: Rectangle of the rotated image in the view.
+        """
         transform = QTransform()
         transform.translate(area.x(), area.y())
         transform.scale(area.width(), area.height())
         return self.orientation() * transform
 
     def to_picture(self, at: QPointF, area: QRectF) -> QPointF:
-        """Return the position in the image (in fractions) of a point in the view.
+        """Convert a point in the view to fractions of the image; below 0 or above 1 beside the image.
 
-        Values below 0 or above 1 are beside the image.
+        Args:
+            at: Point in the view.
+            area: Rectangle of the rotated image in the view.
         """
         back, _good = self.to_view(area).inverted()
         return back.map(at)
@@ -89,7 +101,7 @@ class PicturePlacement:
     # -- commands of the user -----------------------------------------------------------------------------
 
     def zoom_at(self, factor: float, at: QPointF, view: QSizeF, picture: QSizeF) -> None:
-        """Zoom by a factor around a point of the view."""
+        """Zoom by a factor; the image point at ``at`` (in the view) stays in place."""
         area = self.area(view, picture)
         before = area.width() / max(1.0, self.rotated_size(picture).width())
         smallest = min(SMALLEST, self.fit_zoom(view, picture))
@@ -105,7 +117,7 @@ class PicturePlacement:
         self._normalize_centre(view, picture)
 
     def move(self, dx: float, dy: float, view: QSizeF, picture: QSizeF) -> None:
-        """Move the image by a distance in px. An image that fits into the view stays in place."""
+        """Move the image by a distance in px. An image that is fitted to the view stays in place."""
         area = self.area(view, picture)
         if self.zoom is None:
             return
@@ -132,7 +144,11 @@ class PicturePlacement:
             self.centre = (1 - self.centre[0], 1 - self.centre[1])
 
     def flip(self, *, across: bool) -> None:
-        """Mirror the image horizontally if `across`, else vertically."""
+        """Mirror the image.
+
+        Args:
+            across: True to mirror horizontally, False to mirror vertically.
+        """
         x, y = self.centre
         if across:
             self.is_flipped_horizontally, self.centre = not self.is_flipped_horizontally, (1 - x, y)
@@ -150,7 +166,7 @@ class PicturePlacement:
     # -- saved with the layout ----------------------------------------------------------------------------
 
     def to_json(self) -> dict[str, object]:
-        """Return the placement as JSON values for a layout."""
+        """Return the placement as a JSON object, which is saved with the layout."""
         return {
             "zoom": self.zoom,
             "centre": list(self.centre),
@@ -160,7 +176,7 @@ class PicturePlacement:
         }
 
     def restore(self, saved: object) -> None:
-        """Restore a placement returned by `saved`; invalid values are ignored."""
+        """Restore a placement from the result of `to_json`; invalid values are ignored."""
         if not isinstance(saved, Mapping):
             return
         zoom, centre, turned = saved.get("zoom"), saved.get("centre"), saved.get("turned")

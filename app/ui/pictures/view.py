@@ -1,4 +1,4 @@
-"""Image view of a stream: fitted or zoomed, rotated, with boxes and the value of the hovered pixel."""
+"""View of an image stream: fitted or zoomed, with detections and the value of the hovered pixel."""
 
 from __future__ import annotations
 
@@ -36,7 +36,12 @@ ICON_SIZE = 28.0
 
 
 def rate_text(shown_hz: float | None, arriving_hz: float | None) -> str:
-    """Format frame rates, such as ``shown 30 of 60/s``; "" if both are unknown."""
+    """Format frame rates, such as ``60 fps (30 shown)``; "" if the rate of the stream is unknown.
+
+    Args:
+        shown_hz: Rate of painted images; None if unknown.
+        arriving_hz: Rate of received images; None if unknown.
+    """
     if arriving_hz is None:
         return ""
     shown = min(shown_hz, arriving_hz) if shown_hz is not None else 0.0
@@ -44,9 +49,12 @@ def rate_text(shown_hz: float | None, arriving_hz: float | None) -> str:
 
 
 class RateText:
-    """Text with the frame rates of a stream, updated at most once a second.
+    """Formatter for the frame rates of a stream, whose text changes at most once a second.
 
-    Rates that change with every image would be unreadable, and texts of different lengths move adjacent text.
+    A text that changes with every image would be unreadable.
+
+    Args:
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -66,7 +74,13 @@ class RateText:
 
 
 def pixel_text(x: int, y: int, pixel: Pixel | None) -> str:
-    """Format a pixel, such as ``(16, 8)  196 198 190  #C4C6BE``, or with a single number for one channel."""
+    """Format a pixel, such as ``(16, 8)  196 198 190  #C4C6BE``.
+
+    Args:
+        x: Column of the pixel.
+        y: Row of the pixel.
+        pixel: Colour as RGB, or the value of a single channel; None if unknown.
+    """
     if pixel is None:
         return f"({x}, {y})"
     if isinstance(pixel, int | float):
@@ -78,7 +92,7 @@ def pixel_text(x: int, y: int, pixel: Pixel | None) -> str:
 class PictureView(QWidget):
     """Widget that shows the newest image of a stream.
 
-    Call `show_image` on every refresh; it repaints only changes.
+    Call `show_image` on every refresh; only changes are repainted.
     """
 
     def __init__(
@@ -114,7 +128,7 @@ class PictureView(QWidget):
 
     @property
     def label_text(self) -> str:
-        """Text of the label at the lower left."""
+        """Text of the label at the lower left; "" without an image."""
         picture = self._picture
         if picture is None:
             return ""
@@ -126,7 +140,7 @@ class PictureView(QWidget):
 
     @property
     def boxes(self) -> tuple[DetectionBox, ...]:
-        """Detection boxes on the current image."""
+        """Bounding boxes of detections on the current image."""
         return self._boxes
 
     @property
@@ -136,11 +150,11 @@ class PictureView(QWidget):
 
     @property
     def picture(self) -> Picture | None:
-        """Image that is shown, or None."""
+        """Current image, or None."""
         return self._picture
 
     def clear(self) -> None:
-        """Remove the image from the view."""
+        """Remove the image and its label from the view."""
         self._picture = self._image = self._grey = None
         self._boxes, self._drawn = (), ()
         self._rate = self._state = self._age = ""
@@ -154,7 +168,13 @@ class PictureView(QWidget):
         boxes: tuple[DetectionBox, ...] = (),
         drawn: Callable[[int, int], tuple[Shape, ...]] | None = None,
     ) -> None:
-        """Show the stream's newest image; ``drawn`` returns the annotations for an image of a given size."""
+        """Show the newest image of a stream.
+
+        Args:
+            stream: Stream of images.
+            boxes: Bounding boxes of detections on the image.
+            drawn: Returns the annotations for an image with the given width and height.
+        """
         words, before = self.label_text, (self._boxes, self._drawn, self._silent, self._state)
         picture, shown, silent_s = stream.picture, self._picture, stream.silent_s
         self._rate = self._rates.for_stream(stream)
@@ -216,18 +236,18 @@ class PictureView(QWidget):
         return QSizeF(picture.width, picture.height) if picture is not None else QSizeF(self.size())
 
     def area(self) -> QRectF:
-        """Return the rectangle of the rotated image, which may exceed the view."""
+        """Return the rectangle of the rotated image in the view, which it may exceed."""
         if self._picture is None:
             return QRectF(self.rect())
         return self.place.area(QSizeF(self.size()), self.picture_size(), fill=self._fill)
 
     def scale(self) -> float:
-        """Return the number of screen pixels per image pixel."""
+        """Return the number of device pixels per image pixel."""
         seen = self.place.rotated_size(self.picture_size()).width()
         return self.area().width() / max(1.0, seen) * self.devicePixelRatioF()
 
     def pixel_at(self, at: QPointF) -> tuple[int, int] | None:
-        """Return the image pixel at a point of the view; None beside the image."""
+        """Return the column and row of the image pixel at a point of the view; None outside of the image."""
         picture = self._picture
         if picture is None:
             return None
@@ -309,7 +329,7 @@ class PictureView(QWidget):
 
 
 def paint_blurred_background(painter: QPainter, view: QRectF, image: QImage) -> None:
-    """Fill the view around an image with a blurred and darkened copy of it instead of black borders."""
+    """Fill the view with a blurred and darkened copy of an image, instead of black borders."""
     ignore, smooth = Qt.AspectRatioMode.IgnoreAspectRatio, Qt.TransformationMode.SmoothTransformation
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
@@ -324,7 +344,7 @@ def to_greyscale(image: QImage) -> QImage:
 
 
 def paint_stale(painter: QPainter, theme: Theme, view: QRectF, words: str) -> None:
-    """Paint a camera icon and the image's age in the middle of the view."""
+    """Darken the view and paint a camera icon with a text in the middle, for a stream without new images."""
     painter.fillRect(view, SILENT)
     font = theme.font("bodyLarge")
     font.setWeight(font.Weight.DemiBold)

@@ -1,4 +1,4 @@
-"""Image view that can be zoomed and moved by mouse, touch pad and keyboard."""
+"""Image view that can be zoomed and moved with mouse, touch pad and keyboard."""
 
 from __future__ import annotations
 
@@ -18,8 +18,11 @@ KEY_DIRECTIONS = {"Left": (1, 0), "Right": (-1, 0), "Up": (0, 1), "Down": (0, -1
 class ZoomablePicture(PictureView):
     """Image view in which wheel, pinch and double click zoom, and dragging and arrow keys move the image.
 
-    Emits `place_changed` after user input, and `key_pressed` with the name of a key in ``keys`` such as
-    "Ctrl+C". These keys take precedence over the window's shortcuts while the image has the focus.
+    Emits `placement_changed` when the user has changed the placement, and `key_pressed` with the name of a
+    pressed key. Keys in `keys` take precedence over the window's shortcuts while the image has the focus.
+
+    Attributes:
+        keys: Names of the reported keys, such as "Ctrl+C".
     """
 
     placement_changed = Signal()
@@ -33,7 +36,12 @@ class ZoomablePicture(PictureView):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
 
     def zoom_by(self, factor: float, at: QPointF | None = None) -> None:
-        """Zoom by a factor around ``at``, by default the centre."""
+        """Zoom by a factor around a point of the view.
+
+        Args:
+            factor: Factor; greater than 1 to zoom in.
+            at: Point that stays in place (default: the centre).
+        """
         middle = QPointF(self.width() / 2, self.height() / 2)
         self.place.zoom_at(factor, at or middle, QSizeF(self.size()), self.picture_size())
         self.notify_changed()
@@ -44,7 +52,11 @@ class ZoomablePicture(PictureView):
         self.notify_changed()
 
     def show_actual_size(self, at: QPointF | None = None) -> None:
-        """Show one screen pixel per image pixel, around ``at``."""
+        """Show one device pixel per image pixel.
+
+        Args:
+            at: Point of the view that stays in place (default: the centre).
+        """
         self.zoom_by(1 / max(1e-9, self.scale()), at)
 
     def move_by(self, dx: float, dy: float) -> None:
@@ -53,7 +65,7 @@ class ZoomablePicture(PictureView):
         self.notify_changed()
 
     def notify_changed(self) -> None:
-        """Repaint and emit `place_changed`."""
+        """Repaint and emit `placement_changed`."""
         self.update()
         self.placement_changed.emit()
 
@@ -123,7 +135,7 @@ def _is_key(event: QEvent) -> TypeGuard[QKeyEvent]:
 
 
 def key_name(event: QKeyEvent) -> str:
-    """Return the name of a key with its modifiers, such as "Ctrl+C", "R" or "+"."""
+    """Return the name of a pressed key with its modifiers, such as "Ctrl+C", "R" or "+"."""
     held = event.modifiers()
     text = event.text()
     if text and text in "+-":  # on some keyboards these keys need Shift, or are on the number pad

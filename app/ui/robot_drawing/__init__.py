@@ -1,4 +1,4 @@
 """Drawing of virtual robots in their room.
 
-`scene` composes the room, its objects and the robots; `pepper` and `turtle` paint the figures.
+`scene` paints the room with its objects and robots; `pepper` and `turtle` paint the robots.
 """

@@ -1,4 +1,4 @@
-"""Speech bubble of a robot with the wrapped text; a long text scrolls as it is spoken."""
+"""Speech bubble of a robot with wrapped text; a long text scrolls while it is spoken."""
 
 from __future__ import annotations
 
@@ -16,12 +16,18 @@ SHORT_LINES, MAX_LINES, MAX_NARROW = 4, 6, 8
 LARGE, SMALL = 14, 12
 INSIDE, EDGE = 14.0, 8.0
 LINES_ABOVE_SPOKEN = 2
-"""Number of visible lines above the spoken one."""
+"""Number of visible lines above the line that is being spoken."""
 
 
 @dataclass(frozen=True, slots=True)
 class BubbleText:
-    """Wrapped text; ``first`` is the index of the top line, ``shown`` the number of visible lines."""
+    """Wrapped and scrolled text of a speech bubble.
+
+    Attributes:
+        lines: All lines of the text.
+        first: Index of the first visible line.
+        visible_count: Number of visible lines.
+    """
 
     lines: Sequence[str]
     first: int
@@ -29,12 +35,12 @@ class BubbleText:
 
     @property
     def visible_lines(self) -> Sequence[str]:
-        """Lines that are visible."""
+        """Visible lines."""
         return self.lines[self.first : self.first + self.visible_count]
 
 
 def wrap_text(words: str, metrics: QFontMetricsF, width: float) -> list[str]:
-    """Wrap a text to a width in px; a longer word continues in the next line."""
+    """Wrap a text to a width in px; words that are too long are split."""
     lines = [""]
     for word in words.split():
         tried = f"{lines[-1]} {word}".strip()
@@ -59,7 +65,13 @@ def _split_word(word: str, metrics: QFontMetricsF, width: float) -> list[str]:
 
 
 def scroll_to_spoken(lines: Sequence[str], most: int, spoken: float) -> BubbleText:
-    """Return as many lines as fit, scrolled to the spoken word (``spoken`` from 0 to 1)."""
+    """Scroll a wrapped text so that the spoken line is visible.
+
+    Args:
+        lines: Lines of the text.
+        most: Maximum number of visible lines.
+        spoken: Spoken fraction of the text, 0 to 1.
+    """
     shown = max(1, min(most, len(lines)))
     letters = sum(len(line) for line in lines)
     position, line = spoken * letters, 0
@@ -81,13 +93,15 @@ def paint_bubble(
     font: QFont,
     taken: Sequence[QRectF] = (),
 ) -> QRectF:
-    """Paint the speech bubble of a robot beside its head, and return the bubble's rectangle.
+    """Paint the speech bubble of a robot beside its head, and return the rectangle of the bubble.
 
     Args:
         p: Painter in stage units.
         bounds: Area for the bubble.
-        head: Rectangle of the head.
-        taken: Rectangles of other bubbles, which are covered only if there is no other place.
+        head: Position of the head, with its scale.
+        state: State of the robot, with the text.
+        font: Font of the text.
+        taken: Rectangles of other bubbles, which are covered only if there is no free space.
     """
     near, words = 31.0 * head.scale, state.caption
     room_right, room_left = bounds.right() - EDGE - head.u - near, head.u - near - bounds.left() - EDGE
@@ -144,7 +158,14 @@ def _choose_box(
 
 
 def paint_caption(p: QPainter, area: QRectF, words: str, font: QFont) -> None:
-    """Paint a caption, in one line at the bottom of ``area`` (px), of speech that outlasts its bubble."""
+    """Paint speech as a caption in one line at the bottom of an area, after its bubble has disappeared.
+
+    Args:
+        p: Painter in px.
+        area: Area in px.
+        words: Text, elided if it is too long.
+        font: Font of the text.
+    """
     metrics = QFontMetricsF(font)
     most = max(0.0, area.width() - 4 * EDGE - 2 * INSIDE)
     line = metrics.elidedText(words, Qt.TextElideMode.ElideRight, most)

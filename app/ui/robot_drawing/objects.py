@@ -1,4 +1,4 @@
-"""Objects in the virtual robot's room: ball, table, shelf, cards, and marks for positions of people.
+"""Painting of the objects in the room: ball, table, shelf, cards, and marks for positions of people.
 
 All lengths are in stage units (`app.ui.robot_drawing.room`).
 """
@@ -62,7 +62,12 @@ def _paint_shelf(p: QPainter, area: QRectF) -> None:
 
 
 def thing_area(thing: Thing, spot: Spot) -> QRectF:
-    """Return the rectangle of a thing in stage units."""
+    """Return the bounding rectangle of an object in stage units.
+
+    Args:
+        thing: Object.
+        spot: Position of the object on the stage.
+    """
     if thing.kind == "place":
         return QRectF(spot.u - 30 * spot.scale, spot.v - 8 * spot.scale, 60 * spot.scale, 16 * spot.scale)
     if thing.kind == "shelf":
@@ -79,7 +84,14 @@ def thing_area(thing: Thing, spot: Spot) -> QRectF:
 
 
 def paint_thing(p: QPainter, thing: Thing, spot: Spot, font: QFont) -> None:
-    """Paint a ball, a table, a named position, or a card on a stand (face, marker or shelf)."""
+    """Paint an object: a ball, a table, a shelf, a mark with a name, or a card on a stand (face or marker).
+
+    Args:
+        p: Painter in stage units.
+        thing: Object.
+        spot: Position of the object on the stage.
+        font: Font of the name.
+    """
     area = thing_area(thing, spot)
     p.setPen(Qt.PenStyle.NoPen)
     if thing.kind == "table":

@@ -1,9 +1,9 @@
 """Painter of the virtual Pepper at any heading.
 
-Each part is on the body at an azimuth: its horizontal position is ``sin(azimuth + heading)`` times the
-radius, its width is scaled by the cosine, and parts at the back are hidden. The figure therefore turns
-smoothly without separate views. Lengths are in stage units; (0, 0) is the centre of the foot, y points down,
-and the figure is 187 high.
+Each part of the body has an azimuth: its horizontal position is ``sin(azimuth + heading)`` times the radius,
+its width is scaled by the cosine, and parts at the back are hidden. The figure therefore turns smoothly
+without separate views. Lengths are in stage units; (0, 0) is the centre of the foot, y points down, and the
+figure is 187 units high.
 """
 
 from __future__ import annotations
@@ -30,7 +30,14 @@ DARK_COLOUR = "#15181F"
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """Arm on the screen: shoulder, hand, and the depth of the shoulder from -1 (back) to 1 (front)."""
+    """Arm as seen by the viewer.
+
+    Attributes:
+        side: "left" or "right".
+        shoulder: Position of the shoulder.
+        hand: Position of the hand.
+        front: Depth of the shoulder from -1 (back) to 1 (front).
+    """
 
     side: str
     shoulder: QPointF
@@ -40,7 +47,17 @@ class Limb:
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """Facial expression: eye opening, brows (0 none, 1 inner ends up, -1 inner ends down), mouth."""
+    """Facial expression.
+
+    Attributes:
+        lid: Fraction of the eye that the lid covers.
+        brow: Shape of the eyebrows: 0 for none, 1 with the inner ends up, -1 with the inner ends down.
+        eye: Relative size of the eyes.
+        smile: Curvature of the mouth; negative for a sad mouth.
+        mouth_half_width: Half of the width of the mouth.
+        mouth_opening: Height of the open mouth; 0 if it is closed.
+        has_cheeks: True if the cheeks are painted.
+    """
 
     lid: float = 0.0
     brow: float = 0.0
@@ -71,7 +88,7 @@ EMOTIONS = tuple(_EXPRESSIONS)
 
 
 def limbs(state: RobotState) -> tuple[Limb, Limb]:
-    """Return the left and the right arm."""
+    """Return the left and the right arm of the robot."""
     heading = math.radians(state.theta_deg)
     return (
         _limb("left", 1, state.arm_left_deg, heading),
@@ -89,7 +106,7 @@ def _limb(side: str, sign: int, raised_deg: float, heading: float) -> Limb:
 
 
 def paint_figure(p: QPainter, state: RobotState) -> None:
-    """Paint the robot; the painter's origin is the centre of the foot."""
+    """Paint the robot; the origin of the painter is the centre of the foot."""
     heading = math.radians(state.theta_deg)
     arms = limbs(state)
     p.setPen(Qt.PenStyle.NoPen)
@@ -243,11 +260,13 @@ def _paint_ear(p: QPainter, azimuth: float) -> None:
 
 
 def paint_face(p: QPainter, state: RobotState, heading: float, nod: float) -> None:
-    """Paint the face around the centre of the head.
+    """Paint the face; the origin of the painter is the centre of the head.
 
     Args:
+        p: Painter in stage units.
+        state: State of the robot.
         heading: Direction of the head in rad.
-        nod: Vertical shift of the face.
+        nod: Vertical shift of the face because of the head's pitch.
     """
     look = _EXPRESSIONS.get(state.emotion, _EXPRESSIONS["neutral"])
     dot = QPointF(HEAD_RX * 0.5 * math.sin(heading), -20.8 + nod)

@@ -1,7 +1,7 @@
 """Room of the virtual robots: projection from metres to pixels, and painting of wall, window and floor.
 
-The colours belong to the illustration, not to the theme; a dark theme dims them. All lengths are in units of
-a stage of 382 x 286, the size of the panel in the design at 1440 x 900.
+The colours belong to the illustration, not to the theme; a dark theme dims them. Lengths are in stage units:
+the stage is 382 x 286 units large, the size of the panel in px in the design at 1440 x 900.
 """
 
 from __future__ import annotations
@@ -21,7 +21,13 @@ UNIT_SCALE_DEPTH = 250.6 - HORIZON  # vertical position of the robot in the desi
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """Position on the floor in stage units, and the scale of things there."""
+    """Position on the stage in stage units, with the scale of objects there.
+
+    Attributes:
+        u: Horizontal position.
+        v: Vertical position.
+        scale: Scale of objects at this position.
+    """
 
     u: float
     v: float
@@ -30,7 +36,14 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Projection of the room into a rectangle: uniform scale, centred; wall and floor extend to the edges."""
+    """Projection of the room into a rectangle.
+
+    The stage is scaled uniformly and centred; wall and floor extend to the edges of the rectangle.
+
+    Attributes:
+        area: Rectangle in px.
+        room: Extent of the room in m.
+    """
 
     area: QRectF
     room: RoomBounds
@@ -48,19 +61,19 @@ class Stage:
         )
 
     def bounds(self) -> QRectF:
-        """Return the whole rectangle in stage units. Its left and top may be negative."""
+        """Return the rectangle in stage units; its left and top may be negative."""
         s, o = self.scale, self.origin
         a = self.area
         return QRectF((a.x() - o.x()) / s, (a.y() - o.y()) / s, a.width() / s, a.height() / s)
 
     def to_units(self, point: QPointF) -> QPointF:
-        """Convert a point in pixels to stage units."""
+        """Convert a point from px to stage units."""
         return (point - self.origin) / self.scale
 
     def spot_at(self, x: float, y: float) -> Spot:
-        """Return the position of a floor point (in m), limited to the room.
+        """Convert a floor point in m, limited to the room, to a position on the stage.
 
-        This is no true perspective: distant things are drawn closer, so that the robot stays large.
+        The projection is no true perspective: distant objects appear closer, so that the robot stays large.
         """
         room = self.room
         depth = _clamp((x - room.x_min) / (room.x_max - room.x_min), 0.0, 1.0)
@@ -70,7 +83,7 @@ class Stage:
         return Spot(WIDTH / 2 + side * _half_width(scale), v, scale)
 
     def floor_at(self, point: QPointF) -> tuple[float, float]:
-        """Return the floor point (in m) at a pixel, limited to the room."""
+        """Convert a point in px to a floor point in m, limited to the room."""
         unit = self.to_units(point)
         room = self.room
         share = _clamp((unit.y() - BACK) / (FRONT - BACK), 0.0, 1.0)
@@ -92,7 +105,7 @@ def _clamp(value: float, low: float, high: float) -> float:
 
 
 def paint_room(p: QPainter, bounds: QRectF) -> None:
-    """Paint wall, window and floor.
+    """Paint the wall with window and picture, and the floor.
 
     Args:
         p: Painter in stage units.

@@ -1,4 +1,4 @@
-"""Painter of virtual robots in their room, and hit testing of their parts."""
+"""Painter of virtual robots in their room, and hit testing of robots and objects."""
 
 from __future__ import annotations
 
@@ -29,7 +29,13 @@ PREVIEW = RobotState(
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """Part under the mouse and part selected by keyboard, as returned by `RobotDrawing.part_at`."""
+    """Outlined parts of the drawing, as returned by `RobotDrawing.part_at`.
+
+    Attributes:
+        hovered: Part under the mouse, or None.
+        selected: Part selected by keyboard, or None.
+        ink: Colour of the outline.
+    """
 
     hovered: str | None = None
     selected: str | None = None
@@ -40,9 +46,11 @@ NO_MARKS = Marks()
 
 
 class RobotDrawing:
-    """Painter of `RobotState`s. The pixmap of the room is cached for the last size, so that frames are cheap.
+    """Painter of virtual robots in their room.
 
-    The first robot is the main one; ``others`` are robots in the same room, each with its name.
+    The room is painted once per size and cached as a pixmap, so that frames are cheap. In all methods,
+    ``state`` is the main robot, and ``others`` are pairs of name and state of the other robots in the same
+    room.
     """
 
     def __init__(self, font: QFont | None = None) -> None:
@@ -61,7 +69,16 @@ class RobotDrawing:
         marks: Marks = NO_MARKS,
         dark: bool = False,
     ) -> None:
-        """Paint the robots into ``area``."""
+        """Paint the room with its objects and robots.
+
+        Args:
+            painter: Painter in px.
+            area: Area to fill, in px.
+            state: State of the main robot.
+            others: Names and states of the other robots.
+            marks: Outlined parts.
+            dark: True to dim the colours for a dark theme.
+        """
         stage = Stage(area, state.room)
         painter.save()
         painter.setClipRect(area)
@@ -93,10 +110,10 @@ class RobotDrawing:
     def part_at(
         self, point: QPointF, area: QRectF, state: RobotState, others: OtherRobots = ()
     ) -> str | None:
-        """Return the part at a point in px, or None.
+        """Return the part of the drawing at a point in px; None if there is only background.
 
         Examples are ``head``, ``left_hand``, ``body``, ``Turtle/body`` and the name of an object. Parts that
-        can be touched precede things, and things precede others behind them.
+        can be touched take precedence over objects, and objects over bodies and over objects behind them.
         """
         stage = Stage(area, state.room)
         unit = stage.to_units(point)
@@ -113,9 +130,14 @@ class RobotDrawing:
     def side_at(
         self, point: QPointF, area: QRectF, part: str, state: RobotState, others: OtherRobots = ()
     ) -> str | None:
-        """Return the side of the bumper that is pressed by a click on ``part``, the body of a robot.
+        """Return the side of the bumper that a click presses, or None if the robot has no bumper.
 
-        Return None if the robot has no bumper.
+        Args:
+            point: Position of the click in px.
+            area: Area of the drawing in px.
+            part: Clicked body of a robot, as returned by `part_at`.
+            state: State of the main robot.
+            others: Names and states of the other robots.
         """
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
@@ -124,11 +146,11 @@ class RobotDrawing:
         return None
 
     def floor_at(self, point: QPointF, area: QRectF, state: RobotState) -> tuple[float, float]:
-        """Return the floor point (in m) at a point in px."""
+        """Convert a point in px to a floor point in m, limited to the room."""
         return Stage(area, state.room).floor_at(point)
 
     def pixel_of(self, x: float, y: float, area: QRectF, state: RobotState) -> QPointF:
-        """Return the point in px of a floor point (in m)."""
+        """Convert a floor point in m to a point in px."""
         stage = Stage(area, state.room)
         spot = stage.spot_at(x, y)
         return stage.origin + QPointF(spot.u, spot.v) * stage.scale
@@ -136,7 +158,7 @@ class RobotDrawing:
     def point_of(
         self, part: str, area: QRectF, state: RobotState, others: OtherRobots = ()
     ) -> QPointF | None:
-        """Return the point in px at the centre of a part (see `part_at`), or None."""
+        """Return the centre of a part (see `part_at`) in px, or None if there is no such part."""
         stage = Stage(area, state.room)
         for figure in _figures(stage, state, others):
             small = figure.state.figure == TURTLE
@@ -201,18 +223,24 @@ def _placed_things(stage: Stage, state: RobotState) -> list[tuple[Spot, Thing]]:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """Robot with its position; ``name`` is "" for the main robot."""
+    """Robot with its position on the stage.
+
+    Attributes:
+        name: Name of the robot; "" for the main robot.
+        state: State of the robot.
+        spot: Position of the foot, with the scale of the figure.
+    """
 
     name: str
     state: RobotState
     spot: Spot
 
     def part_name(self, part: str) -> str:
-        """Return the name of a part in the format of `RobotDrawing.part_at`."""
+        """Return the name of a part of this robot in the format of `RobotDrawing.part_at`."""
         return f"{self.name}/{part}" if self.name else part
 
     def to_own_units(self, unit: QPointF) -> QPointF:
-        """Convert a point from stage units to the figure's own units."""
+        """Convert a point from stage units to coordinates of the figure: foot at (0, 0), scale 1."""
         return (unit - QPointF(self.spot.u, self.spot.v)) / self.spot.scale
 
     @property

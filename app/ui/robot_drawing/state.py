@@ -1,4 +1,4 @@
-"""State of a virtual robot for the drawing, parsed from its ``state`` topic."""
+"""State of a virtual robot for the drawing, parsed from messages of its ``state`` topic."""
 
 from __future__ import annotations
 
@@ -15,7 +15,17 @@ MAX_HEARD_CHARS = 200  # characters
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """Thing in the room: ``kind`` (ball, face, marker, ...) and position in m."""
+    """Object in the room.
+
+    Attributes:
+        kind: Kind of object, such as "ball", "face" or "marker".
+        x: Position in m.
+        y: Position in m.
+        name: Unique name; "" if unknown.
+        colour: Colour as "#rrggbb"; None for the default.
+        size_m: Radius or side length in m; None for the default.
+        height_m: Height in m; None for the default.
+    """
 
     kind: str
     x: float
@@ -28,7 +38,10 @@ class Thing:
 
 @dataclass(frozen=True, slots=True)
 class RoomBounds:
-    """Extent of the floor in m. The viewer looks from ``x_max`` to ``x_min``; ``y_max`` is at the right."""
+    """Extent of the floor in m.
+
+    The viewer looks from ``x_max`` towards ``x_min``, with ``y_max`` at the right.
+    """
 
     x_min: float = -3.0
     x_max: float = 3.0
@@ -43,16 +56,20 @@ class RobotState:
     Attributes:
         x, y: Position in m.
         theta_deg: Heading; 0 faces along x, towards the viewer, and positive angles turn to the robot's left.
-        head_yaw_deg: Positive to the robot's left.
-        head_pitch_deg: Positive downwards.
+        head_yaw_deg: Direction of the head relative to the body, positive to the robot's left.
+        head_pitch_deg: Inclination of the head, positive downwards.
+        speech: Text that is being spoken, or None.
+        spoken_fraction: Spoken fraction of the text, 0 to 1.
+        sound: Title of the sound that is being played, such as "bell" or "440 Hz"; "" for none.
+        heard_text: Words that the user recently said to the robot.
         arm_left_deg, arm_right_deg: 0 is hanging, 90 horizontal, 180 straight up.
+        touched_parts: Names of the touched parts, such as "head".
         figure: ``pepper`` or ``turtle``.
-        bumped: Side of the pressed bumper.
-        spoken: Spoken fraction of the text (0 to 1).
-        sound: Sound being played, such as "bell" or "440 Hz".
-        heard: Words that the user recently said to the robot.
-        held: True while the user lifts the robot.
-        shared: True if all robots share the room.
+        pressed_bumper: Side of the pressed bumper; "" for none.
+        is_lifted: True while the user has lifted the robot.
+        is_room_shared: True if the robot shares the room with all other robots.
+        objects: Objects in the room.
+        room: Extent of the room.
     """
 
     x: float = 0.0
@@ -80,13 +97,13 @@ class RobotState:
 
     @property
     def caption(self) -> str:
-        """Text of the speech bubble, or of a sound such as "♪ bell"."""
+        """Text of the speech bubble: the spoken text, and the sound such as ``♪ bell``; "" for no bubble."""
         played = f"♪\N{NO-BREAK SPACE}{_(self.sound)}" if self.sound else ""
         return " ".join(each for each in (self.speech or "", played) if each)
 
     @classmethod
     def parse(cls, data: Mapping[str, object]) -> RobotState:
-        """Parse a message. Missing and malformed values keep their defaults."""
+        """Parse the payload of a state message; missing and malformed values have their defaults."""
         speech = data.get("speech")
         return cls(
             x=_number(data.get("x")),

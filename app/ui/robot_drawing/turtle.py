@@ -1,7 +1,7 @@
 """Painter of the virtual Turtle, a small wheeled robot, at any heading, seen slightly from above.
 
-Each part is on the round body at an azimuth, as in `app.ui.robot_drawing.pepper`: 0 faces the viewer, the
-robot's left is +90°. Lengths are in stage units; (0, 0) is the centre of the robot on the floor.
+Each part of the round body has an azimuth, as in `app.ui.robot_drawing.pepper`: 0 faces the viewer, the
+robot's left is at +90°. Lengths are in stage units; (0, 0) is the centre of the robot on the floor.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SHELL, SHELL_DARK, DECK, RUBBER, METAL = "#4E8C7A", "#376B5C", "#6FB3A0", "#2B2D
 
 
 def paint_turtle(p: QPainter, state: RobotState) -> None:
-    """Paint the robot; the painter's origin is its centre on the floor."""
+    """Paint the robot; the origin of the painter is the robot's centre on the floor."""
     heading = math.radians(state.theta_deg)
     p.setPen(Qt.PenStyle.NoPen)
     p.setBrush(QColor(50, 42, 40, 110))
@@ -44,14 +44,24 @@ def paint_turtle(p: QPainter, state: RobotState) -> None:
 
 
 def point_on_body(azimuth: float, share: float = 1.0, height: float = 0.0) -> QPointF:
-    """Return the point at an azimuth (rad, 0 faces the viewer), a fraction of the radius and a height."""
+    """Return the position of a point on the body.
+
+    Args:
+        azimuth: Azimuth in rad; 0 faces the viewer.
+        share: Distance from the axis as a fraction of the radius.
+        height: Vertical position; negative is up.
+    """
     return QPointF(RADIUS * share * math.sin(azimuth), RADIUS * share * FLAT * math.cos(azimuth) + height)
 
 
 def side_at(own: QPointF, theta_deg: float) -> str:
-    """Return the side of the bumper that a click at a point presses.
+    """Return the side of the bumper that a click presses: "left", "right", "front" or "back".
 
-    `own` is in the figure's units; a touch from above presses the front.
+    A click on the top presses the front.
+
+    Args:
+        own: Position of the click in the coordinates of the figure.
+        theta_deg: Heading of the robot.
     """
     across, along = own.x() / RADIUS, (own.y() - HIGH) / (RADIUS * FLAT)
     if math.hypot(across, along) < TOP_TOUCH_FRACTION or along < -1.0:

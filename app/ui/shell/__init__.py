@@ -1,4 +1,5 @@
-"""Window around the panels; `main_window` combines bars, layouts, dialogs and commands.
+"""Main window around the panels; `main_window` combines bars, layouts, dialogs and commands.
 
-The parts don't import the window: commands use it as a `Shell`, panels as a `PanelContext`.
+The other modules don't import the window: commands use the interface `Shell`, panels use
+`PanelContext`.
 """

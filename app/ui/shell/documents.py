@@ -1,6 +1,6 @@
-"""Opens, saves, closes and recovers behaviours.
+"""File operations on behaviours: open, save, close and recover.
 
-All actions can be undone, therefore none asks for confirmation.
+All operations can be undone, therefore none of them asks for confirmation.
 """
 
 from __future__ import annotations
@@ -30,22 +30,28 @@ RECORDING, LAYOUT = OTHER_SUFFIXES = (".mcap", ".nep-layout")
 
 @runtime_checkable
 class SupportsFlush(Protocol):
-    """Panel that may hold an edit that isn't in the document yet."""
+    """Interface of a panel that can hold an edit which the document doesn't contain yet."""
 
     def flush(self, done: Callable[[], None]) -> None:
-        """Call ``done`` once the newest edit is in the document."""
+        """Apply the pending edit to the document, then call ``done``."""
 
 
 @runtime_checkable
 class SupportsShowCurrent(Protocol):
-    """Panel that shows the current behaviour."""
+    """Interface of a panel that shows the current behaviour."""
 
     def show_current(self) -> None:
-        """Show the current behaviour immediately."""
+        """Update the panel to the current behaviour immediately, without waiting for the next tick."""
 
 
 class ClosedTab:
-    """Closed tab: text for the toast, and the previous version of its file if that was overwritten."""
+    """Record of a closed tab.
+
+    Args:
+        document: Document of the tab.
+        words: Text for the toast, or "" if nothing was saved.
+        earlier: Previous version of the file, or None if no file was overwritten.
+    """
 
     def __init__(self, document: Document, words: str = "", earlier: SavedVersion | None = None) -> None:
         self.words, self.earlier = words, earlier
@@ -54,9 +60,15 @@ class ClosedTab:
 
 
 class DocumentController:
-    """Implements the file operations on open behaviours.
+    """Controller that implements the file operations on open behaviours.
 
-    ``say`` shows a toast; ``shown`` is called when another behaviour is shown.
+    Args:
+        session: Session with the documents.
+        asks: File dialogs.
+        say: Shows a toast.
+        shown: Called when a behaviour was opened or reopened.
+        editor: Returns the panel with the block editor, or None before it is created.
+        clock: Returns the Unix time in s.
     """
 
     def __init__(
@@ -82,13 +94,13 @@ class DocumentController:
         self.after_flush(lambda: self._open_tab(self._documents.new))
 
     def ask_open(self) -> None:
-        """Ask for a file and open it."""
+        """Ask for a behaviour file and open it."""
         self._session.alerts.resolve("strange")
         path = self._session.document.path
         self.asks.open(str(path.parent if path is not None else Path.home()), self.open)
 
     def open(self, path: Path) -> None:
-        """Open a behaviour file in a tab. Errors become alerts."""
+        """Open a behaviour file in a tab; an error is shown as an alert."""
 
         def open_document() -> None:
             self._documents.open(path)
@@ -97,9 +109,10 @@ class DocumentController:
         self.after_flush(lambda: self._open_tab(open_document))
 
     def open_all(self, paths: Sequence[Path]) -> None:
-        """Open files from the command line, a drop, or a later start of Studio.
+        """Open files from the command line, from a drop, or from a later start of Studio.
 
-        Files of unknown types are listed in one alert; the others are opened.
+        Of several recordings or layout files only the last one is opened. Files of unknown types are
+        listed in an alert.
         """
         self._session.alerts.resolve("strange")
         strange = [path for path in paths if path.suffix.lower() not in {SUFFIX, *OTHER_SUFFIXES}]
@@ -115,11 +128,16 @@ class DocumentController:
             )
 
     def open_example(self, path: Path) -> None:
-        """Open an example as a new behaviour."""
+        """Open a copy of an example in a new tab."""
         self.after_flush(lambda: self._open_tab(lambda: self._documents.open_example(path)))
 
     def copy(self, path: Path, name: str) -> None:
-        """Open an earlier version as a new behaviour with this name. No file is written."""
+        """Open a copy of a saved version in a new tab, without writing a file.
+
+        Args:
+            path: File of the version.
+            name: Name of the copy.
+        """
 
         def open_copy() -> None:
             self._documents.copy(path, name)
@@ -128,13 +146,14 @@ class DocumentController:
         self.after_flush(lambda: self._open_tab(open_copy))
 
     def recover(self, left: Sequence[UnsavedWork]) -> None:
-        """Open behaviours that were not saved before a crash, each in its tab, and show the last used one."""
+        """Open behaviours with unsaved changes in tabs, and show the most recently used one."""
         self.after_flush(lambda: self._open_tab(lambda: self._session.tabs.recover(left)))
 
     def close(self, *documents: Document) -> None:
-        """Close tabs: stop their programs, and save unsaved work to its file or to Recent.
+        """Close the tabs of documents, stopping their programs.
 
-        Overwritten files can be restored.
+        Unsaved changes are saved to the document's file or, if it has none, to a new file in the list
+        of recent files. The toast offers to restore overwritten files.
         """
 
         def close_documents() -> None:
@@ -154,7 +173,7 @@ class DocumentController:
         self.after_flush(close_documents)
 
     def reopen(self) -> None:
-        """Reopen the tab that was closed last."""
+        """Reopen the most recently closed tab."""
 
         def reopen_document() -> None:
             if self._documents.reopen() is None:
@@ -163,18 +182,21 @@ class DocumentController:
         self.after_flush(lambda: self._open_tab(reopen_document))
 
     def show(self, document: Document) -> None:
-        """Show the tab of an open behaviour immediately; the choice is saved later."""
+        """Show the tab of a document, without waiting for the next tick."""
         self._documents.show(document)
         editor = self._editor()
         if isinstance(editor, SupportsShowCurrent):
             editor.show_current()
 
     def duplicate(self, document: Document) -> None:
-        """Open a copy of a behaviour as a new one."""
+        """Open a copy of a document in a new tab."""
         self.after_flush(lambda: self._open_tab(lambda: self._documents.duplicate(document)))
 
     def rename(self, document: Document, name: str) -> bool:
-        """Rename a behaviour and its file, with undo. Return False on failure."""
+        """Rename a behaviour and its file; return False on failure, which is shown as an alert.
+
+        The toast has an Undo button.
+        """
         before, old = document.name, document.path
         if name.strip() == before:
             return True
@@ -194,19 +216,19 @@ class DocumentController:
         return True
 
     def move(self, document: Document, place: int) -> None:
-        """Move a tab to another position."""
+        """Move the tab of a document to a position, counted from 0."""
         self._documents.move(document, place)
         self._session.tabs.save()
 
     def save(self) -> None:
-        """Save the behaviour, or ask for a file if it has none."""
+        """Save the current behaviour; if it has no file, ask for one."""
         if self._session.document.path is None:
             self.save_as()
         else:
             self.after_flush(lambda: self._save(None))
 
     def save_as(self) -> None:
-        """Ask for a file, then save the behaviour to it."""
+        """Ask for a file and save the current behaviour to it."""
         document = self._session.document
         own = document.path
         folder = own.parent if own is not None and own.parent != closed_tabs_folder() else Path.home()
@@ -214,7 +236,14 @@ class DocumentController:
         self.asks.save(suggestion, lambda path: self.after_flush(lambda: self._save(path)))
 
     def fix(self, action: str) -> bool:
-        """Apply the fix of a problem to the blocks. Return False if the action isn't a fix."""
+        """Apply a fix to the blocks of the current behaviour.
+
+        Args:
+            action: Action of a problem, such as ``limit:ID``.
+
+        Returns:
+            False if the action isn't a fix or can't be applied.
+        """
         document = self._session.document
         if deep_json.run_deep(lambda: fix(document.workspace, action)) is None:
             return False
@@ -226,7 +255,7 @@ class DocumentController:
         return True
 
     def after_flush(self, then: Callable[[], None]) -> None:
-        """Call a function once the editor's newest edit is in the document."""
+        """Call a function after the pending edit of the block editor was applied to the document."""
         editor = self._editor()
         if isinstance(editor, SupportsFlush):
             editor.flush(then)
@@ -348,14 +377,19 @@ class DocumentController:
 
 
 class AlertText(NamedTuple):
-    """Text of an alert: description of the problem, and what to do."""
+    """Text of an alert.
+
+    Attributes:
+        title: Problem, as a sentence.
+        detail: Advice, or "".
+    """
 
     title: str
     detail: str
 
 
 def alert_text(error: Exception) -> AlertText:
-    """Return the text of the alert for a file error."""
+    """Return the text of the alert for an error while a file is opened or saved."""
     if not isinstance(error, DocumentError):
         return AlertText(_as_sentence(str(error)), "")
     named = error.path is not None and error.reason.startswith(error.path.name)  # the name is not capitalised
@@ -379,9 +413,9 @@ def _as_sentence(words: str) -> str:
 
 
 class FlushBeforeClose(QObject):
-    """Fetches the newest edit before the window closes.
+    """Helper that applies the pending edit of the block editor before the window closes.
 
-    Waits up to half a second for the block editor, so that an unresponsive one doesn't keep the window open.
+    The window closes after at most 0.5 s, even if the block editor doesn't respond.
     """
 
     def __init__(self, parent: QObject, editor: Callable[[], object], close: Callable[[], object]) -> None:
@@ -391,9 +425,10 @@ class FlushBeforeClose(QObject):
         self._asked = self._ready = self._waits = False
 
     def ready(self) -> bool:
-        """Return True if the window may close now.
+        """Return True if the window can be closed now.
 
-        Otherwise it will be closed as soon as the edit has arrived.
+        The first call requests the pending edit. If it returns False, the window is closed when the
+        edit has arrived.
         """
         if not self._asked:
             self._asked, self._ready = True, False
@@ -408,7 +443,7 @@ class FlushBeforeClose(QObject):
         return self._ready
 
     def reset(self) -> None:
-        """Reset after closing was cancelled."""
+        """Reset the state after closing the window was cancelled."""
         self._asked = self._ready = self._waits = False
 
     def _on_flushed(self) -> None:

@@ -1,8 +1,8 @@
-"""Focus ring, 2 px wide and 2 px outside the control, which is shown only for keyboard use.
+"""Focus ring around the focused widget, which is shown only while the keyboard is used.
 
-Style sheets can't draw an outline outside a widget, so an overlay follows the focused widget. QFocusFrame is
-unsuitable: it becomes a child of the surrounding scroll area and is deleted with it, and its margin is one
-value of the style for all widgets.
+The ring is 2 px wide, at a distance of 2 px. Style sheets can't draw outside a widget, therefore the
+ring is an overlay. QFocusFrame is unsuitable: it becomes a child of the surrounding scroll area and is
+deleted with it, and the style defines the same margin for all widgets.
 """
 
 from __future__ import annotations
@@ -38,17 +38,18 @@ _NAVIGATION_KEYS = frozenset(
         _Key.Key_PageDown, _Key.Key_Left, _Key.Key_Right, _Key.Key_Up, _Key.Key_Down,
     }
 )  # fmt: skip
-"""Keys that move the focus. Typing or Ctrl+S doesn't count as keyboard navigation."""
+"""Keys that move the focus. Other keys, such as letters, don't count as keyboard navigation."""
 
 
 class FocusRing(QWidget):
-    """Focus ring for a window and its floating panels. The property ``focusRadius`` sets its corners.
+    """Focus ring for a window and its floating panels.
 
-    Keyboard use is detected by the last key that moves the focus, or mouse button: Qt's focus reason is also
-    Tab when a focused widget is hidden.
+    The ring is shown if the last input was a key that moves the focus, and not a mouse button. Qt's
+    focus reason can't be used, because it is also Tab when a focused widget is hidden.
 
-    Widgets with the property ``ownFocus`` (and tables and trees) draw their focus themselves; ``focusInset``
-    is the margin between a widget's edge and its painted shape.
+    These dynamic properties of a widget are used: ``focusRadius``, the radius of its corners;
+    ``focusInset``, the margin around its painted shape; and ``ownFocus``, True if the widget paints its
+    focus itself, as all tables and trees do.
     """
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
@@ -71,7 +72,7 @@ class FocusRing(QWidget):
 
     @property
     def target(self) -> QWidget | None:
-        """Widget that has the ring, or None."""
+        """Widget that the ring surrounds, or None if the ring is hidden."""
         return self._target
 
     def _window_changed(self, window: QWindow | None) -> None:

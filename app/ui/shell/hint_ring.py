@@ -1,4 +1,4 @@
-"""Ring that highlights a button until the button or Esc is pressed, or a timeout."""
+"""Ring that highlights a button for some seconds, or until the button or Esc is pressed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TIMEOUT_MS = 15_000
 
 
 class HintRing(QWidget):
-    """Overlay that ignores the mouse and draws the ring. The button is identified by its command."""
+    """Overlay that paints a ring around a button. Mouse events pass through the overlay."""
 
     def __init__(self, theme: Theme, window: QWidget) -> None:
         super().__init__(window)
@@ -37,7 +37,7 @@ class HintRing(QWidget):
         self.hide()
 
     def point_at(self, command: str) -> bool:
-        """Highlight the button of a command. Return False if no such button is visible."""
+        """Highlight the button of a command, given by name; return False if no such button is visible."""
         self.clear()
         buttons = self._window.findChildren(QAbstractButton)
         found = (each for each in buttons if each.isVisible() and each.property("command") == command)

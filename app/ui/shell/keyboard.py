@@ -1,4 +1,4 @@
-"""Keyboard focus of panels: tracking the focused panel, and navigation between panels."""
+"""Keyboard navigation between panels, and tracking of the focused panel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.ui.widgets.keyboard import tab_stops
 
 
 class PanelFocus(QObject):
-    """Moves the focus between panels of the current workbench, and highlights the focused panel's title."""
+    """Controller that moves the focus between panels and highlights the title of the focused one."""
 
     def __init__(self, bench: Callable[[], Workbench | None], parent: QObject) -> None:
         # `bench` returns the current workbench, or None.
@@ -24,7 +24,11 @@ class PanelFocus(QObject):
             application.focusChanged.connect(self._on_focus_changed)
 
     def next(self, step: int) -> None:
-        """Focus the next visible panel, or the previous one for -1."""
+        """Focus another visible panel by its offset from the focused one, wrapping around.
+
+        Args:
+            step: 1 for the next panel, -1 for the previous one.
+        """
         bench = self._bench()
         docks = [dock for dock in bench.docks.values() if dock.is_displayed()] if bench is not None else []
         if bench is None or not docks:
@@ -34,22 +38,30 @@ class PanelFocus(QObject):
         bench.focus_panel(docks[(place + step) % len(docks)])
 
     def number(self, number: int) -> None:
-        """Focus the open panel with this number, counted from 1."""
+        """Focus an open panel by its number, counted from 1."""
         bench = self._bench()
         names = bench.open_names() if bench is not None else ()
         if bench is not None and 0 < number <= len(names):
             bench.focus_panel(bench.docks[names[number - 1]])
 
     def focus(self, dock: Dock | None) -> None:
-        """Bring a panel to the front and focus it."""
+        """Bring a panel to the front and focus it; None has no effect."""
         bench = self._bench()
         if bench is not None and dock is not None:
             bench.focus_panel(dock)
 
     def skip_hidden(self, window: QWidget, *, forward: bool) -> bool:
-        """Move the focus by Tab past widgets that aren't really visible. Return False if there are none.
+        """Move the focus by Tab, skipping widgets that the user can't see.
 
-        Such widgets are behind another tab, or are Qt's tab bars, which titles replace.
+        These are widgets behind another tab, and Qt's tab bars, which are replaced by the titles of the
+        docks.
+
+        Args:
+            window: Window in which the focus moves.
+            forward: True for Tab, False for Shift+Tab.
+
+        Returns:
+            False if no widget had to be skipped; the focus is then unchanged.
         """
         focus = QApplication.focusWidget()
         if focus is None:
@@ -70,7 +82,7 @@ class PanelFocus(QObject):
         return any(dock.isAncestorOf(widget) and not dock.front for dock in docks)
 
     def dock(self) -> Dock | None:
-        """Return the dock that has the focus, or None."""
+        """Return the dock that contains the focused widget, or None."""
         focus, bench = QApplication.focusWidget(), self._bench()
         if bench is None or focus is None:
             return None

@@ -65,14 +65,14 @@ OTHER_LOADING_TEXT = lazy("Loading panels.")
 
 @runtime_checkable
 class SupportsFields(Protocol):
-    """Panel that plots fields of topics."""
+    """Interface of a panel that plots fields of topics."""
 
     def plot_field(self, topic: str, path: str) -> None:
-        """Add a curve for a field; with an empty path, ask for the field."""
+        """Add a curve for a field of a topic; if the path is "", ask for the field."""
 
 
 class MainWindow(QMainWindow):
-    """Window of one session; implements `Shell` for its commands."""
+    """Main window of a session, which implements `Shell` for its commands."""
 
     bench_created = Signal()
 
@@ -199,12 +199,12 @@ class MainWindow(QMainWindow):
 
     @property
     def current_layout(self) -> str:
-        """Name of the current layout, or `START`."""
+        """Name of the current layout, or `START_PAGE` for the start page."""
         return self._showing
 
     @property
     def surface(self) -> QWidget:
-        """Parent widget of sheets and menus, in which shortcuts work."""
+        """Parent widget of sheets and menus, and context of the shortcuts."""
         return self
 
     @property
@@ -214,12 +214,12 @@ class MainWindow(QMainWindow):
 
     @property
     def show_toast(self) -> ShowToast:
-        """Function that shows a toast."""
+        """Function that shows a toast, see `Toast`."""
         return self.toast.show_toast
 
     @property
     def examples(self) -> Sequence[Example]:
-        """Examples on the start page."""
+        """Examples that the start page offers."""
         return self.start.examples
 
     def show_start(self) -> None:
@@ -252,11 +252,11 @@ class MainWindow(QMainWindow):
         self.start.show_recent(recent_titles(self.session.settings.recent))
 
     def log_problem(self, sentence: str) -> None:
-        """Log a problem that needs no action in the Console."""
+        """Log a sentence to the Console, about a problem that requires no action."""
         self.session.console.add("warn", "studio", sentence)
 
     def show_layout(self, name: str) -> Workbench:
-        """Show a layout and return its workbench; on first use it is created in its last state."""
+        """Show a layout and return its workbench, which is created and restored on first use."""
         layout = layout_named(name)
         if layout.name not in self.benches:
             self.benches[layout.name] = bench = self._new_bench(layout)
@@ -285,7 +285,7 @@ class MainWindow(QMainWindow):
         return bench
 
     def preload_steps(self) -> list[Callable[[], object]]:
-        """Return steps that create the panels of layouts not opened yet, one panel per step."""
+        """Return functions that create in advance the panels of layouts not opened yet, one panel each."""
 
         def make(layout: Layout, name: str) -> None:
             if not self._shut and layout.name not in self.benches:
@@ -295,7 +295,7 @@ class MainWindow(QMainWindow):
         return [partial(make, layout, name) for layout in LAYOUTS for name in layout.default_panels]
 
     def show_placeholder(self, layout: str) -> None:
-        """Show the bars of a layout, with a placeholder until its workbench is created."""
+        """Show the bars of a layout, and a placeholder until `show_layout` creates its workbench."""
         self._showing = layout
         placeholder = Placeholder(layout)
         self.pages.addWidget(placeholder)
@@ -318,20 +318,26 @@ class MainWindow(QMainWindow):
         return self.benches.get(self.current_layout)
 
     def editor(self) -> object:
-        """Return the panel of behaviours, or None before it is first shown."""
+        """Return the panel with the block editor, or None if it wasn't created yet."""
         bench = self.benches.get("behaviour")
         dock = bench.docks.get("behaviour") if bench is not None else None
         return dock.panel if dock is not None else None
 
     def open_panel(self, name: str) -> Dock | None:
-        """Show a panel in the current layout; the panel "behaviour" only in its own layout."""
+        """Show a panel in the current layout; return None if the panel isn't available.
+
+        The panel "behaviour" is always shown in the Behaviour layout, as are all panels from the start
+        page.
+        """
         wanted = "behaviour" if name == "behaviour" or self.bench is None else self.current_layout
         return self.show_layout(wanted).open(name)
 
     def open_topic(self, topic: str, *, beside: bool = False) -> None:
-        """Show a topic in the open panel that fits its type best, else in the Inspector.
+        """Show a topic in the open panel that suits its type best, or else in the Inspector.
 
-        With ``beside``, an additional panel is opened unless the existing one is still empty.
+        Args:
+            topic: Key of the topic.
+            beside: True to open an additional panel, unless the existing one is empty.
         """
         known = self.session.topic(topic)
         kinds = {known.codec, known.msg_type} if known is not None else set()
@@ -348,7 +354,7 @@ class MainWindow(QMainWindow):
             dock.panel.show_topic(topic)
 
     def plot(self, topic: str, path: str) -> None:
-        """Plot a field of a topic; with an empty path, ask for the field."""
+        """Plot a field of a topic; if the path is "", ask for the field."""
         bench = self.bench if self.bench is not None else self.show_layout("developer")
         dock = bench.open_latest("plot")
         if dock is not None and isinstance(dock.panel, SupportsFields):
@@ -358,7 +364,7 @@ class MainWindow(QMainWindow):
         self.commands.run(name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Handle keys that no widget has accepted: copy and paste blocks wherever the focus is."""
+        """Handle keys that no widget has accepted, such as those to copy and paste blocks."""
         what = next((what for key, what in BLOCK_KEYS.items() if event.matches(key)), "")
         if event.keyCombination() == DUPLICATE_KEY:
             what = "duplicate"
@@ -377,7 +383,7 @@ class MainWindow(QMainWindow):
             super().keyPressEvent(event)
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Move the focus by Tab only to visible widgets."""
+        """Move the focus by Tab, skipping widgets that the user can't see."""
         return self.panel_focus.skip_hidden(self, forward=forward) or super().focusNextPrevChild(forward)
 
     def _half_tick(self) -> None:
@@ -408,7 +414,7 @@ class MainWindow(QMainWindow):
             self.timer.setInterval(TICK_MS // 2 if twice else TICK_MS)
 
     def tick(self) -> None:
-        """Process new data and refresh all visible parts of the window."""
+        """Process pending changes of the session and refresh the visible parts of the window."""
         began = time.perf_counter()
         self._ticks += 1
         guarded = self.session.guarded
@@ -524,7 +530,7 @@ class MainWindow(QMainWindow):
         self.session.console.add("error", f"panel {name}", sentence)
 
     def start_session(self) -> None:
-        """Start the session and the timer of the tick."""
+        """Start the session and the tick timer."""
         self.session.start()
         self.timer.start()
         GcTimer(self).start()
@@ -532,7 +538,11 @@ class MainWindow(QMainWindow):
         self.bench_created.connect(self.gc_freeze.start)
 
     def restart(self) -> str:
-        """Close the window and restart Studio. Return the reason if that is impossible, or ""."""
+        """Close the window and restart Studio.
+
+        Returns:
+            The reason why a restart is impossible, or "".
+        """
         if self._may_move():
             return _("Press Stop first. Studio can restart when no program is running and no robot is moving")
         self.wants_restart = True
@@ -580,7 +590,7 @@ class MainWindow(QMainWindow):
 
 
 class Placeholder(QWidget):
-    """Text in place of a layout that is being created, so that startup doesn't wait for panels."""
+    """Text in place of a layout while it is created, so that the first paint doesn't wait for panels."""
 
     def __init__(self, layout: str) -> None:
         super().__init__()

@@ -14,10 +14,11 @@ _KINDS = frozenset({QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress})
 
 
 class StopKeys(QObject):
-    """Event filter for every window that gets the focus; called before the window's widgets.
+    """Event filter that triggers Stop by its keys and buttons before other widgets get the events.
 
-    Shortcuts alone don't suffice, because open menus, lists, pages and fields can consume the key. Neither do
-    buttons: a click outside an open menu or list only closes it.
+    The filter is installed on every window that becomes active. Shortcuts don't suffice, because open
+    menus, lists, pages and fields can consume the key. Buttons don't suffice either, because a click
+    outside an open menu or list only closes it.
     """
 
     def __init__(

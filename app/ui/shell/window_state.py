@@ -1,4 +1,4 @@
-"""Settings of the window that persist: position, layouts, theme and text size."""
+"""Persistent state of the window: position, layouts and theme."""
 
 from __future__ import annotations
 
@@ -19,13 +19,20 @@ FRAME = QSize(16, 48)  # approximate size of a window manager's frame
 
 
 def initial_size(size: QSize, room: QSize) -> QSize:
-    """Return the initial window size for a screen. On a small screen Stop would otherwise be outside it."""
+    """Return the initial size of the window, reduced if it doesn't fit the screen.
+
+    Otherwise Stop could be outside a small screen.
+
+    Args:
+        size: Preferred size.
+        room: Available size of the screen.
+    """
     fits = size.width() <= room.width() and size.height() <= room.height()
     return size if fits else size.boundedTo(room - FRAME)
 
 
 class WindowState:
-    """Loads and saves position, layouts, theme, text size, motion and contrast of the window."""
+    """Accessor for the settings of the window: position, layouts, theme, text size, motion and contrast."""
 
     def __init__(self, settings: Settings, complain: Callable[[str], object]) -> None:
         # `complain` is called with a sentence if settings can't be saved.
@@ -34,7 +41,7 @@ class WindowState:
         self._said = ""
 
     def apply_theme(self, theme: Theme) -> None:
-        """Apply all saved settings to the theme at once."""
+        """Apply the saved mode, text size, motion and contrast to the theme in one update."""
         chosen = self._settings.get("theme", "system")
         mode: Mode = next((mode for mode in MODES if mode == chosen), "system")
         motion = parse_preference(self._settings.get("less_motion", None))
@@ -42,18 +49,18 @@ class WindowState:
         theme.apply_settings(mode, self._settings.get("text_percent", 100), motion, contrast)
 
     def save_theme(self, theme: Theme) -> None:
-        """Save the current settings of the theme."""
+        """Save the mode, text size, motion and contrast of the theme."""
         self._set("theme", theme.mode)
         self._set("text_percent", theme.text_percent)
         self._set("less_motion", theme.motion)
         self._set("high_contrast", theme.contrast)
 
     def save(self, key: str, value: object) -> None:
-        """Save a setting, as JSON value."""
+        """Save a setting, whose value must be JSON-serializable."""
         self._set(key, value)
 
     def restore_geometry(self, window: QMainWindow) -> bool:
-        """Restore the position of the window. Return False if none is saved."""
+        """Restore position and size of the window; return False if none are saved or they are invalid."""
         text = self._settings.get("window", "")
         try:
             data = base64.b64decode(text, validate=True)
@@ -65,12 +72,12 @@ class WindowState:
         return placed
 
     def save_geometry(self, window: QMainWindow) -> None:
-        """Save the window's position."""
+        """Save position and size of the window."""
         self._set("window", base64.b64encode(window.saveGeometry().data()).decode("ascii"))
 
     @property
     def layout(self) -> str:
-        """Name of the last layout; "start" for the start page, or before the first start."""
+        """Name of the last layout; "start" for the start page and before the first start."""
         return self._settings.get("layout", "start")
 
     def save_layout(self, name: str) -> None:
@@ -78,32 +85,41 @@ class WindowState:
         self._set("layout", name)
 
     def layouts(self) -> Mapping[str, object]:
-        """Return all saved layouts by name."""
+        """Return the saved arrangements of all layouts, by name."""
         kept: Saved = self._settings.get("layouts", {})
         return kept
 
     def layout_state(self, name: str) -> Mapping[str, object]:
-        """Return the saved state of a layout; empty if there is none."""
+        """Return the saved arrangement of a layout; empty if there is none."""
         found = self.layouts().get(name)
         return found if isinstance(found, Mapping) else {}
 
     def delete_layout(self, name: str) -> bool:
-        """Delete the saved state of a layout; return False if that couldn't be saved."""
+        """Delete the saved arrangement of a layout; return False if the settings can't be saved."""
         return self._set("layouts", {key: value for key, value in self.layouts().items() if key != name})
 
     def selected_layout(self, base: str) -> str:
-        """Return the name of the custom layout last shown in a built-in layout's workbench, or ""."""
+        """Return the name of the custom layout that a workbench showed last, or "" for the built-in one.
+
+        Args:
+            base: Name of the workbench's built-in layout.
+        """
         kept: Saved = self._settings.get("chosen_layouts", {})
         name = kept.get(base)
         return name if isinstance(name, str) else ""
 
     def save_selected_layout(self, base: str, name: str) -> None:
-        """Save the name of the custom layout shown in a workbench."""
+        """Save the name of the custom layout that a workbench shows.
+
+        Args:
+            base: Name of the workbench's built-in layout.
+            name: Name of the custom layout, or "" for the built-in one.
+        """
         kept: Saved = self._settings.get("chosen_layouts", {})
         self._set("chosen_layouts", {**kept, base: name})
 
     def save_layouts(self, found: Mapping[str, Mapping[str, object]]) -> bool:
-        """Save the states of layouts. Return False on failure."""
+        """Save arrangements of layouts, by name; return False if the settings can't be saved."""
         return self._set("layouts", {**self.layouts(), **found})
 
     def _set(self, key: str, value: object) -> bool:

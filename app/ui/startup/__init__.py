@@ -1,4 +1,4 @@
-"""Steps of Studio's startup: interpreter settings, single instance, files to open, Qt's log.
+"""Parts of Studio's startup: interpreter settings, single instance, files to open, and Qt's log.
 
-`app.ui.application` calls the steps; they are independent of each other.
+The modules are independent of each other; `app.ui.application` calls them.
 """

@@ -1,4 +1,4 @@
-"""Deferred startup steps, which are run in small portions after the first paint."""
+"""Deferred startup steps, which are run one at a time after the first paint."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ _log = logging.getLogger(__name__)
 
 
 class DeferredSteps(QObject):
-    """Runs one step per iteration of the event loop, so that a click waits for at most one step."""
+    """Runner for startup steps that begins after the first paint of a window.
+
+    One step is run per iteration of the event loop, so that a click waits for at most one step.
+    """
 
     def __init__(self, window: QWidget, steps: Iterable[Callable[[], object]]) -> None:
         # Starts after the first paint of `window`. An exception in a step is logged, and the next step
@@ -33,7 +36,7 @@ class DeferredSteps(QObject):
         window.installEventFilter(self)
 
     def prepend(self, steps: Sequence[Callable[[], object]]) -> None:
-        """Run these steps before all others."""
+        """Insert steps before all pending ones."""
         self._steps.extendleft(reversed(steps))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -60,5 +63,5 @@ class DeferredSteps(QObject):
 
     @property
     def done(self) -> bool:
-        """True once all steps were run."""
+        """True once all steps have been started."""
         return not self._steps

@@ -1,4 +1,4 @@
-"""Files that other programs pass to the window: by drag and drop or, on macOS, by the system."""
+"""Files that are passed to the window: by drag and drop or, on macOS, by the Finder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,12 @@ DROPS = frozenset({QEvent.Type.DragEnter, QEvent.Type.DragMove, QEvent.Type.Drop
 
 
 class IncomingFiles(QObject):
-    """Opens files that are dropped on a window; ``take`` is called with their paths."""
+    """Event filter that accepts files dropped on a window.
+
+    Args:
+        window: Window on which files can be dropped.
+        take: Called with the paths of dropped files.
+    """
 
     def __init__(self, window: QWidget, take: Callable[[Sequence[Path]], object]) -> None:
         super().__init__(window)
@@ -37,11 +42,11 @@ class IncomingFiles(QObject):
 
 
 class Application(QApplication):
-    """QApplication that, on macOS, receives the files that the Finder opens.
+    """QApplication that receives the files opened by the Finder on macOS.
 
-    Installing a Python event filter on the application raises an error: the filter would also receive events
-    of the block editor's browser and crash the process, because PySide queries each receiver for its C++
-    type, and Chromium's have none (ADR 0018). This applies to plug-ins as well.
+    Python event filters on the application are rejected, also those of plug-ins: they would receive
+    events of the block editor's browser and crash the process, because PySide queries the C++ type of
+    each receiver, which Chromium's objects lack (ADR 0018).
     """
 
     def __init__(self, arguments: Sequence[str]) -> None:
@@ -50,7 +55,11 @@ class Application(QApplication):
         self._waiting: list[Path] = []
 
     def open_files_with(self, take: Callable[[Sequence[Path]], object]) -> None:
-        """Set the function that opens files, and call it for files that have arrived already."""
+        """Set the function that opens files, and call it with the files that have arrived before.
+
+        Args:
+            take: Called with the paths.
+        """
         self._take = take
         waiting, self._waiting = self._waiting, []
         if waiting:
@@ -66,7 +75,10 @@ class Application(QApplication):
         return super().event(event)
 
     def installEventFilter(self, filter_object: QObject) -> None:
-        """Raise TypeError. Filter the events of a window or a widget instead (see the class)."""
+        """Raise TypeError, because event filters on the application are not supported.
+
+        Install the filter on a window or a widget instead.
+        """
         raise TypeError(
             f"{type(filter_object).__name__} can't filter the events of the whole application: the first one "
             "of the block editor's browser would end Studio; filter those of a window or a widget"
@@ -74,5 +86,5 @@ class Application(QApplication):
 
 
 def paths_of(dropped: QMimeData) -> list[Path]:
-    """Return the paths of the local files in the data of a drag."""
+    """Return the paths of local files in drag-and-drop data."""
     return [Path(url.toLocalFile()) for url in dropped.urls() if url.isLocalFile()]

@@ -1,8 +1,8 @@
-"""Software rendering on machines without a GPU, where the graphics driver renders in software too.
+"""Selection of Qt's software renderer on machines without a GPU.
 
-Once a window shows a web page, Qt lets the graphics driver compose the whole window at every change. Without
-a GPU the driver (llvmpipe on Linux, WARP on Windows) is slow: it used a third of a core for images at 25 Hz.
-Qt's own software renderer adds almost nothing.
+Once a window shows a web page, Qt composes the whole window with the graphics driver at every change.
+Without a GPU the driver renders in software too (llvmpipe on Linux, WARP on Windows) and is slow: it
+used a third of a core for images at 25 Hz. Qt's own software renderer adds almost no load.
 """
 
 from __future__ import annotations
@@ -21,21 +21,24 @@ GPU_DEVICE_PATTERNS = (
     "/dev/kgsl*",
     "/dev/pvr*",
 )
-"""Device files of GPUs on Linux, including WSL and single-board computers."""
+"""Patterns for the device files of GPUs on Linux, including WSL and single-board computers."""
 FALLBACK_ADAPTERS = ("Microsoft Basic Display", "Microsoft Basic Render")
-"""Names of Windows' fallback graphics adapters."""
+"""Prefixes of the names of Windows' fallback graphics adapters."""
 _ATTACHED = 0x1
 
 
 def use_software_renderer(
     environ: MutableMapping[str, str], platform: str, there: Callable[[str], bool] | None = None
 ) -> bool:
-    """Select Qt's software renderer on machines without a GPU. Return True if it was selected.
-
-    Call this before Qt is used. An existing choice in the environment is kept.
+    """Select Qt's software renderer on a machine without a GPU; call this before Qt is used.
 
     Args:
-        there: Returns True if a platform has a GPU.
+        environ: Environment variables, modified in place. A renderer that is already set isn't changed.
+        platform: Value of `sys.platform`.
+        there: Returns True if there is a GPU, given the platform; default: `has_graphics_processor`.
+
+    Returns:
+        True if the software renderer is selected.
     """
     if not environ.get(CHOICE) and not (there or has_graphics_processor)(platform):
         environ[CHOICE] = BY_SOFTWARE
@@ -43,7 +46,7 @@ def use_software_renderer(
 
 
 def has_graphics_processor(platform: str) -> bool:
-    """Return True if this computer has a GPU, or if the system doesn't report that."""
+    """Return True if this computer has a GPU, or if that can't be determined on the platform."""
     if platform.startswith("linux"):
         return any(glob.glob(pattern) for pattern in GPU_DEVICE_PATTERNS)  # noqa: PTH207 - absolute patterns
     if platform == "win32":
@@ -52,12 +55,12 @@ def has_graphics_processor(platform: str) -> bool:
 
 
 def has_driver(names: Sequence[str]) -> bool:
-    """Return True if one of these adapters is not Windows' fallback, or if the list is empty."""
+    """Return True if one of the adapters is not a fallback adapter of Windows, or if none is listed."""
     return not names or any(not name.startswith(FALLBACK_ADAPTERS) for name in names)
 
 
 def adapters() -> list[str]:
-    """Return the names of the active graphics adapters on Windows; empty on other platforms."""
+    """Return the names of the active graphics adapters; empty except on Windows."""
     found: list[str] = []
     if sys.platform == "win32":
 

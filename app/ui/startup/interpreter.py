@@ -1,16 +1,17 @@
 """Interpreter settings that keep the window responsive: thread switching and garbage collection.
 
-Painting a table releases and reacquires the GIL hundreds of times. While another thread receives 50 000
-messages per second, each reacquisition could take Python's default switch interval of 5 ms, and a click
-waited for several of them.
+Painting a table releases and reacquires the GIL hundreds of times. With Python's default switch
+interval, each reacquisition can take 5 ms while another thread receives 50 000 messages per second,
+which delays the response to a click.
 
-A full collection takes 50 to 170 ms with the objects of a window, and many short-lived messages trigger one.
-Therefore nothing is collected during startup. The objects that exist afterwards are frozen, which leaves
-little work for later collections.
+A full collection takes 50 to 170 ms with the objects of a window, and is triggered often by many
+short-lived messages. Therefore nothing is collected during startup, and the objects that exist
+afterwards are frozen, which shortens later collections.
 
-Python runs a collection in the thread that exceeds the allocation threshold. Qt objects in a reference cycle
-(a timer, a model) would be deleted there while the GUI thread may be using them, which crashes Studio, or in
-the middle of Qt's own work with a widget. Therefore only the GUI thread collects, between two events.
+Python runs a collection in the thread that exceeds the allocation threshold. Qt objects in a reference
+cycle, such as a timer or a model, would be deleted in that thread, while the main thread may be using
+them, or in the middle of Qt's own work. Either can crash Studio. Therefore only the main thread
+collects, between two events.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ NEW_OBJECTS, COLLECTIONS = 10_000, 20
 
 
 def shorten_switch_interval() -> None:
-    """Shorten the interpreter's thread switch interval. Idempotent."""
+    """Set a short thread switch interval. Idempotent."""
     sys.setswitchinterval(SWITCH_INTERVAL_S)
 
 
@@ -38,16 +39,17 @@ def freeze_objects() -> None:
 
 
 def collect_garbage() -> None:
-    """Run the collection that Python would have run automatically since the last call, if any."""
+    """Run the collection that the thresholds require, if any, as Python's automatic collection would."""
     new_objects, young, middle = gc.get_count()
     if new_objects > NEW_OBJECTS:
         gc.collect(0 if young <= COLLECTIONS else 1 if middle <= COLLECTIONS else 2)
 
 
 class GcTimer(QTimer):
-    """Calls `collect_garbage` four times a second in its own thread after `start`.
+    """Timer that calls `collect_garbage` four times a second and replaces the automatic collection.
 
-    Automatic collection is disabled.
+    Creating the timer disables the automatic collection; collections run in the timer's thread after
+    `start`.
     """
 
     def __init__(self, parent: QObject) -> None:
@@ -59,7 +61,10 @@ class GcTimer(QTimer):
 
 
 class GcFreezeTimer(QTimer):
-    """Calls `freeze_garbage` one second after `start`. Start the timer after many objects were created."""
+    """Single-shot timer that calls `freeze_objects` one second after `start`.
+
+    Start the timer after many long-lived objects were created.
+    """
 
     def __init__(self, parent: QObject) -> None:
         super().__init__(parent)

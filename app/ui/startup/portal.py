@@ -1,7 +1,7 @@
-"""Native file dialogs on Linux through the desktop portal, if it is available on the session bus.
+"""Native file dialogs on Linux, by the desktop portal on the session bus.
 
-Qt uses the portal if its platform theme "xdgdesktopportal" is selected before the application is created.
-Without a session bus nothing is loaded or delayed.
+Qt uses the portal if its platform theme "xdgdesktopportal" is selected before the application is
+created. Without a session bus, no module is loaded and the startup isn't delayed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ MAX_MS = 300
 
 
 def has_bus(environ: MutableMapping[str, str]) -> bool:
-    """Return True if there is a session bus."""
+    """Return True if the environment variables refer to a D-Bus session bus."""
     if environ.get("DBUS_SESSION_BUS_ADDRESS"):
         return True
     folder = environ.get("XDG_RUNTIME_DIR")
@@ -24,7 +24,7 @@ def has_bus(environ: MutableMapping[str, str]) -> bool:
 
 
 def has_file_chooser() -> bool:
-    """Return True if the portal has a file chooser, False if it doesn't reply within 0.3 s."""
+    """Return True if the desktop portal has a file chooser; False if it doesn't reply within 0.3 s."""
     from PySide6.QtDBus import QDBusConnection, QDBusMessage  # noqa: PLC0415 - only where there is a bus
 
     bus = QDBusConnection.connectToBus(QDBusConnection.BusType.SessionBus, "studio-portal")
@@ -41,14 +41,18 @@ def has_file_chooser() -> bool:
 def use_portal(
     environ: MutableMapping[str, str], platform: str, answers: Callable[[], bool] = has_file_chooser
 ) -> None:
-    """Select the portal's dialogs if they are available and the environment doesn't choose another theme.
+    """Select the portal's file dialogs if they are available; call this before the application is created.
 
-    Call this before the application is created. ``platform`` is a value of `sys.platform`.
+    Args:
+        environ: Environment variables, modified in place. A platform theme that is already set isn't
+            changed.
+        platform: Value of `sys.platform`.
+        answers: Returns True if the portal has a file chooser.
     """
     if platform.startswith("linux") and not environ.get(CHOICE) and has_bus(environ) and answers():
         environ[CHOICE] = THEME
 
 
 def has_system_dialogs(environ: MutableMapping[str, str], platform: str) -> bool:
-    """Return True if native file dialogs are used: on Windows and macOS, and on Linux with the portal."""
+    """Return True if the platform has native file dialogs: Windows, macOS, and Linux with the portal."""
     return platform in {"win32", "darwin"} or environ.get(CHOICE) == THEME

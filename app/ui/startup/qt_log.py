@@ -1,7 +1,7 @@
-"""Log of Qt, Chromium and Studio. Known noise is dropped; everything else goes to the log and the Console.
+"""Logging of Qt, Chromium and Studio to stderr, to the log files and to the Console.
 
-Noise are messages of these libraries on machines without a GPU or a message bus, where Studio works all the
-same. Only messages known to be harmless are dropped.
+Qt and Chromium log many harmless messages on machines without a GPU or a message bus, although Studio
+works there. Messages that are known to be harmless are dropped.
 """
 
 from __future__ import annotations
@@ -47,17 +47,18 @@ _log = logging.getLogger("qt")
 
 
 def quiet_chromium(environ: MutableMapping[str, str]) -> None:
-    """Disable Chromium's log unless the user's flags configure it."""
+    """Disable Chromium's log, unless the flags in the environment configure it."""
     flags = environ.get(FLAGS, "")
     if "--log-level" not in flags and "--enable-logging" not in flags:
         environ[FLAGS] = f"{flags} {QUIET}".strip()
 
 
 def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> None:
-    """Log a message of Qt, unless it is known noise.
+    """Log a message of Qt, unless it is known to be harmless.
 
-    If Qt can't open a window, the program exits here with code 2, because Qt would advise to reinstall the
-    application and abort. This happens during startup, so no work is lost.
+    If Qt can't open a window, the process exits with code 2 after a log message of our own, because Qt
+    would abort and advise to reinstall the application. This happens during startup, so no work is
+    lost.
     """
     if kind == QtMsgType.QtFatalMsg and NO_PLATFORM_MESSAGE in words:
         _log.critical(
@@ -73,7 +74,7 @@ def on_qt_message(kind: QtMsgType, _context: QMessageLogContext, words: str) -> 
 
 
 class ConsoleHandler(logging.Handler):
-    """Logging handler that stores warnings and errors of all threads for the Console."""
+    """Logging handler that stores warnings and errors for the Console. Thread-safe."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -81,7 +82,7 @@ class ConsoleHandler(logging.Handler):
         self._records: deque[tuple[str, str, str]] = deque(maxlen=MAX_RECORDS)
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Store a record. Repeated records are stored with their count."""
+        """Store a record; repetitions are combined and stored with their count."""
         if getattr(record, "in_console", False):
             return
         filtered = self._repeat_filter.filter(record)
@@ -90,15 +91,19 @@ class ConsoleHandler(logging.Handler):
             self._records.append((level, filtered.name.partition(".")[0], filtered.getMessage()))
 
     def drain(self, add: Callable[[str, str, str], object]) -> None:
-        """Pass the stored records to ``add`` (level, origin, text), oldest first, and discard them."""
+        """Remove the stored records and pass them to a function, oldest first.
+
+        Args:
+            add: Called with level ("warn" or "error"), origin and text of each record.
+        """
         while self._records:
             add(*self._records.popleft())
 
 
 class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
-    """Logging handler that writes warnings and errors to stderr, with a traceback if the error is new.
+    """Logging handler that writes warnings and errors to stderr, with a traceback for new errors.
 
-    Never blocks a thread, although a terminal may stop accepting output for hours.
+    Never blocks the calling thread, even if the terminal stops accepting output.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -108,7 +113,7 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
         self.setFormatter(terminal.LineFormatter("%(name)s: %(message)s"))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Write a record. Repeated records are written with their count."""
+        """Write a record; repetitions are combined and written with their count."""
         filtered = self._repeat_filter.filter(record)
         if filtered is not None:
             super().emit(filtered)
@@ -116,7 +121,7 @@ class TerminalHandler(logging.StreamHandler[terminal.Terminal]):
                 self.stream.drain()
 
     def close(self) -> None:
-        """Allow some time for pending output to be written. Called by `logging` at exit."""
+        """Write pending output within a time limit; called by `logging` at exit."""
         self.stream.close()
         super().close()
 

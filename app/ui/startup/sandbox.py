@@ -1,9 +1,8 @@
 """Sandbox of the block editor's browser on Linux systems that deny user namespaces.
 
-Chromium isolates its processes by namespaces and by a system call filter. Where namespaces are denied, for
-example by AppArmor (Ubuntu 24.04 and later, for programs without a profile), Chromium finds out too late and
-crashes Studio. Therefore namespaces are tested first and, if necessary, disabled for Chromium; the filter
-stays active.
+Chromium isolates its processes by namespaces and by a system call filter. Where namespaces are denied,
+for example by AppArmor on Ubuntu 24.04 and later, Chromium crashes Studio. Therefore the creation of
+namespaces is tested first; if it fails, Chromium uses only the system call filter.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ NO_NAMESPACES_FLAG = "--disable-namespace-sandbox"
 DISABLE_VARIABLE = "QTWEBENGINE_DISABLE_SANDBOX"
 NEW_USER, NEW_PROCESSES = 0x10000000, 0x20000000
 EMPTY_ROOT = b"/proc/self/fdinfo"
-"""Root folder of Chromium's isolated processes; it is empty once its process has ended."""
+"""Root folder of an isolated process; the folder is empty once the process that created it has ended."""
 MAX_S = 2.0
 
 _log = logging.getLogger("studio.editor")
 
 
 class SandboxTrial:
-    """Tests in a short-lived process whether this program may create namespaces as Chromium does."""
+    """Test in a child process whether this program may create namespaces as Chromium does."""
 
     def __init__(self) -> None:
         # The test takes about 20 ms, during which other work can be done.
@@ -49,9 +48,9 @@ class SandboxTrial:
             os.close(writer)
 
     def is_allowed(self) -> bool:
-        """Return True if namespaces are allowed, False if they are denied or the result is unknown.
+        """Return True if namespaces are allowed; False if they are denied or the test fails.
 
-        Waits at most 2 s. Call it once.
+        Blocks for up to 2 s. Can be called only once.
         """
         if self._process < 0:
             return False
@@ -62,10 +61,14 @@ class SandboxTrial:
 
 
 def start_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | None:
-    """Start the test. Return None where it isn't needed.
+    """Start a test of the sandbox if the platform and the environment require one.
 
-    It isn't needed if the user has disabled the sandbox, or chosen another one by Chromium's flags.
-    ``platform`` is a value of `sys.platform`.
+    Args:
+        environ: Environment variables.
+        platform: Value of `sys.platform`.
+
+    Returns:
+        The running test; None except on Linux, or if the user has configured the sandbox.
     """
     if (
         not platform.startswith("linux")
@@ -77,9 +80,11 @@ def start_trial(environ: Mapping[str, str], platform: str) -> SandboxTrial | Non
 
 
 def configure_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | None) -> None:
-    """Restrict Chromium to the system call filter if the test failed.
+    """Disable Chromium's namespaces if the test failed; call this before the web engine starts.
 
-    Call this before the web engine starts.
+    Args:
+        environ: Environment variables, modified in place.
+        trial: Test that was started, or None.
     """
     if trial is not None and not trial.is_allowed():
         _log.info(
@@ -89,7 +94,7 @@ def configure_sandbox(environ: MutableMapping[str, str], trial: SandboxTrial | N
 
 
 def try_isolation() -> bool:
-    """Isolate this process as Chromium does. Return False if the system denies it."""
+    """Isolate this process as Chromium isolates its processes; return False if the system denies it."""
     if sys.platform == "win32":
         return False
     user, group = os.geteuid(), os.getegid()

@@ -1,7 +1,7 @@
 """Single instance: a second start passes its files to the running Studio and exits.
 
-Both processes use a local socket in a private folder, and each checks the owner of the other. The option
-``--new-window`` skips this.
+The processes communicate by a local socket in a private folder, and each checks that the other belongs
+to the same user. The option ``--new-window`` starts an independent instance.
 """
 
 from __future__ import annotations
@@ -44,17 +44,24 @@ OK = b"ok\n"
 
 @dataclass(frozen=True)
 class StartRequest:
-    """Request of a second start to the running window."""
+    """Request of a later start to the running instance.
+
+    Attributes:
+        files: Files to open.
+        demo: True to start the demonstration.
+    """
 
     files: tuple[Path, ...] = ()
     demo: bool = False
 
 
 def socket_name(folder: Path) -> str:
-    """Return the name of the socket for Studio's folder; "" if there is no private folder for it.
+    """Return the name of the local socket for a folder of Studio.
 
-    The socket is in the user's runtime folder, else in Studio's folder, else in a private temporary one: in a
-    shared folder another user could impersonate the window.
+    Returns "" if there is no private folder for the socket.
+
+    The socket is in the user's runtime folder, else in Studio's folder, else in a private temporary
+    folder. In a shared folder, another user could impersonate the running instance.
     """
     mark = hashlib.sha256(os.fsencode(folder.resolve())).hexdigest()[:16]
     if os.name != "posix":
@@ -73,7 +80,10 @@ def socket_name(folder: Path) -> str:
 
 
 def is_private(folder: Path) -> bool:
-    """Return True if a folder belongs to this user and is private. A symbolic link is not private."""
+    """Return True if a folder belongs to this user and nobody else has access.
+
+    Symbolic links are rejected.
+    """
     try:
         about = folder.lstat()
     except OSError:
@@ -82,7 +92,7 @@ def is_private(folder: Path) -> bool:
 
 
 def is_own_socket(name: str) -> bool:
-    """Return True if the socket exists, belongs to this user, and is in a private folder."""
+    """Return True if a socket exists in a private folder and belongs to this user."""
     if os.name != "posix":
         return bool(name)
     try:
@@ -93,7 +103,11 @@ def is_own_socket(name: str) -> bool:
 
 
 def peer_user(descriptor: int) -> int | None:
-    """Return the user id of the peer of a local socket; None where the system doesn't report it."""
+    """Return the user id of the peer of a local socket, or None if it can't be determined.
+
+    Args:
+        descriptor: File descriptor of the socket.
+    """
     asked = getattr(socket, "SO_PEERCRED", None)
     copy = os.dup(descriptor)
     try:
@@ -113,9 +127,14 @@ def peer_user(descriptor: int) -> int | None:
 
 
 def send_request(name: str, asked: StartRequest) -> bool:
-    """Pass a request to the running window. Return False if there is none. Waits at most 3 s.
+    """Send a request to the running instance. Blocks for about 3 s at most.
 
-    Sockets of other users are ignored.
+    Args:
+        name: Name of the socket; a socket of another user is ignored.
+        asked: Request.
+
+    Returns:
+        True if the instance accepted the request, False if there is none.
     """
     if not is_own_socket(name):
         return False  # checked on Unix before Qt's network module is loaded, which takes time
@@ -136,10 +155,18 @@ def send_request(name: str, asked: StartRequest) -> bool:
 
 
 def pass_to_running(name: str, asked: StartRequest, turn: FileLock, within_s: float = START_S) -> bool:
-    """Return True if a running or starting window accepted the request.
+    """Send a request to a running instance, or to one that is just starting.
 
-    Otherwise this process holds the lock ``turn`` and has to open a window; it releases the lock when the
-    window can be reached. A double click on Studio's icon therefore opens only one window.
+    Args:
+        name: Name of the socket.
+        asked: Request.
+        turn: Lock of the instance that is starting.
+        within_s: Maximum time to wait for an instance that is starting.
+
+    Returns:
+        True if an instance accepted the request. Otherwise this process must open a window; it holds
+        the lock, which must be released when the window can receive requests, unless the time limit was
+        exceeded.
     """
     until, pause, waited = time.monotonic() + within_s, threading.Event(), False
     while not send_request(name, asked):
@@ -163,7 +190,7 @@ def _belongs_to_other_user(line: QtNetwork.QLocalSocket) -> bool:
 
 
 class SingleInstanceServer(QObject):
-    """Server that receives the requests of later starts; `close` stops it."""
+    """Server that receives the requests of later starts until it is closed."""
 
     def __init__(
         self, name: str, do: Callable[[StartRequest], object], parent: QObject | None = None
@@ -226,12 +253,12 @@ class SingleInstanceServer(QObject):
             socket.deleteLater()
 
     def close(self) -> None:
-        """Stop accepting requests."""
+        """Stop the server."""
         self._server.close()
 
 
 def parse(data: bytes) -> StartRequest | None:
-    """Parse a request; None if it is malformed."""
+    """Parse a request, encoded as JSON; return None if it is malformed."""
     try:
         content = json.loads(data)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Formatting of values for display: numbers, dates, sensors.
+"""Formatting of numbers, dates and sensor values for display.
 
-Independent of widgets; translations come from `nep.i18n`.
+Independent of widgets; translations are those of `nep.i18n`.
 """

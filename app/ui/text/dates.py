@@ -8,7 +8,7 @@ from nep.i18n import _, day_text
 
 
 def relative_day_text(then: dt.datetime, now: dt.datetime) -> str:
-    """Format a day, such as "Today, 8:12", "Yesterday", "17 November" or "17 November 2025"."""
+    """Format a date relative to now, such as "Today, 8:12", "Yesterday" or "17 November 2025"."""
     days = (now.date() - then.date()).days
     if days == 0:
         return _("Today, {clock}").format(clock=clock_text(then))
@@ -18,7 +18,7 @@ def relative_day_text(then: dt.datetime, now: dt.datetime) -> str:
 
 
 def date_time_text(then: dt.datetime, now: dt.datetime) -> str:
-    """Format a date and time, such as "Today, 8:12", "Yesterday, 8:12" or "17 November, 8:12"."""
+    """Format a date and time relative to now, such as "Today, 8:12" or "17 November, 8:12"."""
     day = relative_day_text(then, now)
     if then.date() == now.date():
         return day
@@ -26,7 +26,7 @@ def date_time_text(then: dt.datetime, now: dt.datetime) -> str:
 
 
 def last_seen_text(then: dt.datetime, now: dt.datetime) -> str:
-    """Format when something was last seen, such as "seen today, 8:12" or "seen 17 November, 16:20"."""
+    """Format the time at which something was last seen, such as "seen today, 8:12"."""
     clock = clock_text(then)
     days = (now.date() - then.date()).days
     if days == 0:

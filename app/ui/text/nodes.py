@@ -1,4 +1,4 @@
-"""Formatting of properties of nodes: NEP version and CPU use."""
+"""Formatting of properties of nodes: generation and CPU use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ GENERATIONS = {
 
 
 def generation_text(node: NodeEntry) -> str:
-    """Return "native", the version of the original NEP, or the name of the other network."""
+    """Return the generation of a node: "native", the version of NEP, or the name of another network."""
     kind = find_kind(node.network)
     if kind is not None:
         return kind.product_name
@@ -22,7 +22,11 @@ def generation_text(node: NodeEntry) -> str:
 
 
 def cpu_text(ratio: float | None) -> str:
-    """Format a share of a core, such as "0.4 %", "12 %" or "130 %"; "" if it is unknown."""
+    """Format the CPU use of a node, such as "0.4 %", "12 %" or "130 %"; "" if it is unknown.
+
+    Args:
+        ratio: CPU use as a share of one core, or None.
+    """
     if ratio is None:
         return ""
     percent = ratio * 100

@@ -1,4 +1,4 @@
-"""Formatting of numbers with units ("" for unknown ones), and of keyboard shortcuts."""
+"""Formatting of numbers with units, and of keyboard shortcuts."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ THIN = "\u2009"  # thin space, as thousands separator
 
 
 def rate_text(rate_hz: float | None) -> str:
-    """Format a rate in messages per second, such as "30.0", "0.4" or "1 204"; "" if it is unknown."""
+    """Format a rate in Hz without a unit, such as "30.0", "0.4" or "1 204"; "" for None."""
     if rate_hz is None:
         return ""
     return number(rate_hz, ".1f") if rate_hz < 1000 else group_digits(round(rate_hz))
 
 
 def bandwidth_text(bytes_per_s: float | None) -> str:
-    """Format a bandwidth, such as "92 B/s", "1.6 kB/s" or "5.1 MB/s"; "" if it is unknown."""
+    """Format a bandwidth, such as "92 B/s", "1.6 kB/s" or "5.1 MB/s"; "" for None."""
     return "" if bytes_per_s is None else f"{size_text(bytes_per_s)}/s"
 
 
@@ -62,7 +62,7 @@ def size_text(size_bytes: float) -> str:
 
 
 def age_text(age_s: float | None) -> str:
-    """Format an age, such as "12 ms", "0.4 s", "6 s", "2 min" or "3 h"; "" if it is unknown."""
+    """Format an age, such as "12 ms", "0.4 s", "6 s", "2 min" or "3 h"; "" for None."""
     if age_s is None:
         return ""
     if age_s < 0.0995:
@@ -82,7 +82,7 @@ def latency_text(latency_s: float) -> str:
 
 
 def group_digits(count: int) -> str:
-    """Format a count with a thousands separator, such as "18 204"."""
+    """Format a count with thin spaces as thousands separators, such as "18 204"."""
     return f"{count:,}".replace(",", THIN)
 
 
@@ -94,7 +94,12 @@ def seconds_text(value_s: float) -> str:
 
 
 def shortcut_text(shortcut: str, platform: str = sys.platform) -> str:
-    """Format shortcuts, separated by commas, such as "Ctrl+Shift+S", or "⇧⌘S" on a Mac, where Ctrl is Cmd."""
+    """Format shortcuts in the style of the platform, such as "Ctrl+Shift+S", or "⇧⌘S" on macOS.
+
+    Args:
+        shortcut: Shortcuts in Qt's portable format, separated by ", "; Ctrl stands for Cmd on macOS.
+        platform: Value of `sys.platform`.
+    """
     if platform != "darwin":
         return _named_keys(shortcut, {})
     return ", ".join(_mac_key(each) for each in shortcut.split(", "))
@@ -107,7 +112,13 @@ def _mac_key(shortcut: str) -> str:
 
 
 def tip_with_key(tip: str, shortcut: str, platform: str = sys.platform) -> str:
-    """Append a shortcut to a tooltip, such as "Save (Ctrl+S)", or "Save (⌘S)" on a Mac."""
+    """Append a shortcut to a tooltip, such as "Save (Ctrl+S)", or "Save (⌘S)" on macOS.
+
+    Args:
+        tip: Text of the tooltip.
+        shortcut: Shortcut in Qt's portable format, or "" for none.
+        platform: Value of `sys.platform`.
+    """
     return f"{tip} ({shortcut_text(shortcut, platform)})" if shortcut else tip
 
 
@@ -116,7 +127,7 @@ def _named_keys(shortcut: str, signs: Mapping[str, str]) -> str:
 
 
 def length_text(seconds: float) -> str:
-    """Format the length of a recording, such as "0:42", "12:04" or "1:32:10"."""
+    """Format a duration of a recording, such as "0:42", "12:04" or "1:32:10"."""
     whole = int(seconds) if 0 <= seconds < 1e9 else 0
     minutes, rest = divmod(whole, 60)
     hours, minutes = divmod(minutes, 60)

@@ -1,7 +1,7 @@
-"""Escaping of names from the network, so that tooltips and menus show them as plain text.
+"""Escaping of names that were received from the network, for tooltips and menus.
 
-Qt interprets a tooltip that looks like HTML as HTML. A node named ``<img src="//server/share">`` could
-therefore show a file of this computer, or reveal the user to a server, when the mouse is over its name.
+Qt renders a tooltip that looks like HTML as HTML. A tooltip with the node name ``<img
+src="//server/share">`` could therefore load a local file, or contact a server.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ ZERO_WIDTH_SPACE = "\u200b"  # zero-width space, at which a line may break
 
 
 def make_breakable(words: str) -> str:
-    """Insert line break opportunities into very long words, which a label would otherwise cut off."""
+    """Insert zero-width spaces into long words, so that a label can wrap instead of truncating them."""
     return " ".join(_pieces(word) if len(word) > LONG_WORD else word for word in words.split(" "))
 
 
@@ -31,12 +31,12 @@ def _pieces(word: str) -> str:
 
 
 def tip(words: str) -> str:
-    """Escape a text for a tooltip that shows exactly this text."""
+    """Escape a text for a tooltip, so that Qt shows it as plain text."""
     if not Qt.mightBeRichText(words):
         return words
     return f'<span style="white-space: pre-wrap">{html.escape(words)}</span>'
 
 
 def escape_menu_text(name: str) -> str:
-    """Escape a name for a menu entry: an ampersand makes no mnemonic, and a tab no shortcut."""
+    """Escape a name for a menu entry: "&" doesn't mark a mnemonic, and a tab doesn't start a shortcut."""
     return name.replace("&", "&&").replace("\t", " ")

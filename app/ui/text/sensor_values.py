@@ -1,4 +1,4 @@
-"""Formatting of sensor values for a table row: value, details, and position in the range."""
+"""Formatting of sensor values for the rows of a table."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class ReadingText:
     """Formatted sensor value.
 
     Attributes:
-        value: Value, shown in bold at the right.
-        beside: Details, shown in the middle.
-        share: Position in the range (0 to 1), shown as a bar, or None.
+        value: Value, shown in bold on the right.
+        details: Details, shown in the middle.
+        fraction: Position in the range (0 to 1), shown as a bar, or None.
     """
 
     value: str = ""
@@ -30,7 +30,7 @@ class ReadingText:
 
 
 def reading_text(sensor: Sensor, value: object) -> ReadingText:
-    """Format a sensor's newest value. All texts are empty if there is none."""
+    """Format the newest value of a sensor; all texts are empty if the value is None."""
     if value is None:
         return ReadingText()
     if sensor.kind == "boolean" or isinstance(value, bool):
@@ -50,12 +50,17 @@ def reading_text(sensor: Sensor, value: object) -> ReadingText:
 
 
 def yes_no_text(value: object) -> str:
-    """Return "yes" or "no", translated."""
+    """Return the translated "yes" or "no" for the truth value of an object."""
     return _("yes") if value else _("no")
 
 
 def quantity_text(value: float, unit: str | None) -> str:
-    """Format a number with its significant decimals, such as "0.82 m", "84 %" or "31°"."""
+    """Format a number with a suitable number of decimals, such as "0.82 m", "84 %" or "31°".
+
+    Args:
+        value: Number.
+        unit: Unit to append, or None.
+    """
     if isinstance(value, int) or float(value).is_integer():
         words = f"{value:.0f}"
     elif abs(value) < 10:

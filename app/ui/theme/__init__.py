@@ -1,5 +1,5 @@
 """Theme of Studio: design tokens, colours, fonts, icons and the style sheet.
 
-`theme` provides each colour, size and font by the name of its role; `tokens` reads the design tokens from
-their file.
+`theme` provides colours, sizes and fonts by the name of their role; `tokens` loads the design tokens
+from their file.
 """

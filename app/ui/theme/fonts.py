@@ -10,7 +10,7 @@ from PySide6.QtGui import QFont, QFontDatabase
 from app import resources
 
 REJECTED_PROPERTY = "fontsRefused"
-"""Application property with the font files that Qt rejected; set once all are loaded."""
+"""Application property with the names of the font files that Qt rejected; set by `load`."""
 FILES = (
     "Inter-Regular.otf",
     "Inter-Medium.otf",
@@ -26,10 +26,10 @@ FILES = (
 
 
 def load() -> tuple[str, ...]:
-    """Register the bundled fonts with Qt. Return the files that Qt rejected.
+    """Register the bundled fonts with Qt and return the names of the files that Qt rejected.
 
-    Needs a QGuiApplication. Idempotent, because each registration, even of a known file, clears Qt's cache of
-    text sizes.
+    Requires a QGuiApplication. Repeated calls have no effect, because each registration clears Qt's
+    cache of text sizes.
     """
     application = QCoreApplication.instance()
     if application is not None and application.property(REJECTED_PROPERTY) is not None:
@@ -45,7 +45,14 @@ def load() -> tuple[str, ...]:
 
 
 def make(families: Sequence[str], size_px: float, weight: int, *, spacing_em: float = 0.0) -> QFont:
-    """Return a font with tabular digits (``tnum``) and letter spacing in em."""
+    """Return a font with tabular digits.
+
+    Args:
+        families: Font families in order of preference.
+        size_px: Size in px.
+        weight: Weight, 100 to 900.
+        spacing_em: Letter spacing in em.
+    """
     font = QFont(list(families))
     font.setPixelSize(max(1, round(size_px)))
     font.setWeight(QFont.Weight(weight))

@@ -1,7 +1,7 @@
-"""Lucide icons in the colour of the adjacent text, sharp at every device pixel ratio.
+"""Lucide icons, painted in the colour of the adjacent text and sharp at every device pixel ratio.
 
-There is one drawing per icon for all themes: ``currentColor`` is replaced by the colour of a role when it is
-painted. Delegates and painted widgets call `paint_icon`; widgets that need a QIcon use `IconEngine`.
+There is one drawing per icon for all themes, in which ``currentColor`` is replaced when it is painted.
+Delegates and painted widgets call `paint_icon`; other widgets use a QIcon with an `IconEngine`.
 """
 
 from __future__ import annotations
@@ -68,9 +68,15 @@ def _renderer(name: str, colour: str, opacity: float, filled: bool, thin: bool) 
 
 
 def paint_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor, *, filled: bool = False) -> None:
-    """Paint an icon into a square in logical pixels; ``dot`` is the filled disc of a running block.
+    """Paint an icon into a square.
 
-    An unknown name is replaced by a circle with a question mark, and logged with the most similar known name.
+    Args:
+        painter: Painter.
+        rect: Square in logical pixels.
+        name: Name of the icon, or "dot" for a filled disc. An unknown name is logged with a suggestion
+            and replaced by a question mark.
+        colour: Colour of the lines.
+        filled: True to fill the shape with the colour.
     """
     painter.save()
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -97,7 +103,10 @@ def _cached_pixmap(name: str, side: float, rgba: int, ratio: float) -> QPixmap:
 
 
 def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor) -> None:
-    """Paint an icon like `paint_icon`, but from a cached pixmap at whole pixels, for frequent repaints."""
+    """Paint an icon from a cached pixmap, aligned to device pixels.
+
+    Faster than `paint_icon`, for widgets that are repainted often.
+    """
     ratio = painter.device().devicePixelRatioF()
     place = QPointF(round(rect.x() * ratio) / ratio, round(rect.y() * ratio) / ratio)
     painter.drawPixmap(place, _cached_pixmap(name, rect.width(), colour.rgba(), ratio))
@@ -105,7 +114,7 @@ def paint_cached_icon(painter: QPainter, rect: QRectF, name: str, colour: QColor
 
 @guard  # not a QObject
 class IconEngine(QIconEngine):
-    """Icon engine that paints an icon in the colours of the current state: enabled, disabled, or selected."""
+    """Icon engine that paints an icon in the colour of the current mode, such as normal or disabled."""
 
     def __init__(self, name: str, colour: Callable[[QIcon.Mode, QIcon.State], QColor]) -> None:
         # `colour` is called at each paint, so that a new theme needs no new icon.

@@ -1,6 +1,7 @@
 """Style sheet of the application, built from a theme, with rules by class and dynamic property.
 
-Labels get font and colour by the properties ``kind`` and ``role`` (`app.ui.widgets.label`).
+The font and the colour of labels are set by the properties ``kind`` and ``role``, see
+`app.ui.widgets.label`.
 """
 
 from __future__ import annotations
@@ -16,33 +17,33 @@ LABEL_ROLES = (
 )  # fmt: skip
 
 EXTRA_KINDS = {"titleLarge": (14.0, 600), "empty": (17.0, 600), "card": (15.0, 600), "lead": (15.0, 400)}
-"""Size and weight of additional kinds of labels."""
+"""Size in px and weight of kinds of labels that the tokens don't define."""
 
 
 class ThemeValues(Protocol):
-    """Part of a theme that the style sheet uses."""
+    """Interface of a theme that the style sheet uses."""
 
     @property
     def dark(self) -> bool:
         """True if the theme is dark."""
 
     def hex(self, role: str) -> str:
-        """Return the colour of a role."""
+        """Return the colour of a role as ``#RRGGBB`` or ``#RRGGBBAA``."""
 
     def radius(self, name: str) -> int:
-        """Return a corner radius."""
+        """Return a corner radius in px by name."""
 
     def size(self, *path: str) -> int:
-        """Return a length."""
+        """Return a length in px by its path in the tokens."""
 
     def scaled(self, pixels: float) -> float:
-        """Return a length scaled with the text size."""
+        """Return a length in px multiplied by the text size."""
 
     def text_kinds(self) -> Mapping[str, TextKind]:
-        """Return the kinds of text."""
+        """Return the kinds of text by name."""
 
     def family(self, kind: Literal["text", "mono"]) -> str:
-        """Return a font family."""
+        """Return the font family for text or for code."""
 
 
 SHEET = """
@@ -139,7 +140,7 @@ def _labels(theme: ThemeValues) -> str:
 
 
 class _Roles(dict[str, str]):
-    """Mapping of roles to values, with the theme's colours as defaults."""
+    """Mapping of role names to values, with the theme's colours as defaults."""
 
     def __init__(self, theme: ThemeValues) -> None:
         super().__init__()
@@ -150,7 +151,7 @@ class _Roles(dict[str, str]):
 
 
 def build(theme: ThemeValues) -> str:
-    """Return the style sheet with the colours and sizes of ``theme``."""
+    """Return the style sheet for a theme."""
     roles = _Roles(theme)
     roles.update(
         small=str(theme.radius("small")),

@@ -1,4 +1,4 @@
-"""Accessibility preferences of the system: high contrast and reduced motion, as far as available."""
+"""Accessibility preferences of the system for high contrast and reduced motion."""
 
 from __future__ import annotations
 
@@ -16,27 +16,30 @@ CLIENT_AREA_ANIMATION = 0x1042  # SPI_GETCLIENTAREAANIMATION of Windows
 
 
 def parse_preference(kept: object) -> Preference:
-    """Parse a preference from the settings, where older versions stored a boolean."""
+    """Parse a preference from the settings; "system" for an unknown value.
+
+    Older versions stored a boolean.
+    """
     if isinstance(kept, bool):
         return "on" if kept else "system"
     return next((wish for wish in PREFERENCES if wish == kept), "system")
 
 
 def prefers_contrast(hints: QStyleHints) -> bool:
-    """Return True if the system requests high contrast; False if Qt doesn't report it."""
+    """Return True if the system requests high contrast; False if Qt is too old to report it."""
     asked = getattr(hints, "accessibility", None)
     return asked is not None and asked().contrastPreference() == Qt.ContrastPreference.HighContrast
 
 
 def on_contrast_changed(hints: QStyleHints, call: Callable[[], object]) -> None:
-    """Call ``call`` when the system's contrast preference changes, if Qt supports that."""
+    """Register a callback for changes of the system's contrast preference, if Qt reports them."""
     asked = getattr(hints, "accessibility", None)
     if asked is not None:
         asked().contrastPreferenceChanged.connect(call)
 
 
 def prefers_reduced_motion(platform: str = sys.platform) -> bool:
-    """Return True if the system requests reduced motion; False if programs can't query it."""
+    """Return True if the system requests reduced motion; False where programs can't query it."""
     if platform != "win32":
         return False
     animated = ctypes.c_int(1)

@@ -1,8 +1,8 @@
-"""Theme of Studio: every colour, size, duration and font by the name of its role.
+"""Theme of Studio: colours, sizes, durations and fonts by the name of their role.
 
-`Theme` reads the design tokens and creates the palette, the style sheet and the tokens of the block editor.
-No other module contains a colour; painters call ``theme.colour("accent")``. Changes repaint the window
-immediately.
+`Theme` loads the design tokens and creates the palette, the style sheet and the values for the block
+editor. No other module defines colours; painters call, for example, ``theme.colour("accent")``. After a
+change, all windows are repainted immediately.
 """
 
 from __future__ import annotations
@@ -53,11 +53,11 @@ DISABLED_ROLES = (QPalette.ColorRole.Text, QPalette.ColorRole.WindowText, QPalet
 
 
 STYLED_PROPERTY = "isFusion"
-"""Application property that is set with the style, which Qt doesn't report once a style sheet is set."""
+"""Application property that is True once the style was set, which can't be queried under a style sheet."""
 
 
 class Theme(QObject):
-    """Colours, sizes, fonts and icons of the current mode. Emits `changed` when any of them changes."""
+    """Colours, sizes, fonts and icons of the current mode. `changed` is emitted after every change."""
 
     changed = Signal()
 
@@ -83,26 +83,33 @@ class Theme(QObject):
 
     @property
     def mode(self) -> Mode:
-        """Mode chosen by the user: "light", "dark" or "system"."""
+        """Selected mode: "light", "dark", or "system" to follow the system."""
         return self._mode
 
     @property
     def dark(self) -> bool:
-        """True if the current colours are dark."""
+        """True if the dark colours are in use."""
         return self._dark
 
     @property
     def tokens(self) -> Mapping[str, object]:
-        """Design tokens as stored in their file."""
+        """Design tokens, as parsed from their file."""
         return self._tokens.raw
 
     def set_mode(self, mode: Mode) -> None:
-        """Use light or dark colours, or those of the system, and repaint."""
+        """Select light or dark colours, or follow the system."""
         self._mode = mode
         self._refresh()
 
     def apply_settings(self, mode: Mode, text_percent: int, motion: Preference, contrast: Preference) -> None:
-        """Apply all saved settings at once."""
+        """Apply all settings in one update.
+
+        Args:
+            mode: Mode.
+            text_percent: Text size in percent, clamped to 100 to 200.
+            motion: Reduced motion.
+            contrast: High contrast.
+        """
         self._mode, self.contrast = mode, contrast
         self.high_contrast = self._resolve_contrast()
         self._text_percent = min(max(text_percent, TEXT_PERCENT_RANGE[0]), TEXT_PERCENT_RANGE[1])
@@ -111,19 +118,22 @@ class Theme(QObject):
         self._refresh()
 
     def set_text_percent(self, percent: int) -> None:
-        """Set the text size in per cent (100 to 200), which also scales lengths that depend on text."""
+        """Set the text size in percent, clamped to 100 to 200."""
         self._text_percent = min(max(percent, TEXT_PERCENT_RANGE[0]), TEXT_PERCENT_RANGE[1])
         self._fonts.clear()
         self.apply()
 
     def set_motion(self, wish: Preference) -> None:
-        """Set reduced motion: "on", "off", or "system" for the system's preference."""
+        """Set reduced motion: "on", "off", or "system" to follow the system."""
         self.motion = wish
         self.reduced_motion = wish == "on" or (wish == "system" and system.prefers_reduced_motion())
         self.changed.emit()
 
     def set_contrast(self, wish: Preference) -> None:
-        """Set high contrast (strong borders, no tints): "on", "off", or "system" to follow the system."""
+        """Set high contrast: "on", "off", or "system" to follow the system.
+
+        High contrast has strong borders and no tinted backgrounds.
+        """
         self.contrast = wish
         if self._resolve_contrast() != self.high_contrast:
             self.high_contrast = not self.high_contrast
@@ -137,11 +147,11 @@ class Theme(QObject):
 
     @property
     def text_percent(self) -> int:
-        """Text size in per cent, 100 to 200."""
+        """Text size in percent, 100 to 200."""
         return self._text_percent
 
     def apply(self) -> None:
-        """Apply style, palette, style sheet and font to the application, and emit `changed`."""
+        """Apply style, palette, font and style sheet to the application, and emit `changed`."""
         application = QApplication.instance()
         if isinstance(application, QApplication):
             # Each of these visits all widgets, even if nothing changes.
@@ -177,7 +187,11 @@ class Theme(QObject):
         return "dark" if self._dark else "light"
 
     def hex(self, role: str) -> str:
-        """Return the colour of a role as in the tokens. Raises KeyError for an unknown role."""
+        """Return the colour of a role as ``#RRGGBB`` or ``#RRGGBBAA``.
+
+        Raises:
+            KeyError: The role is unknown.
+        """
         if self.high_contrast:
             if role in HC_STRONG_ROLES:
                 role = "controlBorder"
@@ -186,36 +200,46 @@ class Theme(QObject):
         return self._tokens.colours[self._scheme][role]
 
     def colour(self, role: str) -> QColor:
-        """Return the colour of a role. Raises KeyError for an unknown role."""
+        """Return the colour of a role.
+
+        Raises:
+            KeyError: The role is unknown.
+        """
         return qt_colour(self.hex(role))
 
     def series(self, index: int) -> QColor:
-        """Return the colour of a curve; colours repeat cyclically."""
+        """Return the colour of the curve with this index; the colours repeat."""
         colours = self._tokens.series[self._scheme]
         return QColor(colours[index % len(colours)])
 
     def block_colour(self, category: str, part: str = "primary") -> QColor:
-        """Return the "primary", "secondary" or "tertiary" colour of a block category.
+        """Return a colour of a block category; an unknown category has the colours of "values".
 
-        Unknown categories use the colours of "values".
+        Args:
+            category: Name of the category.
+            part: "primary", "secondary" or "tertiary".
         """
         block = self._tokens.blocks.get(category, self._tokens.blocks["values"])
         return QColor(block[self._scheme][part])
 
     def block_text(self, category: str) -> QColor:
-        """Return the colour of text and icons on a block."""
+        """Return the colour of text and icons on blocks of a category."""
         return QColor(self._tokens.block_text.get(category, self._tokens.block_text["values"]))
 
     def block_icon(self, category: str) -> str:
-        """Return the icon of a block category."""
+        """Return the name of the icon of a block category."""
         return self._tokens.block_icons.get(category, self._tokens.block_icons["values"])
 
     def status(self, name: str) -> Status:
-        """Return the style of a status: "ok", "warn", "error", "info", "off", "running" or "recording"."""
+        """Return colours and icon of a status.
+
+        Args:
+            name: "ok", "warn", "error", "info", "off", "running" or "recording".
+        """
         return self._tokens.status[name]
 
     def palette(self) -> QPalette:
-        """Return the palette for widgets that Qt paints itself."""
+        """Return the palette for widgets that are painted by Qt."""
         return _palette(self.colour)
 
     def style_sheet(self) -> str:
@@ -225,7 +249,11 @@ class Theme(QObject):
     # -- sizes and durations ----------------------------------------------------------------------
 
     def size(self, *path: str) -> int:
-        """Return a length in px, such as ``size("row", "compact")``. Raises KeyError if it is unknown."""
+        """Return a length in px by its path in the tokens, such as ``size("row", "compact")``.
+
+        Raises:
+            KeyError: There is no such length.
+        """
         value: object = self._tokens.sizes
         for step in path:
             if not isinstance(value, Mapping):
@@ -236,7 +264,11 @@ class Theme(QObject):
         return round(value)
 
     def pair(self, *path: str) -> QSize:
-        """Return a width and height in px, such as ``pair("stop", "runBar")``."""
+        """Return a width and height in px by their path in the tokens, such as ``pair("stop", "runBar")``.
+
+        Raises:
+            KeyError: There is no such pair.
+        """
         value: object = self._tokens.sizes
         for step in path:
             value = value[step] if isinstance(value, Mapping) else None
@@ -245,11 +277,15 @@ class Theme(QObject):
         return QSize(int(value[0]), int(value[1]))
 
     def radius(self, name: str) -> int:
-        """Return a corner radius in px."""
+        """Return a corner radius in px by name."""
         return self._tokens.radii[name]
 
     def duration(self, name: str) -> int:
-        """Return a duration in ms. Except for display times, it is 0 if motion is reduced."""
+        """Return a duration in ms by name.
+
+        If motion is reduced, durations of animations are 0; the display times of messages are
+        unchanged.
+        """
         if self.reduced_motion and not name.endswith("Shown"):
             return 0
         return self._tokens.motion_ms[name]
@@ -257,11 +293,11 @@ class Theme(QObject):
     # -- fonts and icons --------------------------------------------------------------------------
 
     def scaled(self, pixels: float) -> float:
-        """Return a length scaled with the text size."""
+        """Return a length in px multiplied by the text size."""
         return pixels * self._text_percent / 100
 
     def font(self, kind: str) -> QFont:
-        """Return the font of a kind of text; "mono" is the body font in JetBrains Mono."""
+        """Return the font for a kind of text, such as "body"; "mono" is the body font in JetBrains Mono."""
         if kind not in self._fonts:
             text = self._tokens.texts["body" if kind == "mono" else kind]
             family = self._tokens.families["mono" if kind in MONO_KINDS else "text"]
@@ -282,11 +318,21 @@ class Theme(QObject):
         return self._tokens.families[kind]
 
     def icon_name(self, use: str) -> str:
-        """Return the icon name of a meaning, such as "play" for "run". Raises KeyError if it is undefined."""
+        """Return the name of the icon for a use, such as "play" for "run".
+
+        Raises:
+            KeyError: The use is unknown.
+        """
         return self._tokens.icons[use]
 
     def icon(self, name: str, role: str = "textSecondary", *, active: str = "text") -> QIcon:
-        """Return an icon in the colour of a role; the icon follows changes of the theme."""
+        """Return an icon that follows changes of the theme.
+
+        Args:
+            name: Name of the icon.
+            role: Colour role.
+            active: Colour role while the icon is active, for example hovered.
+        """
         key = (name, role, active)
         if key not in self._icons:
 
@@ -301,7 +347,7 @@ class Theme(QObject):
     # -- block editor -----------------------------------------------------------------------------
 
     def blockly_tokens(self) -> dict[str, object]:
-        """Return all roles and block colours of the current mode, for the page of the block editor."""
+        """Return the colours and other values of the current mode for the page of the block editor."""
         return theme_tokens.tokens_for_page(
             self._tokens,
             self.hex,
@@ -321,7 +367,10 @@ def _palette(colour: Callable[[str], QColor]) -> QPalette:
 
 
 def qt_colour(text: str) -> QColor:
-    """Convert a token to a QColor. In ``#RRGGBBAA`` alpha is last, which Qt doesn't support."""
+    """Convert a colour such as ``#RRGGBB`` or ``#RRGGBBAA`` to a QColor.
+
+    Qt itself expects alpha at the start.
+    """
     if len(text) == len("#RRGGBBAA"):
         colour = QColor(text[:7])
         colour.setAlpha(int(text[7:], 16))

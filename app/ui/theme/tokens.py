@@ -1,7 +1,7 @@
-"""Design tokens, parsed once into typed, immutable values.
+"""Design tokens, loaded once into typed, immutable values.
 
-Colours keep the format of the file (``#RRGGBB`` or ``#RRGGBBAA``); `app.ui.theme.theme` converts them to Qt
-values. Also provides the subset for the page of the block editor.
+Colours have the format of the file, ``#RRGGBB`` or ``#RRGGBBAA``; `app.ui.theme.theme` converts them to
+Qt values.
 """
 
 from __future__ import annotations
@@ -22,7 +22,13 @@ _DRAWN_ICONS = MappingProxyType({"a filled dot 10 px": "dot"})
 
 @dataclass(frozen=True)
 class Status:
-    """Style of a status: colour role, tint role (None for no tint) and icon."""
+    """Style of a status.
+
+    Attributes:
+        colour: Colour role of text and icon.
+        tint: Colour role of the background, or None for none.
+        icon: Name of the icon.
+    """
 
     colour: str
     tint: str | None
@@ -31,7 +37,13 @@ class Status:
 
 @dataclass(frozen=True)
 class TextKind:
-    """Kind of text: size and line height in px, and weight (400 to 700)."""
+    """Style of a kind of text.
+
+    Attributes:
+        size_px: Font size.
+        line_px: Line height.
+        weight: Font weight, 400 to 700.
+    """
 
     size_px: int
     line_px: int
@@ -40,7 +52,24 @@ class TextKind:
 
 @dataclass(frozen=True)
 class Tokens:
-    """All tokens of ``resources/theme/tokens.json``; ``raw`` is the parsed file."""
+    """Design tokens of ``resources/theme/tokens.json``.
+
+    Attributes:
+        raw: Parsed file.
+        colours: Colours by theme ("light", "dark") and role.
+        series: Colours of curves by theme.
+        status: Styles of statuses by name.
+        blocks: Colours of blocks by category, theme and part.
+        block_icons: Icon names by block category.
+        block_text: Colours of text on blocks by category.
+        sizes: Lengths in px as nested mappings; a pair is a width and height.
+        radii: Corner radii in px by name.
+        texts: Kinds of text by name.
+        motion_ms: Durations by name.
+        icons: Icon names by use.
+        families: Font families by "text" and "mono".
+        fallback: Fallback font families.
+    """
 
     raw: Mapping[str, object]
     colours: Mapping[str, Mapping[str, str]]
@@ -59,13 +88,25 @@ class Tokens:
 
 
 def load(path: Path | None = None) -> Tokens:
-    """Load the design tokens. Raises KeyError or ValueError if the file is invalid."""
+    """Load the design tokens.
+
+    Args:
+        path: File to load, by default the one shipped with Studio.
+
+    Raises:
+        KeyError: A token is missing.
+        ValueError: The file isn't valid JSON.
+    """
     source = path if path is not None else resources.path("theme", "tokens.json")
     return parse(json.loads(source.read_text("utf-8")))
 
 
 def parse(raw: Mapping[str, object]) -> Tokens:
-    """Convert a parsed ``tokens.json`` to typed tokens."""
+    """Convert the parsed contents of ``tokens.json`` to typed tokens.
+
+    Raises:
+        KeyError: A token is missing.
+    """
     colours = cast("Mapping[str, Mapping[str, str | list[str]]]", raw["colour"])
     blocks = cast("Mapping[str, Mapping[str, object]]", raw["block"])
     font = cast("Mapping[str, object]", raw["font"])
@@ -117,7 +158,15 @@ def _texts(raw: Mapping[str, Mapping[str, int]]) -> Mapping[str, TextKind]:
 def tokens_for_page(
     tokens: Tokens, colour: Callable[[str], str], *, dark: bool, reduced_motion: bool, text_percent: int
 ) -> dict[str, object]:
-    """Return all roles and block colours of the current mode; ``colour`` returns the colour of a role."""
+    """Return the values for the page of the block editor, as a JSON-serializable dict.
+
+    Args:
+        tokens: Design tokens.
+        colour: Returns the colour of a role in the current mode.
+        dark: True for the dark theme.
+        reduced_motion: True to reduce motion.
+        text_percent: Text size in percent.
+    """
     scheme = "dark" if dark else "light"
     return {
         "dark": dark,

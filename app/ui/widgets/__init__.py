@@ -1,7 +1,7 @@
-"""Small painted widgets for panels and the shell. Each takes the theme as its first argument.
+"""Painted widgets that panels and the shell share. Each takes the theme as its first argument.
 
-The widgets are independent of the session and of panels. Buttons, chips and labels are exported here, others
-by their modules.
+The widgets are independent of the session and of panels. Buttons, chips and labels are exported by this
+package, other widgets by their modules.
 """
 
 from __future__ import annotations

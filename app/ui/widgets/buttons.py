@@ -1,6 +1,6 @@
-"""Buttons that paint their icon, gap and text themselves, because Fusion's gap is narrow and fixed.
+"""Buttons that paint icon and text themselves, because the gap between both is fixed in the Fusion style.
 
-Run, Pause, Step and Stop keep their position and width in every state.
+Run, Pause, Step and Stop keep their positions and widths in every state.
 """
 
 from __future__ import annotations
@@ -56,20 +56,19 @@ _MEASURES: dict[str, _Measure] = {
 
 
 def name_command(widget: QWidget, command: str) -> None:
-    """Set the command of a button. The tooltip is then the command's, with the current shortcut."""
+    """Associate a button with a command, whose tooltip and current shortcut the button then shows."""
     widget.setProperty("command", command)
 
 
 class PaintedButton(QAbstractButton):
     """Base class of painted buttons. Subclasses implement `paint_button`.
 
-    Buttons accept the keyboard focus (the focus ring follows their corners), are repainted on hover and
-    press, and scale with the theme's text size. Their accessible name is their text unless another one is
-    set.
+    Buttons accept the keyboard focus, are repainted on hover and press, and scale with the text size of
+    the theme. The accessible name is the text, unless another one is set.
     """
 
     elides_text = False
-    """True if the text is elided when the button is narrow; the tooltip then has the full text."""
+    """True if a long text is elided; the full text is then shown as tooltip."""
 
     def __init__(
         self,
@@ -98,24 +97,29 @@ class PaintedButton(QAbstractButton):
         return self._aimed
 
     def set_drop_target(self, aimed: bool) -> None:
-        """Draw a ring around the button, or remove it, to show that it is the drop target."""
+        """Set whether the button is the drop target of a drag; a drop target has a ring."""
         if aimed != self._aimed:
             self._aimed = aimed
             self.update()
 
     def set_text(self, text: str, name: str = "") -> None:
-        """Set the text, and ``name`` or else the text as the accessible name."""
+        """Set the text and the accessible name.
+
+        Args:
+            text: Text.
+            name: Accessible name, or "" to use the text.
+        """
         self.setText(text)
         self.setAccessibleName(name or text)
 
     @property
     def is_hovered(self) -> bool:
-        """True if the mouse is over the button and the button is enabled."""
+        """True while the mouse pointer is over the button, if the button is enabled."""
         return self.underMouse() and self.isEnabled()
 
     @property
     def is_highlighted(self) -> bool:
-        """True if the mouse is over the button or the button is held down."""
+        """True while the button is hovered or held down."""
         return self.is_hovered or self.isDown()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -124,9 +128,10 @@ class PaintedButton(QAbstractButton):
             paint.set_elision_tooltip(self, self.text())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Click on Enter as well as on Space, without auto-repeat.
+        """Click on Enter as well as on Space, ignoring auto-repeat.
 
-        Qt's `autoDefault` does so only for a QPushButton, and repeats the click while Enter is held.
+        Qt does so only for a QPushButton with `autoDefault`, which also repeats the click while Enter
+        is held.
         """
         if event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter} or not is_plain(event):
             super().keyPressEvent(event)
@@ -145,11 +150,16 @@ class PaintedButton(QAbstractButton):
         painter.end()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
-        """Paint the button in its current state; ``rect`` is the whole widget."""
+        """Paint the button in its current state. Subclasses implement this.
+
+        Args:
+            painter: Painter.
+            rect: Rectangle of the whole widget.
+        """
 
 
 class Button(PaintedButton):
-    """Button with a text and optionally an icon. Filled kinds are for primary actions."""
+    """Button with a text and an optional icon."""
 
     elides_text = True
 
@@ -174,9 +184,12 @@ class Button(PaintedButton):
         self.setCursor(Qt.CursorShape.ArrowCursor)
 
     def set_label(self, text: str, icon: str | None = None, *, name: str = "") -> None:
-        """Set the text and, if given, the icon.
+        """Set the text and the icon.
 
-        ``name`` is the accessible name if it differs from the text.
+        Args:
+            text: Text.
+            icon: Name of the icon; None keeps the current one.
+            name: Accessible name, or "" to use the text.
         """
         same = text == self.text() and (name or text) == self.accessibleName()
         if same and icon in {None, self.icon_name}:
@@ -187,7 +200,7 @@ class Button(PaintedButton):
         self.update()
 
     def set_size(self, size: Size) -> None:
-        """Set height, font and padding to those of a size."""
+        """Set the size, which determines height, font and padding."""
         if self.measure != _MEASURES[size]:
             self.measure = _MEASURES[size]
             self.setProperty("focusRadius", self._theme.radius(self.measure.radius))
@@ -195,13 +208,13 @@ class Button(PaintedButton):
             self.update()
 
     def set_kind(self, kind: Kind) -> None:
-        """Set the kind of the button, such as filled or outlined."""
+        """Set the kind, which determines the colours, such as "primary" or "ghost"."""
         if kind != self.kind:
             self.kind = kind
             self.update()
 
     def width_with(self, text: str) -> int:
-        """Return the width that the button needs for a text."""
+        """Return the width in px that the button needs for a text."""
         width = paint.width_of(self._theme.font(self.measure.font), text) + 2 * self.measure.padding
         if self.icon_name is not None:
             width += self.icon_side() + (self.measure.gap if text else 0)
@@ -216,9 +229,10 @@ class Button(PaintedButton):
         return wanted if self._least is None else QSize(min(self._least, wanted.width()), wanted.height())
 
     def allow_shrinking(self, least: int = 72) -> None:
-        """Elide the text if the button is narrow, down to a minimum width.
+        """Allow layouts to make the button narrower than its text, which is then elided.
 
-        The tooltip then has the full text.
+        Args:
+            least: Minimum width in px.
         """
         self._least = least
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
@@ -228,7 +242,7 @@ class Button(PaintedButton):
         return round(self._theme.scaled(self.measure.icon))
 
     def displayed_text(self) -> str:
-        """Return the text that is painted."""
+        """Return the text to paint, which differs from `text` if only the icon is shown."""
         return self.text()
 
     def paint_button(self, painter: QPainter, rect: QRectF) -> None:
@@ -237,7 +251,12 @@ class Button(PaintedButton):
         self.paint_content(painter, ink)
 
     def paint_content(self, painter: QPainter, ink: QColor) -> None:
-        """Paint icon and text, centred together."""
+        """Paint icon and text, centred together.
+
+        Args:
+            painter: Painter.
+            ink: Colour of the text and, by default, of the icon.
+        """
         font = self._theme.font(self.measure.font)
         if self.measure.font == "body":
             font.setWeight(font.Weight.Medium)
@@ -272,7 +291,7 @@ class Button(PaintedButton):
 
 
 class MenuButton(Button):
-    """Button that opens a menu, with a chevron."""
+    """Button with a chevron that opens a menu."""
 
     def sizeHint(self) -> QSize:
         return super().sizeHint() + QSize(round(self._theme.scaled(CHEVRON)) + CHEVRON_GAP, 0)
@@ -290,7 +309,7 @@ class MenuButton(Button):
 
 
 class ToggleButton(Button):
-    """Button that stays checked, in the colours of a selection."""
+    """Checkable button, painted in the colours of a selection while it is checked."""
 
     def __init__(self, theme: Theme, text: str, icon: str) -> None:
         super().__init__(theme, text, icon, size="small")
@@ -304,7 +323,7 @@ class ToggleButton(Button):
 
 
 class IconButton(PaintedButton):
-    """Button with an icon only. Tooltip and accessible name contain its name and shortcut."""
+    """Button with only an icon. The name is shown as tooltip, with the shortcut."""
 
     def __init__(
         self,
@@ -323,7 +342,7 @@ class IconButton(PaintedButton):
         self.set_name(name, shortcut)
 
     def set_name(self, name: str, shortcut: str = "") -> None:
-        """Set the name and the shortcut."""
+        """Set the name and the shortcut for the tooltip; the name is also the accessible name."""
         self.setAccessibleName(name)
         self.setToolTip(plain.tip(tip_with_key(name, shortcut)))
 
@@ -332,7 +351,7 @@ class IconButton(PaintedButton):
         return self._theme.scaled(self._theme.size("icon", name))
 
     def set_icon(self, icon: str) -> None:
-        """Set the icon."""
+        """Set the icon by name."""
         self._icon = icon
         self.update()
 
@@ -361,7 +380,7 @@ class IconButton(PaintedButton):
 
 
 class LinkButton(PaintedButton):
-    """Link in the accent colour, optionally with an arrow."""
+    """Button that looks like a link, with an optional icon after the text."""
 
     elides_text = True
 
@@ -371,7 +390,7 @@ class LinkButton(PaintedButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
 
     def set_label(self, text: str, icon: str | None) -> None:
-        """Set the text and, if given, the arrow icon."""
+        """Set the text and the icon after it; None removes the icon."""
         self._icon = icon
         self.set_text(text)
         self.updateGeometry()
@@ -396,7 +415,7 @@ class LinkButton(PaintedButton):
 
 
 class RunButton(Button):
-    """Button of the run bar, 112 x 44 px, wider only for large text."""
+    """Button of the run bar, 112 x 44 px or larger for large text."""
 
     def __init__(
         self, theme: Theme, text: str, icon: str, *, widest: str = "", parent: QWidget | None = None
@@ -408,12 +427,12 @@ class RunButton(Button):
         self.fill_icon = False
 
     def set_filled(self, filled: bool) -> None:
-        """Make the button filled green (Run, Resume) or outlined."""
+        """Fill the button green if `filled`, else paint only its outline."""
         self.fill_icon = filled
         self.set_kind("run" if filled else "plain")
 
     def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon if `bare`, where large text leaves no space. The accessible name stays."""
+        """Show only the icon if `bare`, else the icon and the text. The accessible name doesn't change."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
@@ -436,15 +455,16 @@ class RunButton(Button):
         return QSize(self.full_width(), height)
 
     def full_width(self) -> int:
-        """Return the width in px for the longest text."""
+        """Return the width in px with the longest text that the button can show."""
         words = paint.width_of(self._theme.font("button"), self._widest)
         return max(RUN_WIDTH, round(self.icon_side() + self.measure.gap + words) + 28)
 
 
 class StopButton(PaintedButton):
-    """Stop button, which is always enabled. A ring shows that replies are pending.
+    """Stop button, which is always enabled.
 
-    The button has a margin of 4 px for the ring.
+    A ring around the button shows that replies of robots are pending; the button has a margin of 4 px
+    for it.
     """
 
     def __init__(self, theme: Theme, place: BarName = "runBar", parent: QWidget | None = None) -> None:
@@ -459,7 +479,13 @@ class StopButton(PaintedButton):
         self.setProperty("focusInset", RING)
 
     def show_state(self, word: str, *, ring: bool = False, filled: bool = True) -> None:
-        """Show "Stop", "Stopping" (with the ring) or "Stop again"; outlined only if nothing can move."""
+        """Set the state of the button.
+
+        Args:
+            word: "Stop", "Stopping" or "Stop again", translated.
+            ring: True while replies of robots are pending.
+            filled: False to paint only the outline, because nothing can move.
+        """
         if (word, ring, filled) == (self.text(), self._ring, self.filled):
             return
         self.set_text(word)

@@ -1,7 +1,4 @@
-"""Surfaces: cards, the tile of an action or block, and boxes for alerts in the colours of their severity.
-
-The banner and the rows of alerts and findings are such boxes.
-"""
+"""Surfaces: cards, tiles, and boxes in the colours of a status."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ BORDERS = {"error": "errorBorder", "warn": "warnBorder", "ok": "okBorder", "info
 
 
 class Card(QFrame):
-    """Surface with a border and large corners."""
+    """Frame with a border and large round corners."""
 
     def __init__(self, theme: Theme, *, radius: str = "card", fill: str = "panel") -> None:
         super().__init__()
@@ -37,7 +34,7 @@ class Card(QFrame):
 
 
 class Tile(QWidget):
-    """White icon on the colour of a block category."""
+    """Icon on a square in the colour of a block category."""
 
     def __init__(self, theme: Theme, icon: str, category: str = "robot", side: int = TILE) -> None:
         super().__init__()
@@ -55,9 +52,9 @@ class Tile(QWidget):
 
 
 class AlertBox(QWidget):
-    """Box in the colours of a status, with its icon and a text.
+    """Base class of boxes for alerts, in the colours and with the icon of a status.
 
-    Buttons are beside the text or, if narrow, below.
+    Buttons are to the right of the text or, if there is too little space, below it.
     """
 
     icon_side, icon_left, left, high, gap = 18, 12, 40, 10, 10
@@ -102,7 +99,7 @@ class AlertBox(QWidget):
             self._whole.setAlignment(self.button_row, Qt.AlignmentFlag(0) if beside else right)
 
     def icon_top(self) -> float:
-        """Return the distance in px of the icon from the upper edge."""
+        """Return the distance in px between the upper edges of the box and the icon."""
         return 11.0 if self._framed else 4.0
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -118,7 +115,7 @@ class AlertBox(QWidget):
 
 
 class AlertRow(AlertBox):
-    """Row of an alert: title in bold, detail, command, time, and button for the next step."""
+    """Row of an alert: title in bold, detail, shell command, note and button."""
 
     def __init__(self, theme: Theme, *, framed: bool = True) -> None:
         super().__init__(theme, framed=framed)
@@ -138,9 +135,17 @@ class AlertRow(AlertBox):
     def set_texts(
         self, status: str, title: str, detail: str, *, command: str = "", note: str = "", button: str = ""
     ) -> None:
-        """Show the given texts; empty ones are hidden.
+        """Set the contents of the row; empty texts are hidden.
 
-        The button is kept, so that a click in progress is not lost.
+        The button widget is reused, so that a click in progress isn't lost.
+
+        Args:
+            status: Status that determines the colours and the icon.
+            title: Problem, described in one sentence.
+            detail: Explanation.
+            command: Shell command that the user can copy.
+            note: Text in a small font, such as a time.
+            button: Text of the button for the next step.
         """
         self.set_status(status)
         for line, text in zip(self._lines, (title, detail, command, note), strict=True):

@@ -1,4 +1,4 @@
-"""Empty state of a panel, which explains what would be shown, how to get it, and offers next steps."""
+"""Empty state of a panel, which explains its future contents and offers next steps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,14 @@ ABOVE_ROW = 14
 
 @dataclass(frozen=True)
 class EmptyAction:
-    """Button of an empty state: text, function, icon, and True if it is filled."""
+    """Button of an empty state.
+
+    Attributes:
+        text: Text of the button.
+        run: Callback.
+        icon: Name of the icon, or None.
+        is_primary: True if the button is filled.
+    """
 
     text: str
     run: Callable[[], object]
@@ -50,7 +57,7 @@ class _Tile(QWidget):
 
 
 class EmptyState(QWidget):
-    """Icon in a tile, title, one or two lines of text, and one or two buttons; centred."""
+    """Placeholder with an icon, a title, one or two lines of text, and up to two buttons."""
 
     def __init__(
         self, theme: Theme, icon: str, title: str, text: str, actions: Sequence[EmptyAction] = ()
@@ -91,7 +98,7 @@ class EmptyState(QWidget):
         self.set_actions(actions)
 
     def set_texts(self, title: str, text: str, icon: str | None = None) -> None:
-        """Replace the title, the text and the icon."""
+        """Set the title, the text and, unless it is None, the icon."""
         self._title.setText(title)
         self._text.setText(text)
         if icon is not None:

@@ -13,11 +13,16 @@ from app.ui.widgets.labels import label
 
 MIME = "application/x-nep-field"
 MODIFIERS = {Qt.Key.Key_Shift, Qt.Key.Key_Control, Qt.Key.Key_Alt, Qt.Key.Key_Meta, Qt.Key.Key_AltGr}
-"""Modifier keys, which choose the drop action and are no shortcuts of commands."""
+"""Modifier keys, which are ignored during a drag because Qt uses them for the drop action."""
 
 
 def field_mime_data(topic: str, path: str) -> QMimeData:
-    """Return the drag data of a field, also as text; ``topic`` is a topic's key with its network."""
+    """Return the drag data of a message field, which can also be dropped as text.
+
+    Args:
+        topic: Key of the topic, including its network.
+        path: Field path.
+    """
     data = QMimeData()
     data.setData(MIME, json.dumps([topic, path]).encode())
     data.setText(f"{topic}{'' if path.startswith('[') else '.'}{path}")
@@ -25,7 +30,7 @@ def field_mime_data(topic: str, path: str) -> QMimeData:
 
 
 def dropped_field(data: QMimeData) -> tuple[str, str] | None:
-    """Return topic and path of a dropped field; None for other data."""
+    """Return the key of the topic and the field path in dropped data, or None for other data."""
     if not data.hasFormat(MIME):
         return None
     try:
@@ -38,9 +43,9 @@ def dropped_field(data: QMimeData) -> tuple[str, str] | None:
 
 
 class DragKeys(QObject):
-    """Keyboard shortcuts during a drag: any key but Esc cancels the drag and runs its shortcut.
+    """Event filter that makes keyboard shortcuts work during a drag, when Qt grabs all keys.
 
-    Qt grabs all keys during a drag. This way the key of Stop works nevertheless.
+    A key other than Esc or a modifier cancels the drag and runs its shortcut. This is needed for Stop.
     """
 
     def __init__(self, press: Callable[[str], object]) -> None:
@@ -49,16 +54,17 @@ class DragKeys(QObject):
         self._press = press
 
     def begin(self) -> None:
-        """Start to filter keys.
+        """Install the filter.
 
-        Call this after the drag has started, so that this filter precedes Qt's own.
+        Call this after the start of the drag: the last installed filter is called first, so it precedes
+        Qt's own.
         """
         application = QApplication.instance()
         if application is not None:
             application.installEventFilter(self)
 
     def end(self) -> None:
-        """Stop filtering keys."""
+        """Remove the filter."""
         application = QApplication.instance()
         if application is not None:
             application.removeEventFilter(self)
@@ -75,7 +81,14 @@ class DragKeys(QObject):
 
 
 def drag_field(source: QWidget, topic: str, path: str, *, press: Callable[[str], object]) -> None:
-    """Drag a field; returns after the drop. ``press`` is as in `DragKeys`."""
+    """Drag a message field; returns after the drop.
+
+    Args:
+        source: Widget in which the drag starts.
+        topic: Key of the topic.
+        path: Field path.
+        press: Runs a shortcut that is pressed during the drag, such as "F12".
+    """
     keys = DragKeys(press)
     QTimer.singleShot(0, keys.begin)  # runs in the event loop of the drag, after Qt has installed its filter
     drag = QDrag(source)

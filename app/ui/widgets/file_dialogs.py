@@ -1,4 +1,4 @@
-"""File dialogs: the system's own where available. They are non-modal, so that Stop stays accessible."""
+"""File dialogs, which are non-modal so that Stop stays accessible. Native ones are used where available."""
 
 from __future__ import annotations
 
@@ -16,14 +16,27 @@ from nep.i18n import _, lazy
 
 @dataclass(frozen=True)
 class FileKind:
-    """Type of file: label, wrapped in `lazy`, and suffix."""
+    """Type of file that can be saved.
+
+    Attributes:
+        label: Description of the type, wrapped in `lazy`.
+        suffix: File extension with its dot.
+    """
 
     label: str
     suffix: str
 
 
 def resolve_kind(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tuple[Path, FileKind]:
-    """Return path and type for a chosen name. A typed suffix takes precedence over the chosen type."""
+    """Return the path with a file extension, and the type of the file to save.
+
+    An extension that was typed takes precedence over the selected type.
+
+    Args:
+        chosen: Path that was entered.
+        kind: Selected type.
+        kinds: Types that were offered.
+    """
     ending = chosen.suffix.lower()
     if ending != kind.suffix:
         typed = next((each for each in kinds if each.suffix == ending), None)
@@ -32,13 +45,16 @@ def resolve_kind(chosen: Path, kind: FileKind, kinds: Sequence[FileKind]) -> tup
 
 
 class FileDialogs(Protocol):
-    """Dialogs that ask for a file. ``take`` is called with the path, and never on cancel."""
+    """Interface of dialogs that ask for a file.
+
+    The callback ``take`` of each method is called with the path; it isn't called on cancel.
+    """
 
     def open(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for a file to open."""
+        """Ask for a behaviour to open."""
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Ask where to save a behaviour."""
+        """Ask for the folder and name to save a behaviour."""
 
     def save_as(
         self,
@@ -47,10 +63,17 @@ class FileDialogs(Protocol):
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], None],
     ) -> None:
-        """Ask for place and type to save another kind of file. The path gets the suffix of the type."""
+        """Ask for folder, name and type to save a file other than a behaviour.
+
+        Args:
+            title: Title of the dialog.
+            suggestion: Suggested path, without extension.
+            kinds: Types that are offered.
+            take: Called with the path, which has the extension of the type, and the type.
+        """
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Ask for an image file; an empty `folder` stands for the picture folder."""
+        """Ask for an image file, starting in a folder or, for "", in the user's picture folder."""
 
     def open_recording(self, folder: str, take: Callable[[Path], None]) -> None:
         """Ask for a recording to open."""
@@ -66,7 +89,7 @@ PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def pictures_folder() -> str:
-    """Return the system's picture folder, or else the home folder."""
+    """Return the user's picture folder, or the home folder if there is none."""
     place = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.PicturesLocation)
     return place if place and Path(place).is_dir() else str(Path.home())
 
@@ -75,14 +98,14 @@ BEHAVIOURS = (lazy("Behaviours"), f"*{SUFFIX}")
 RECORDINGS = (lazy("Recordings"), "*.mcap")
 LAYOUTS = (lazy("Layouts"), "*.nep-layout")
 PICTURES = (lazy("Images"), " ".join(f"*{ending}" for ending in PICTURE_SUFFIXES))
-"""Name filter for images in dialogs: label and patterns."""
+"""Name filter for images in file dialogs, as label and patterns."""
 
 
 class SystemDialogs:
-    """Native file dialogs of Windows, macOS, or a Linux desktop through its portal.
+    """Native file dialogs of Windows, macOS, or a Linux desktop with the portal.
 
-    The window can be used while a dialog is open, for example for Stop. Keys pressed in the dialog don't
-    reach Studio.
+    The window stays usable while a dialog is open, for example for Stop. Keys pressed in the dialog
+    don't reach Studio.
     """
 
     def __init__(self, window: QWidget) -> None:

@@ -1,4 +1,4 @@
-"""Layout of a row that wraps into several rows if it is narrow."""
+"""Layout of a row that wraps into several rows if there is too little space."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from PySide6.QtWidgets import QLabel, QLayout, QLayoutItem, QWidget
 
 
 class Flow(QLayout):
-    """Layout with one row if everything fits, else as many as necessary, with items vertically centred.
+    """Layout that arranges items in one row if they fit, else in several, vertically centred in each row.
 
-    In one row the spare space is at the position of `push`, and elastic items may be narrower than their size
-    hint. A wrapping label takes the rest of its row.
+    In a single row, spare space is inserted at the position of `push`, and elastic items can be
+    narrower than their size hints. A label with word wrap takes the rest of its row.
     """
 
     def __init__(self, parent: QWidget | None = None, *, gap: int = 10, row_gap: int = 6) -> None:
@@ -24,11 +24,16 @@ class Flow(QLayout):
         self.setContentsMargins(0, 0, 0, 0)
 
     def push(self) -> None:
-        """Align the following items to the right end if everything is in one row."""
+        """Align all items that are added later to the right, if everything is in one row."""
         self._push = len(self._items)
 
     def add_elastic(self, widget: QWidget, *, greedy: bool = False) -> None:
-        """Add a widget that may be narrower than its size hint. A ``greedy`` one takes the spare space."""
+        """Add a widget that can be narrower than its size hint.
+
+        Args:
+            widget: Widget to add.
+            greedy: True to expand the widget into the spare space.
+        """
         self._elastic[widget] = greedy
         self.addWidget(widget)
 

@@ -1,4 +1,4 @@
-"""Status indicators that are not buttons: chips, items of the status bar, sparklines and bars."""
+"""Status indicators: chips, items of the status bar, sparklines and bars."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def status_name(status: str) -> str:
 
 
 class Chip(QWidget):
-    """Chip with an icon and text on the tint of a status; hidden if the text is empty."""
+    """Chip with icon and text in the colours of a status; hidden if the text is empty."""
 
     def __init__(
         self,
@@ -88,7 +88,13 @@ class Chip(QWidget):
         return self._status
 
     def set(self, text: str, status: str = "ok", icon: str | None = None) -> None:
-        """Set text, status and icon; an empty text hides the chip."""
+        """Set the contents of the chip.
+
+        Args:
+            text: Text; "" hides the chip.
+            status: Status that determines the colours.
+            icon: Name of the icon; None for that of the status, "" for no icon.
+        """
         if (text, status, icon) == (self._text, self._status, self._icon):
             if not text:
                 self.hide()
@@ -103,14 +109,14 @@ class Chip(QWidget):
         self.update()
 
     def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon if `bare`, where space is scarce; the tooltip then has the text."""
+        """Show only the icon if `bare`, with the text as tooltip, else the icon and the text."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def full_width(self) -> int:
-        """Return the width in px with the text."""
+        """Return the width in px with icon and text."""
         width = paint.width_of(self._font(), self._text) + 2 * CHIP_PADDING + (2 if self._large else 0)
         return round(width + (self._side() + CHIP_GAP if self._icon_name() else 0)) + 1
 
@@ -173,7 +179,7 @@ class Chip(QWidget):
 
 
 class StatusIcon(QWidget):
-    """Icon of a status beside a text with the same meaning. Its accessible name is the status."""
+    """Icon of a status, next to a text with the same meaning."""
 
     def __init__(self, theme: Theme, status: str = "off", *, height: int = 0, ink: str = "") -> None:
         # `height` is that of the adjacent line of text (0: the icon's own); `ink` overrides the colour.
@@ -183,7 +189,7 @@ class StatusIcon(QWidget):
         self.set(status)
 
     def set(self, status: str) -> None:
-        """Set the status."""
+        """Set the status, which determines icon, colour and accessible name."""
         if status != self._status:
             self._status = status
             self.setAccessibleName(status_name(status))
@@ -201,7 +207,7 @@ class StatusIcon(QWidget):
 
 
 class StatusItem(QWidget):
-    """Item of the status bar: optional icon and short text. If it has a ``command``, it can be clicked."""
+    """Item of the status bar with an optional icon and a short text, clickable if it has a command."""
 
     ICON = 14
     pressed = Signal(str)
@@ -223,7 +229,13 @@ class StatusItem(QWidget):
         return self._text
 
     def set(self, icon: str, text: str, status: str | None = None) -> None:
-        """Set icon, text and status (which determines the colour). An empty text hides the item."""
+        """Set the contents of the item.
+
+        Args:
+            icon: Name of the icon, or "" for none.
+            text: Text; "" hides the item.
+            status: Status that determines the colour, or None for normal text.
+        """
         if (icon, text, status) == (self._icon, self._text, self._status):
             return
         before = self.sizeHint()
@@ -235,7 +247,7 @@ class StatusItem(QWidget):
         self.update()
 
     def set_command(self, command: str) -> None:
-        """Set the command that a click emits, or "" for none."""
+        """Set the command to emit on activation; "" makes the item passive."""
         if command != self.command:
             self.command = command
             self.setFocusPolicy(Qt.FocusPolicy.TabFocus if command else Qt.FocusPolicy.NoFocus)
@@ -291,7 +303,7 @@ class StatusItem(QWidget):
 
 
 class Sparkline(QWidget):
-    """Small curve of 56 x 16 px."""
+    """Small chart of recent values, 56 x 16 px."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -312,11 +324,11 @@ class Sparkline(QWidget):
 
 
 def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], colour: QColor) -> None:
-    """Paint a line through the values without axes, with the oldest value at the left.
+    """Paint a line chart without axes, with the oldest value on the left.
 
-    The lower edge is 0 (or the minimum, if negative) and the upper edge the maximum, so an almost constant
-    rate is a level line, and one that stops falls to the bottom. Nothing is painted for fewer than two
-    values, or if one is NaN or infinite.
+    The vertical range is from 0, or the minimum if that is negative, to the maximum. A constant rate is
+    therefore a horizontal line, and a rate that stops falls to the bottom. Nothing is painted for fewer
+    than two values, or if one is NaN or infinite.
     """
     if len(values) < 2 or not isfinite(sum(values)):
         return
@@ -339,7 +351,7 @@ def paint_sparkline(painter: QPainter, rect: QRectF, values: Sequence[float], co
 
 
 class ValueBar(QWidget):
-    """Bar that shows a sensor's value between its limits. None shows an empty bar."""
+    """Bar that shows the position of a sensor's value within its range."""
 
     def __init__(self, theme: Theme, fraction: float | None = None) -> None:
         super().__init__()
@@ -352,11 +364,11 @@ class ValueBar(QWidget):
 
     @property
     def fraction(self) -> float | None:
-        """Displayed fraction (0 to 1), or None."""
+        """Displayed position, from 0 to 1, or None if it is unknown."""
         return self._fraction
 
     def set_fraction(self, fraction: float | None) -> None:
-        """Set the fraction, which is clamped to 0 to 1, or None if it is unknown."""
+        """Set the position, clamped to 0 to 1; None shows an empty bar."""
         value = None if fraction is None or fraction != fraction else min(max(fraction, 0.0), 1.0)  # noqa: PLR0124
         if value != self._fraction:
             self._fraction = value
@@ -369,7 +381,7 @@ class ValueBar(QWidget):
 
 
 def paint_bar(painter: QPainter, theme: Theme, rect: QRectF, fraction: float | None) -> None:
-    """Paint a bar with a filled fraction (0 to 1); None and 0 paint an empty bar."""
+    """Paint a bar that is filled up to a fraction (0 to 1); None paints an empty bar."""
     round_end = rect.height() / 2
     paint.box(painter, rect, round_end, theme.colour("sunken"))
     if fraction:

@@ -1,9 +1,10 @@
 """Keyboard helpers: keys without modifiers, and the tab order of widgets.
 
-Queries of the tab order must not have side effects. PySide makes the result of a getter without arguments a
-child of the queried object. For the next widget in the focus chain, or a focus proxy, that is wrong: when the
-queried widget is deleted, PySide deletes the other one too, while Qt still uses it. Therefore each result
-immediately gets its own parent back, and no other module in `app.ui` may make these queries (ADR 0018).
+Queries of the tab order need a workaround. PySide makes the result of a getter without arguments a
+child of the queried object. For the next widget in the focus chain and for a focus proxy that is wrong:
+when the queried widget is deleted, PySide deletes the other one too, although Qt still uses it.
+Therefore the parent of each result is restored immediately, and no other module in `app.ui` may make
+these queries (ADR 0018).
 """
 
 from __future__ import annotations
@@ -19,34 +20,39 @@ _NAVIGATION_PROPERTY = "keyboardLeads"
 
 
 def is_plain(event: QKeyEvent) -> bool:
-    """Return True if a key press has no modifiers.
+    """Return True if a key was pressed without modifiers.
 
-    On a Mac, for example, Cmd+Down moves to the end of a text, and Down into the list. The modifier of arrow
-    keys on a Mac and of keys on a number pad is ignored.
+    On macOS, for example, Cmd+Down moves to the end of a text, but Down moves from a field to its list.
+    The modifier that Qt sets for keys on a number pad, and for arrow keys on macOS, is ignored.
     """
     return not event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
 
 
 def is_activation_key(key: int) -> bool:
-    """Return True if a key activates the focused widget."""
+    """Return True if a key activates the focused button: Enter or Space."""
     return key in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space}
 
 
 def is_keyboard_navigation() -> bool:
-    """Return True if the keyboard moved the focus. Only then a focus ring is shown."""
+    """Return True if the last input was keyboard navigation; only then the focus ring is shown."""
     application = QApplication.instance()
     return bool(application is not None and application.property(_NAVIGATION_PROPERTY))
 
 
 def set_keyboard_navigation(leads: bool) -> None:
-    """Record whether the last input was a key that moves the focus, or a mouse button."""
+    """Set whether the last input was keyboard navigation, and not a mouse button."""
     application = QApplication.instance()
     if application is not None:
         application.setProperty(_NAVIGATION_PROPERTY, leads)
 
 
 def next_in_focus_chain(widget: QWidget, *, forward: bool = True) -> QWidget:
-    """Return the next (or previous) widget in the window's focus chain; the widget itself if it is alone."""
+    """Return the next widget in the focus chain of a window, or the widget itself if it is the only one.
+
+    Args:
+        widget: Widget in the chain.
+        forward: False to return the previous widget.
+    """
     found = widget.nextInFocusChain() if forward else widget.previousInFocusChain()
     return widget if found is None else _restore_parent(found)
 
@@ -58,10 +64,15 @@ def focus_proxy(widget: QWidget) -> QWidget | None:
 
 
 def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Iterator[QWidget]:
-    """Yield the tab stops inside a widget in order, after (or before) ``begin``, each once.
+    """Yield the tab stops inside a widget in tab order.
 
-    Ends early at a widget that PySide confuses with a deleted one at the same address: only Qt knows the next
-    one.
+    The iteration ends early at a widget that PySide confuses with a deleted one at the same address,
+    because the next widget is then known only to Qt.
+
+    Args:
+        widget: Widget that contains the tab stops.
+        begin: Widget after which the iteration starts.
+        forward: False to iterate in reverse order.
     """
     step = next_in_focus_chain(begin, forward=forward)
     while step is not begin and isValid(step):
@@ -72,9 +83,9 @@ def tab_stops(widget: QWidget, begin: QWidget, *, forward: bool = True) -> Itera
 
 
 def tab_stops_of(widget: QWidget) -> list[QWidget]:
-    """Return the tab stops of a widget and its children, in the order of their creation.
+    """Return a widget and its children as far as they are tab stops, in the order of their creation.
 
-    The popup of a combo box is a child, but a separate window that Tab does not reach.
+    The popup of a combo box is left out, because it is a separate window that can't be reached by Tab.
     """
     return [
         each

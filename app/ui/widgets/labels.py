@@ -1,4 +1,4 @@
-"""Labels of a kind and colour, elided if narrow; separators."""
+"""Labels with the font of a kind and the colour of a role, and separators."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from app.ui.widgets import paint
 
 
 def label(text: str = "", kind: str = "body", *, role: str = "text", wrap: bool = False) -> QLabel:
-    """Return a label of a kind ("body", "small", "title", ...) in the colour of a role."""
+    """Create a label for plain text.
+
+    Args:
+        text: Text.
+        kind: Kind of text, such as "body", "small" or "title", which determines the font.
+        role: Colour role.
+        wrap: True for word wrap.
+    """
     result = QLabel(text)
     result.setTextFormat(Qt.TextFormat.PlainText)
     result.setProperty("kind", kind)
@@ -30,7 +37,7 @@ def set_role(shown: QLabel, role: str) -> None:
 
 
 class ElidedLabel(QLabel):
-    """Label that is elided in the middle if narrow; the tooltip then has the full text."""
+    """Label whose text is elided in the middle if it doesn't fit; the tooltip has the full text."""
 
     mode = Qt.TextElideMode.ElideMiddle
 
@@ -58,9 +65,9 @@ class ElidedLabel(QLabel):
 
 
 class FixedWidthLabel(ElidedLabel):
-    """Label for a text that changes often, with a size that does not depend on it.
+    """Label for a text that changes often, whose size doesn't depend on the text.
 
-    A normal label updates its size with every text, which causes a relayout of the whole window.
+    With a normal label, each change of the text causes a relayout of the whole window.
     """
 
     def __init__(self, kind: str, role: str) -> None:
@@ -79,7 +86,7 @@ class FixedWidthLabel(ElidedLabel):
 
 
 class SteadyLabel(ElidedLabel):
-    """Label for a text that changes about every second. It is as wide as its longest text so far."""
+    """Label for a text that changes about once a second, as wide as the widest text so far."""
 
     def __init__(self, kind: str, role: str, least: int = 0) -> None:
         self._words = ""
@@ -101,7 +108,14 @@ class SteadyLabel(ElidedLabel):
 
 
 class BoldInLine(QWidget):
-    """Label that shows a ``sentence`` with the ``subject`` in bold."""
+    """Label for one line of text, in which one part is bold.
+
+    Args:
+        theme: Theme.
+        sentence: Text.
+        subject: Part of the text to show in bold.
+        kind: Kind of text, which determines the font.
+    """
 
     def __init__(self, theme: Theme, sentence: str, subject: str, kind: str = "bodyLarge") -> None:
         super().__init__()

@@ -1,6 +1,7 @@
-"""Mnemonics of menu entries, assigned automatically for the current language.
+"""Automatic mnemonics for menu entries in the current language.
 
-Translators need not define them: each entry gets a unique letter of its text, preferably the first of a word.
+Translators need not define mnemonics: each entry gets a unique letter of its text, preferably the first
+letter of a word.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from collections.abc import Iterator, Sequence
 
 
 def strip_mnemonic(text: str) -> str:
-    """Return the text of an entry without mnemonic mark and shortcut."""
+    """Return the text of a menu entry without its mnemonic marker and shortcut."""
     return re.sub("&(.)", r"\1", text.partition("\t")[0])
 
 
@@ -32,15 +33,15 @@ def mnemonic_positions(texts: Sequence[str]) -> list[int]:
 
 
 def key_of(letter: str) -> str:
-    """Return the key that types a letter without its accent; "" if there is none."""
+    """Return the upper-case key that types a letter, without its accent; "" if there is none."""
     base = unicodedata.normalize("NFD", letter)[:1].upper()
     return base if base.isascii() and base.isalpha() else ""
 
 
 def with_mnemonics(texts: Sequence[str]) -> list[str]:
-    """Return the texts with Qt's mnemonic mark.
+    """Return the texts with "&" before their mnemonic letters.
 
-    Letters with accents are not used, because Alt can't type them.
+    Accented letters aren't used, because Alt can't be combined with them.
     """
     bare = [re.sub(r"[^\x00-\x7f]", "\N{BULLET}", text) for text in texts]
     return [

@@ -1,7 +1,7 @@
-"""Menus with round corners, for the menu bar, panels, and text fields.
+"""Menus with round corners, for the menu bar, panels and text fields.
 
-Where the system composites windows (Wayland, macOS, Windows) the corners are transparent. X11 may have no
-compositor, which would show them black; there a mask clips the window.
+Where the system composites windows (Wayland, macOS, Windows) the corners are transparent. Under X11,
+where a compositor may be missing and the corners would be black, a mask clips the window.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MIN_WIDTH = 160  # px; narrower menus are unreadable and better placed over Stop
 
 
 def make_round(widget: QWidget) -> None:
-    """Prepare a popup for its first show: no system frame, transparent corners."""
+    """Set the window flags of a popup for round corners; call this before the popup is first shown."""
     widget.setWindowFlag(Qt.WindowType.FramelessWindowHint, True)
     widget.setWindowFlag(
         Qt.WindowType.NoDropShadowWindowHint, QGuiApplication.platformName() in MASKED_PLATFORMS
@@ -51,22 +51,23 @@ def make_round(widget: QWidget) -> None:
 
 
 def cut(widget: QWidget, radius: float) -> None:
-    """Clip a popup to its round corners, on systems without a compositor."""
+    """Clip a popup to its round corners, on platforms that may have no compositor."""
     if QGuiApplication.platformName() in MASKED_PLATFORMS:
         widget.setMask(round_region(widget.size(), radius))
 
 
 def round_region(size: QSize, radius: float) -> QRegion:
-    """Return the region of a rounded rectangle."""
+    """Return the region of a rectangle with round corners."""
     path = QPainterPath()
     path.addRoundedRect(QRectF(0, 0, size.width(), size.height()), radius, radius)
     return QRegion(path.toFillPolygon().toPolygon())
 
 
 def avoid_stop(menu: QRect, stop: QRect, screen: QRect) -> QRect:
-    """Return a position of a menu that doesn't cover Stop: left of it, below it, or narrower.
+    """Return the geometry of a menu, changed so that it doesn't cover Stop.
 
-    If there is no such space on the screen, the position is unchanged.
+    The menu is moved to the left of Stop or below it, or is made narrower. If none is possible on the
+    screen, the geometry isn't changed.
     """
     if not menu.intersects(stop):
         return menu
@@ -80,7 +81,7 @@ def avoid_stop(menu: QRect, stop: QRect, screen: QRect) -> QRect:
 
 
 def stop_button_at(place: QPoint) -> QAbstractButton | None:
-    """Return the Stop button at a screen position, unless a popup covers it."""
+    """Return the Stop button at a screen position; None if there is none or a popup covers it."""
     windows = [window for window in QApplication.topLevelWidgets() if window.isVisible()]
     inside = [window for window in windows if window.rect().contains(window.mapFromGlobal(place))]
     if any(window.windowType() == Qt.WindowType.Popup for window in inside):
@@ -93,7 +94,7 @@ def stop_button_at(place: QPoint) -> QAbstractButton | None:
 
 
 def press_stop(place: QPoint) -> bool:
-    """Click the Stop button at a position, if there is one, and close all popups. Return True if clicked."""
+    """Close all popups and click the Stop button at a screen position; return False if there is none."""
     stop = stop_button_at(place)
     if stop is None:
         return False
@@ -104,10 +105,10 @@ def press_stop(place: QPoint) -> bool:
 
 
 class Menu(QMenu):
-    """Menu in Studio's style: icons and check marks in one column, shortcuts at the right.
+    """Menu with icons and check marks in the same column, and shortcuts on the right.
 
-    Each entry has a mnemonic letter, which is underlined if the menu was opened by keyboard. On a Mac,
-    entries stay in the menu unless they have an explicit role.
+    Each entry has a mnemonic letter, which is underlined if the menu was opened by the keyboard. On
+    macOS, only entries with an explicit role are moved to the application menu.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None, title: str = "") -> None:
@@ -118,10 +119,10 @@ class Menu(QMenu):
         make_round(self)
 
     def actionEvent(self, event: QActionEvent) -> None:
-        """Prevent macOS from guessing an entry's role by its text.
+        """Clear the role of a new entry if Qt would derive it from the text.
 
-        A file, layout or robot may be called "About us", "Quit" or "Setup", and would be moved to the
-        application menu.
+        On macOS, a file, layout or robot named "About us", "Quit" or "Setup" would otherwise be moved
+        to the application menu.
         """
         action = event.action()
         if event.type() == QEvent.Type.ActionAdded and action.menuRole() == GUESSED_ROLE:
@@ -129,13 +130,13 @@ class Menu(QMenu):
         super().actionEvent(event)
 
     def mnemonics(self) -> dict[QAction, int]:
-        """Return the position of each entry's mnemonic letter, or -1 for none."""
+        """Return the position of the mnemonic letter in the text of each entry, or -1 for none."""
         entries = [action for action in self.actions() if action.isVisible() and not action.isSeparator()]
         places = mnemonic_positions([strip_mnemonic(action.text()) for action in entries])
         return dict(zip(entries, places, strict=True))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Activate an entry by its mnemonic letter, as Enter does."""
+        """Activate an entry when its mnemonic letter is pressed."""
         self._by_keys = True
         self.update()
         held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.AltModifier)
@@ -170,10 +171,10 @@ class Menu(QMenu):
                 self.setGeometry(avoid_stop(self.geometry(), place, screen))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Close the menu on a click outside it, and trigger Stop if the click is on a Stop button.
+        """Trigger Stop on a click on a Stop button; otherwise close the menu on a click outside.
 
-        `app.ui.shell.stop_keys` receives the events of windows that get the keyboard first, which a submenu
-        never does.
+        `app.ui.shell.stop_keys` doesn't receive this event for submenus, because they don't become the
+        active window.
         """
         left = event.button() == Qt.MouseButton.LeftButton
         if not (left and press_stop(event.globalPosition().toPoint())):
@@ -254,7 +255,7 @@ class Menu(QMenu):
 
 
 def open_below(menu: Menu, anchor: QWidget) -> None:
-    """Open a menu below a button; right-aligned if it would exceed the window."""
+    """Open a menu below a button, aligned so that the menu stays within the window's width."""
     place = anchor.rect().bottomLeft() + QPoint(0, 3)
     over = anchor.mapTo(anchor.window(), place).x() + menu.sizeHint().width() - anchor.window().width()
     if over > 0:
@@ -263,7 +264,7 @@ def open_below(menu: Menu, anchor: QWidget) -> None:
 
 
 class EditMenu(QObject):
-    """Gives a text field its context menu in Studio's style."""
+    """Event filter that gives a text field a context menu in Studio's style."""
 
     def __init__(self, theme: Theme, field: QLineEdit | QPlainTextEdit) -> None:
         super().__init__(field)

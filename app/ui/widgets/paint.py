@@ -1,4 +1,4 @@
-"""Shapes of painted widgets: crisp boxes, single-line text, key caps."""
+"""Painting of shapes and texts: boxes, lines, single-line text, key caps."""
 
 from __future__ import annotations
 
@@ -32,7 +32,16 @@ def box(
     border: QColor | None = None,
     width: float = 1.0,
 ) -> None:
-    """Paint a rounded box, with its border inside ``rect`` and on whole pixels."""
+    """Paint a box with round corners.
+
+    Args:
+        painter: Painter.
+        rect: Rectangle that includes the border.
+        radius: Corner radius in px.
+        fill: Colour of the inside, or None.
+        border: Colour of the border, or None.
+        width: Width of the border in px.
+    """
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setBrush(fill if fill is not None else Qt.BrushStyle.NoBrush)
     if border is None:
@@ -46,7 +55,10 @@ def box(
 
 
 def hairline(painter: QPainter, rect: QRectF, edge: Qt.Edge, colour: QColor) -> None:
-    """Paint a line inside one edge of ``rect`` with the same thickness everywhere: 1 px, even at 125 %."""
+    """Paint a line along the inside of an edge, 1 logical pixel wide but aligned to device pixels.
+
+    The width is the same at every position, even with a fractional device pixel ratio.
+    """
     ratio = painter.device().devicePixelRatioF()
     thin = max(1, int(ratio)) / ratio
     line = QRectF(rect)
@@ -72,7 +84,7 @@ def text_line(
     colour: QColor,
     align: Qt.AlignmentFlag = LEFT,
 ) -> None:
-    """Paint one line of text, elided at its end if it does not fit."""
+    """Paint one line of text, elided at its end if it doesn't fit."""
     painter.setFont(font)
     painter.setPen(colour)
     fitting = QFontMetricsF(font).elidedText(text, Qt.TextElideMode.ElideRight, rect.width() + 1)
@@ -80,7 +92,13 @@ def text_line(
 
 
 def two_lines(font: QFont, text: str, width: float) -> list[str]:
-    """Break a text into one or two lines. The second line may be too long."""
+    """Break a text into at most two lines, of which only the first is limited to the width.
+
+    Args:
+        font: Font.
+        text: Text.
+        width: Width of the first line in px.
+    """
     line, *rest = text.split(" ")
     while rest and width_of(font, f"{line} {rest[0]}") <= width:
         line = f"{line} {rest.pop(0)}"
@@ -98,12 +116,20 @@ def height_of(font: QFont) -> float:
 
 
 def key_width(theme: Theme, key: str) -> float:
-    """Return the width in px of a key cap."""
+    """Return the width in px of the key cap for a key."""
     return max(MIN_KEY_SIZE, width_of(theme.font("caption"), key) + 2 * KEY_PADDING)
 
 
 def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: str) -> QRectF:
-    """Paint a key cap whose right edge is at ``right``. Return its rectangle."""
+    """Paint a key cap and return its rectangle.
+
+    Args:
+        painter: Painter.
+        theme: Theme.
+        right: Right edge in px.
+        middle: Vertical centre in px.
+        key: Formatted name of the key.
+    """
     height = max(MIN_KEY_SIZE, theme.scaled(MIN_KEY_SIZE))
     width = key_width(theme, key)
     rect = QRectF(right - width, middle - height / 2, width, height)
@@ -113,7 +139,7 @@ def key_cap(painter: QPainter, theme: Theme, right: float, middle: float, key: s
 
 
 def set_elision_tooltip(widget: QWidget, words: str) -> None:
-    """Set a tooltip with the full text if it is elided. An explicit tooltip is kept."""
+    """Show the full text as tooltip if the widget elides it, unless the widget has its own tooltip."""
     own = widget.property("tip") or (widget.toolTip() and not widget.property("shortened"))
     if own:
         return
@@ -123,13 +149,16 @@ def set_elision_tooltip(widget: QWidget, words: str) -> None:
 
 
 def announce(widget: QWidget, words: str) -> None:
-    """Announce a text to screen readers. Used for alerts and stopped robots, never for changing values."""
+    """Announce a text to screen readers, for events such as alerts; not for values that change often."""
     if QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, words))
 
 
 def show_when(widget: QWidget, shown: bool) -> None:
-    """Show or hide a widget. Unlike with `setVisible`, a widget without a parent doesn't become a window."""
+    """Show a widget if `shown`, else hide it.
+
+    Unlike `setVisible`, this doesn't show a widget without a parent as a window.
+    """
     if not shown:
         widget.hide()
     elif widget.parentWidget() is not None:

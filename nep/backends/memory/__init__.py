@@ -42,7 +42,9 @@ from nep.system.cpu import CpuLoad
 _logger = logging.getLogger("nep")
 
 _BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch. The inbox is smaller by this size, so that the sum stays within the bound.
+"""Maximum size of a sink's batch in bytes, which is subtracted from the inbox's limit.
+
+The inbox and a batch together thus stay within the subscriber's `max_bytes`.
 """
 _BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
@@ -126,7 +128,7 @@ class MemoryPublisher:
         return self.subscribers > 0
 
     def borrow_memory(self, _size_bytes: int) -> memoryview | None:
-        """Return None: no shared memory is needed."""
+        """Return None, because messages stay in the memory of the process."""
         return None
 
     def skip(self) -> None:
@@ -212,7 +214,7 @@ class MemorySubscriber(WakingSubscriber):
             return None if self.is_closed else self.inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
         self._transport.wait((self,), timeout_s)
         return self.poll()
 
@@ -301,7 +303,7 @@ class MemoryTransport:
         return subscriber
 
     def discard(self, closed: MemoryPublisher | MemorySubscriber) -> None:
-        """Remove a closed publisher or subscriber. Call with the lock of its hub held."""
+        """Remove a closed publisher or subscriber. Call with the hub's lock held."""
         self._publishers = tuple(each for each in self._publishers if each is not closed)
         self._subscribers = tuple(each for each in self._subscribers if each is not closed)
         with self.changed:
@@ -323,7 +325,7 @@ class MemoryTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
+        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, MemorySubscriber)]
         before = self._wakes
         with wake_on_call(calls, self.wake) as is_empty:
@@ -345,7 +347,10 @@ class MemoryTransport:
         return _hub(configuration).view()
 
     def renewal(self, hub: _Hub) -> requests.Renew:
-        """Return the renewal request with this node's statistics at one hub."""
+        """Return the renewal request with the statistics of this node's members at `hub`.
+
+        The members are the node's publishers, subscribers, servers and clients.
+        """
         outs = [each for each in self._publishers if each.hub is hub and not each.is_closed]
         ins = [each for each in self._subscribers if each.hub is hub and not each.is_closed]
         return requests.Renew(

@@ -44,7 +44,7 @@ OutcomeCallback = Callable[[Outcome], None]
 
 
 class ServiceHub:
-    """Registry of servers and clients. Its lock guards all their state except the call queues."""
+    """Registry of servers and clients. Its lock guards the state of all of them except the call queues."""
 
     def __init__(self) -> None:
         self.lock = threading.RLock()
@@ -92,7 +92,7 @@ class MemoryServer:
         self.is_closed = False
 
     def enqueue(self, call: _Call) -> None:
-        """Queue or reject a call. Call with the hub's lock held."""
+        """Queue a call, or reject it if the queue is full or closed. Call with the hub's lock held."""
         call.server = self
         incoming = IncomingCall(
             call.data,
@@ -156,7 +156,7 @@ class MemoryServer:
 
 
 class MemoryClient:
-    """Client and its calls in flight. Its statistics are guarded by the hub's lock."""
+    """Client with its calls in flight. The hub's lock guards its statistics."""
 
     def __init__(self, node_id: str, hub: ServiceHub, spec: ClientSpec, deadlines: Deadlines) -> None:
         self._node_id = node_id
@@ -176,13 +176,13 @@ class MemoryClient:
 
     @property
     def calls(self) -> list[_Call]:
-        """Calls in flight. Read with the hub's lock held."""
+        """Calls in flight. Call with the hub's lock held."""
         return list(self._calls.values())
 
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> OpenCall:
-        """Send a call. See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.start_call`."""
         return self._start_call(data, timeout_s, then, None)
 
     def _start_call(
@@ -215,7 +215,7 @@ class MemoryClient:
     def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> list[OpenCall]:
-        """Send a call to each server. See `SurveyTransport.begin_all`."""
+        """Send a call to each server. See `SurveyTransport.start_survey`."""
         with self.hub.lock:
             servers = self.hub.servers.get(self.spec.service, ())
             return [self._start_call(data, timeout_s, then, server) for server in servers]
@@ -226,7 +226,10 @@ class MemoryClient:
             self.cancel(call)
 
     def remove_locked(self, call: _Call) -> bool:
-        """Remove a call; return False if it is not in flight any more. Call with the hub's lock held."""
+        """Remove a call from the calls in flight; return False if it has already ended.
+
+        Call with the hub's lock held.
+        """
         if self._calls.pop(call.number, None) is None:
             return False
         self._bytes -= len(call.data)
@@ -240,13 +243,13 @@ class MemoryClient:
                 self.remove_locked(known)
 
     def send_waiting_calls(self, server: MemoryServer) -> None:
-        """Send the calls that wait for a server to a new one. Call with the hub's lock held."""
+        """Send the calls that are waiting for a server to `server`. Call with the hub's lock held."""
         for call in self.calls:
             if call.server is None:
                 server.enqueue(call)
 
     def expire(self, now: float) -> float:
-        """Fail expired calls and return the next deadline."""
+        """Fail expired calls and return the next deadline. See `ExpiringClient.expire`."""
         with self.hub.lock:
             late = [each for each in self.calls if each.deadline <= now and self.remove_locked(each)]
             self.failed += len(late)
@@ -291,7 +294,12 @@ class MemoryClient:
 
 
 class MemoryServices:
-    """Servers and clients of one node, as a part of `MemoryTransport`. `joined` yields the locked hub."""
+    """Servers and clients of one node. Part of `MemoryTransport`.
+
+    Args:
+        node: Record of the node.
+        joined: Returns a context manager that yields the hub for a configuration with its lock held.
+    """
 
     def __init__(
         self, node: NodeRecord, joined: Callable[[Configuration], AbstractContextManager[ServiceHub]]
@@ -303,7 +311,7 @@ class MemoryServices:
         self._clients: tuple[MemoryClient, ...] = ()
 
     def create_server(self, spec: ServerSpec) -> MemoryServer:
-        """Register a server and send it the calls that wait for one."""
+        """Register a server and send it the calls that are waiting for one."""
         with self._joined(spec.configuration) as hub:
             record = PublisherRecord(
                 spec.id, topic_of(spec.service), SERVICE_TYPE, SERVICE_TYPE, ("memory",), number=spec.number
@@ -328,7 +336,7 @@ class MemoryServices:
         return client
 
     def server_counts(self, hub: ServiceHub) -> Iterable[PublisherCount]:
-        """Return the statistics of the servers at `hub`. Call with its lock held."""
+        """Return the statistics of this node's servers at `hub`. Call with the hub's lock held."""
         return [
             each.counts()
             for each in self._servers
@@ -336,7 +344,7 @@ class MemoryServices:
         ]
 
     def client_counts(self, hub: ServiceHub) -> Iterable[SubscriberCount]:
-        """Return the statistics of the clients at `hub`. Call with its lock held."""
+        """Return the statistics of this node's clients at `hub`. Call with the hub's lock held."""
         return [each.counts() for each in self._clients if each.hub is hub and not each.is_closed]
 
     def begin_close(self) -> None:

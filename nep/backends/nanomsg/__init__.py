@@ -1,7 +1,7 @@
 """Back end `nanomsg`: messages over the library pynng.
 
-Direct connections are compatible with libnanomsg; hybrid connections use the master. `library` loads pynng,
-`direct` implements the frames of the original NEP, `publisher` and `sub_socket` the native wire.
+Direct connections are compatible with libnanomsg; hybrid connections use the master. The frames of the
+original NEP are in `direct`, the native wire in `publisher` and `sub_socket`.
 """
 
 from nep.backends.base import Backend

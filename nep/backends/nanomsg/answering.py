@@ -1,6 +1,7 @@
-"""NanomsgServer: replies to calls (REP socket) and surveys (RESPONDENT socket) without a master.
+"""Server for calls (REP socket) and surveys (RESPONDENT socket) without a master.
 
-Each call keeps its own pynng context until its reply is sent, so that any number of calls can be queued.
+Each call holds its own pynng context until its reply is sent, so that any number of calls can be
+queued.
 """
 
 from __future__ import annotations
@@ -30,24 +31,27 @@ REPLY_TIMEOUT_S = 2.0
 """Time limit in seconds for sending a reply to a client that doesn't read."""
 _JOIN_TIMEOUT_S = 2.0
 _LINGER_S = 0.2
-"""Time in seconds to flush the last reply before closing, unless all clients have disconnected.
+"""Time in seconds to flush the last reply before closing. Skipped if all clients have disconnected.
 
-pynng discards the queue of a closed socket.
+Needed because pynng discards the queue of a closed socket.
 """
 
 
 def join_parts(framing: Framing, parts: list[bytes | memoryview]) -> bytes:
-    """Return a call or reply as one message: the native header and payload, or the payload alone."""
+    """Join the parts of a call or reply into one message.
+
+    With the native framing, the message is the header and the payload; otherwise it is the payload alone.
+    """
     return b"".join(parts) if framing is NATIVE else bytes(parts[-1])
 
 
 def split_parts(framing: Framing, message: bytes) -> list[bytes]:
-    """Split a message into the parts that `framing` parses."""
+    """Split a message into the parts that `framing` parses; the reverse of `join_parts`."""
     return [message[:HEADER_BYTES], message[HEADER_BYTES:]] if framing is NATIVE else [b"", message]
 
 
 def receive(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
-    """Return the next message, or None on timeout or if the context is closed."""
+    """Return the next message of a pynng context; None on timeout or if the context is closed."""
     try:
         data: bytes = context.recv()
     except (
@@ -59,13 +63,16 @@ def receive(context: Any) -> bytes | None:  # noqa: ANN401 - pynng is not typed
 
 
 def close_context(context: Any) -> None:  # noqa: ANN401 - pynng is not typed
-    """Close a context. Idempotent."""
+    """Close a pynng context. Idempotent."""
     with contextlib.suppress(load_pynng().NNGException, TypeError):
         context.close()
 
 
 class NanomsgServer:
-    """Server on an attached socket, with a thread that receives calls. Implements `ServerTransport`."""
+    """Server on a socket that is already bound or connected, with a thread that receives calls.
+
+    Implements `ServerTransport`.
+    """
 
     def __init__(
         self,
@@ -158,7 +165,7 @@ class NanomsgServer:
             call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:
-        """Close the server. Idempotent."""
+        """Close the server; replies are flushed for up to `timeout_s` seconds. Idempotent."""
         self.begin_close()
         with self._lock:
             if self.is_closed:

@@ -1,7 +1,8 @@
-"""NanomsgClient: calls a server over a REQ socket, without a master.
+"""Client for calls over a REQ socket, without a master.
 
 Each call has its own pynng context and a thread that waits for the reply. nng's automatic resending of
-unanswered requests is disabled: the call fails instead, because the server may already have executed it.
+unanswered requests is disabled: the call fails instead, because the server may already have executed
+it.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _logger = logging.getLogger("nep")
 _JSON_CODEC = 1
 _JOIN_TIMEOUT_S = 2.0
 _MAX_LATE_CALLS = 100
-"""Maximum number of timed-out calls whose late replies are still received and counted."""
+"""Maximum number of timed-out or cancelled calls whose late replies are still received and counted."""
 
 OutcomeCallback = Callable[[Outcome], None]
 
@@ -88,7 +89,7 @@ class NanomsgClient(ClientCalls[_Call]):
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> OpenCall:
-        """Send a call. See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.start_call`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -172,7 +173,7 @@ class NanomsgClient(ClientCalls[_Call]):
             close_context(closed.context)
 
     def expire(self, now: float) -> float:
-        """Fail expired calls and return the next deadline."""
+        """Fail expired calls and return the next deadline. See `ExpiringClient.expire`."""
         with self._lock:
             late = [
                 each
@@ -187,7 +188,7 @@ class NanomsgClient(ClientCalls[_Call]):
         return due
 
     def service_names(self, timeout_s: float) -> tuple[str, ...]:  # noqa: ARG002 - no master to query
-        """Return an empty tuple: without a master, servers are unknown."""
+        """Return an empty tuple, because services can't be listed without a master."""
         return ()
 
     # ---- closing

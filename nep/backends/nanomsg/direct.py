@@ -31,7 +31,7 @@ _LINGER_S = 0.2
 pynng discards the queue of a closed socket and doesn't report when the queue is empty.
 """
 _LIBNANOMSG_MAX_BYTES = 2**20
-"""libnanomsg silently rejects larger messages by default."""
+"""Default size limit of libnanomsg in bytes. The receiver silently discards larger messages."""
 
 
 def check_direct(direct: Direct) -> None:
@@ -52,7 +52,18 @@ def check_direct(direct: Direct) -> None:
 
 
 def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str:  # noqa: ANN401 - pynng is not typed
-    """Listen or dial as the mode requires; return the endpoint. Raises `AddressInUseError`, `NepError`."""
+    """Listen or dial, depending on the mode, and return the endpoint.
+
+    Args:
+        socket: Socket of pynng.
+        direct: Address and mode.
+        is_publisher: True for a publisher's socket, False for a subscriber's.
+        what: Owner of the socket, for error messages.
+
+    Raises:
+        AddressInUseError: The address can't be bound.
+        NepError: The address to dial is invalid.
+    """
     address = f"{direct.ip}:{direct.port}"
     if is_publisher == (direct.mode == "one2many"):
         listen(socket, address, what)
@@ -61,7 +72,10 @@ def attach(socket: Any, direct: Direct, *, is_publisher: bool, what: str) -> str
 
 
 def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
-    """Connect to `HOST:PORT` and return the endpoint; the peer may bind it later. Raises `NepError`."""
+    """Connect to `HOST:PORT` and return the endpoint. Raises `NepError` for an invalid address.
+
+    The peer may start listening later.
+    """
     try:
         address = resolve_address(address)
         socket.dial(f"tcp://{address}", block=False)
@@ -75,7 +89,7 @@ def dial(socket: Any, address: str) -> str:  # noqa: ANN401 - pynng is not typed
 
 
 class DirectPublisher:
-    """Publisher on a PUB socket. Every connection counts as a subscriber: subscriptions are not visible."""
+    """Publisher on a PUB socket. Each connection counts as a subscriber, because nng hides subscriptions."""
 
     def __init__(
         self, spec: PublisherSpec, direct: Direct, on_close: Callable[[DirectPublisher, float], None]
@@ -106,12 +120,12 @@ class DirectPublisher:
 
     @property
     def subscribers(self) -> int:
-        """Number of connections."""
+        """Number of connections, with or without a subscription to the topic."""
         return len(self._pipes)
 
     @property
     def has_subscribers(self) -> bool:
-        """True if there is any connection."""
+        """True if there is at least one connection."""
         return bool(self._pipes)
 
     def _handle_pipe_added(self, pipe: Any) -> None:  # noqa: ANN401 - pynng is not typed
@@ -142,7 +156,7 @@ class DirectPublisher:
             self.count += 1
 
     def send(self, encoded: Encoded) -> None:
-        """Publish one frame. Drops in full queues can't be detected. Warns once about a large message."""
+        """Publish one frame. Drops in full queues can't be detected; a large message is logged once."""
         frame = to_frame(
             self.spec.topic, self._generation, self.spec.msg_type, self.spec.codec.name, encoded.data
         )
@@ -167,7 +181,7 @@ class DirectPublisher:
         return PollState(pause_reading=True)
 
     def close(self, timeout_s: float) -> None:
-        """Flush for a limited time (`finish`) and close. Called once, by the publisher."""
+        """Flush for up to `timeout_s` seconds and close the publisher. Must be called only once."""
         self._on_close(self, timeout_s)
 
     def send_bye(self) -> None:
@@ -176,7 +190,11 @@ class DirectPublisher:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
-        """Wait up to `_LINGER_S` for pynng to send its queue; its progress is not visible."""
+        """Give pynng up to `_LINGER_S` seconds after the last message to send its queue.
+
+        Returns earlier at `deadline` (`time.monotonic`) or when all connections have closed. pynng doesn't
+        report how much of the queue it has sent.
+        """
         until = min(deadline, self._sent_at + _LINGER_S)
         with self._changed:
             wait_until(self._changed, lambda: not self._pipes, until - time.monotonic())
@@ -188,7 +206,7 @@ class DirectPublisher:
 
 
 class DirectSubSocket(UnbatchedReader):
-    """SUB socket for frames of both generations. They have no sequence numbers, so losses are unknown."""
+    """SUB socket for frames of both generations, which have no sequence numbers, so losses are unknown."""
 
     def __init__(self, spec: SubscriberSpec, direct: Direct) -> None:
         check_direct(direct)
@@ -215,7 +233,7 @@ class DirectSubSocket(UnbatchedReader):
         return self._sub.has_input
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message of the topic, or None."""
+        """Return the next message of the topic, or None if there is none. See `Readable.read`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             try:
                 data = from_frame(self._spec.topic, self._spec.msg_type, self._codec, frame)
@@ -228,7 +246,7 @@ class DirectSubSocket(UnbatchedReader):
         return None
 
     def count_dropped(self, count: int) -> None:
-        """Count messages dropped from the full queue, the only detectable losses."""
+        """Add messages dropped from the full queue to the losses. Other losses can't be detected."""
         self.received -= count
         self.lost = (self.lost or 0) + count
 

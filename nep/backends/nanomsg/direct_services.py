@@ -1,7 +1,7 @@
-"""DirectServices: servers, clients and surveyors of one node without a master.
+"""Servers, clients and surveyors of one node without a master.
 
-Part of `NanomsgTransport`. Regardless of the mode, a server binds its port and clients connect; a surveyor
-binds and respondents connect.
+Part of `NanomsgTransport`. Regardless of the mode, a server binds its port and clients connect; a
+surveyor binds and respondents connect.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _MAX_MESSAGE_BYTES = PAYLOAD_MAX_BYTES + HEADER_BYTES
 _REPLY_TIMEOUT_MS = round(REPLY_TIMEOUT_S * 1000)
 _NEVER_RESEND = -1
 _RECONNECT_MS = {"reconnect_time_min": 10, "reconnect_time_max": 500}
-"""Initial and maximum reconnection interval in milliseconds."""
+"""Socket options of pynng: initial and maximum reconnection interval in milliseconds."""
 
 
 class DirectServices:

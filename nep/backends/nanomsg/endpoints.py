@@ -27,7 +27,7 @@ def endpoint(host: str, messages: int, hellos: int) -> str:
 
 
 def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
-    """Return the addresses (`HOST:PORT`) for messages and hellos, or None for other endpoints."""
+    """Return the addresses (`HOST:PORT`) for messages and for hellos; None for endpoints of other schemes."""
     found = _ENDPOINT.fullmatch(endpoint)
     if found is None or not all(0 < int(port) < 65536 for port in found.groups()[1:]):
         return None
@@ -36,14 +36,23 @@ def parse_endpoint(endpoint: str) -> tuple[str, str] | None:
 
 
 def subscriber_topic_part(subscriber: int, topic: str) -> bytes:
-    """Return the topic prefix of messages addressed to this subscriber only."""
+    """Return the topic prefix of messages that are addressed only to this subscriber."""
     return hello_part(subscriber, topic) + b"\0"
 
 
 def split_message(message: bytes, first: bytes, *, is_alone: bool) -> list[bytes]:
-    """Return the parts after the first: header, payload and extension, or only the header of a notice.
+    """Split a one-part message into the parts after its prefix.
 
-    Raises `WireError`.
+    Args:
+        message: Received message.
+        first: Prefix of the message: the topic, or the hello of one subscriber.
+        is_alone: True if the message is addressed to one subscriber, as notices are.
+
+    Returns:
+        Header, payload and, if the message has one, extension; for a notice only the header.
+
+    Raises:
+        WireError: The header is malformed or declares more bytes than follow.
     """
     rest = message[len(first) :]
     header = read_header(rest[:HEADER_BYTES])

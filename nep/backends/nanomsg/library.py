@@ -23,15 +23,15 @@ MAX_QUEUE_LENGTH = 8192
 """Maximum queue length that pynng allows, in messages. pynng's defaults are too short for bursts."""
 _QUEUE_LENGTHS = {"image": 64, "bytes": 1000}
 FDS_PER_SOCKET = 6
-"""Number of file descriptors per socket: socket, port, signals and a connection."""
+"""Number of file descriptors that a socket needs, including its port and a connection."""
 _PORT_ATTEMPTS = 100
 _MODULE_NAME = "pynng.nng"
 _exit_handler: Callable[[], object] | None = None
 _sockets: WeakSet[Any] = WeakSet()
 _inherited_libraries: set[str] = set()
-"""Names of libraries that were in use before a fork.
+"""Names of libraries that were in use in the parent process before a fork.
 
-In the child process nng would wait for threads that don't exist there.
+They can't be used in the child process, because nng would wait for threads that don't exist there.
 """
 
 
@@ -69,7 +69,12 @@ def _defer_exit_handler() -> None:
 
 
 def new_socket(kind: str, **options: object) -> Any:  # noqa: ANN401 - not typed
-    """Create a pynng socket, such as "Pub0", with these options."""
+    """Create a pynng socket.
+
+    Args:
+        kind: Name of the class, such as "Pub0".
+        options: Arguments of the constructor.
+    """
     created = getattr(load_pynng(), kind)(**options)
     _sockets.add(created)
     return created
@@ -97,7 +102,7 @@ call_in_child(_forked)
 
 
 def queue_length(codec: str) -> int:
-    """Return the queue length per connection in messages. pynng doesn't limit the bytes."""
+    """Return the queue length per connection in messages for a codec. pynng has no limit in bytes."""
     return _QUEUE_LENGTHS.get(codec, MAX_QUEUE_LENGTH)
 
 
@@ -107,9 +112,16 @@ def bound_port(listener: Any) -> int:  # noqa: ANN401 - not typed
 
 
 def listen(owner: Any, address: str, what: str) -> Any:  # noqa: ANN401 - not typed
-    """Listen at `HOST:PORT`. Port 0 selects a free port that the original NEP doesn't use.
+    """Listen at `HOST:PORT` and return the listener. Port 0 selects a port not used by the original NEP.
 
-    Raises `AddressInUseError`, `TooManyFilesError`.
+    Args:
+        owner: Socket of pynng.
+        address: Address as `HOST:PORT`.
+        what: Owner of the socket, for error messages.
+
+    Raises:
+        AddressInUseError: The address can't be bound.
+        TooManyFilesError: The process is out of file descriptors.
     """
     nng = load_pynng()
     check_free_descriptors(FDS_PER_SOCKET, what)

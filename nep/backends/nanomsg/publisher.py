@@ -1,9 +1,9 @@
-"""NanomsgPublisher: publisher that subscribers find through the master.
+"""Publisher that subscribers find through the master.
 
-A PUB socket doesn't report its subscribers. They therefore send a hello to a second port, with the local
-address of their connection. Once the hello and the connection have both arrived, the publisher sends the
-history and an echo, as on the native wire. Messages are sent in the publishing thread; hellos are read in the
-I/O thread.
+A PUB socket doesn't report its subscribers. Subscribers therefore send a hello to a second port, with
+the local address of their connection. Once the hello and the connection have both arrived, the
+publisher sends the history and an echo, as on the native wire. Messages are sent in the publishing
+thread; hellos are read in the I/O thread.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ _BYE_RETRY_S = 0.05
 
 
 class NanomsgPublisher(HandshakePublisher):
-    """Publisher with a PUB socket, and a PULL socket for hellos.
+    """Publisher with a PUB socket for messages and a PULL socket for hellos.
 
-    Never close pynng objects with the lock held: closing waits for callbacks in other threads, which acquire
-    the lock.
+    Never close pynng objects with the lock held: closing waits for callbacks in other threads, which
+    acquire the lock.
     """
 
     def __init__(
@@ -107,7 +107,11 @@ class NanomsgPublisher(HandshakePublisher):
             )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:  # noqa: ARG002 - loopback only
-        """Listen on the first call; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+        """Listen on the loopback interface on the first call, and return the endpoint.
+
+        `hosts` is ignored, because this back end connects only nodes of one computer. Raises
+        `AddressInUseError` and `TooManyFilesError`.
+        """
         if not self._endpoint:
             what = f"a publisher of '{self.spec.topic}'"
             messages, hellos = (
@@ -117,7 +121,7 @@ class NanomsgPublisher(HandshakePublisher):
         return (self._endpoint,)
 
     def unbind_local(self) -> None:
-        """Do nothing, because this back end has no Unix socket names."""
+        """Do nothing, because this back end has no Unix sockets."""
 
     # ---- sending
 
@@ -228,17 +232,20 @@ class NanomsgPublisher(HandshakePublisher):
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, flush and close the sockets. Called once, by the publisher."""
+        """Unregister, flush for up to `timeout_s` seconds and close the sockets. Must be called only once."""
         self._on_close(self, timeout_s)
 
     def send_bye(self) -> None:
-        """Send the bye: subscribers read the remaining messages and disconnect."""
+        """Send the bye, after which subscribers read the remaining messages and disconnect."""
         with self._changed:
             self._is_closed = True
             self._send_bye_locked()
 
     def finish(self, deadline: float) -> None:
-        """Wait until all subscribers have disconnected; log undelivered messages at `deadline`."""
+        """Wait until all subscribers have disconnected; log undelivered messages at `deadline`.
+
+        `deadline` is a time of `time.monotonic`.
+        """
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):

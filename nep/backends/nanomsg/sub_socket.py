@@ -1,6 +1,6 @@
-"""NanomsgSubSocket: a SUB socket connected to publishers, with a hello sent to the second port of each.
+"""SUB socket connected to publishers, with a hello sent to the second port of each publisher.
 
-Not thread-safe. See `Readable`.
+Not thread-safe. See `nep.backends.zeromq.subscriber.Readable`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _HELLO_QUEUE_LENGTH = 8
 
 
 class PollableSub:
-    """SUB socket with a descriptor for polling. `recv` returns None if no message is available."""
+    """SUB socket with a file descriptor for polling."""
 
     def __init__(self, codec: str) -> None:
         nng = load_pynng()
@@ -53,13 +53,13 @@ class PollableSub:
         return not self._is_closed and bool(zmq.zmq_poll([(self.fd, zmq.POLLIN)], 0))
 
     def enlarge_queue(self, history: int) -> None:
-        """Enlarge the receive queue so that it holds a history of this length."""
+        """Enlarge the receive queue so that a history of `history` messages fits."""
         room = 2 * min(history, MAX_HISTORY)
         if room > self._room:
             self._room = self.socket.recv_buffer_size = room
 
     def recv(self, *, may_wait: bool) -> bytes | None:
-        """Return the next message, or None; with `may_wait`, wait up to `SHORT_WAIT_S`."""
+        """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
         try:
             return bytes(self.socket.recv(block=may_wait))
         except self._empty_errors:
@@ -86,7 +86,7 @@ class _Link:
 
 
 class NanomsgSubSocket(UnbatchedReader):
-    """Subscriber socket for publishers of this back end. Other endpoints are reported as problems."""
+    """Subscriber socket for publishers of this back end. Endpoints of other back ends set `problem`."""
 
     def __init__(self, spec: SubscriberSpec) -> None:
         self.sources = PublisherTracker()
@@ -119,7 +119,7 @@ class NanomsgSubSocket(UnbatchedReader):
 
     @property
     def problem(self) -> str:
-        """Reason why a listed publisher can't be received; "" if there is none."""
+        """Reason why messages of a listed publisher can't be received; "" if there is none."""
         listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
         return next((each.problem for each in listed), "")
 
@@ -129,7 +129,7 @@ class NanomsgSubSocket(UnbatchedReader):
         return self._sub.has_input
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher and disconnect from unresponsive ones that it replaces. Idempotent."""
+        """Connect to a publisher, and disconnect from silent publishers that it replaces. Idempotent."""
         for old in self.sources.replaced_publishers(remote):
             self.sources.count_missing(old)
             self.disconnect(old)
@@ -203,7 +203,7 @@ class NanomsgSubSocket(UnbatchedReader):
             link.close()
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message, or None; with `may_wait`, wait up to `SHORT_WAIT_S`."""
+        """Return the next message, or None if there is none; with `may_wait`, wait up to `SHORT_WAIT_S`."""
         while (frame := self._sub.recv(may_wait=may_wait)) is not None:
             is_alone = frame.startswith(self._own)
             first = self._own if is_alone else self._topic
@@ -218,7 +218,7 @@ class NanomsgSubSocket(UnbatchedReader):
         return None
 
     def count_dropped(self, count: int) -> None:
-        """Count received messages that were dropped from the full queue."""
+        """Add received messages that were dropped from the full queue to the losses."""
         self.sources.count_dropped(count)
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
-"""NanomsgSurveyor: surveys over a SURVEYOR socket without a master, as in the original NEP.
+"""Surveys over a SURVEYOR socket without a master, as in the original NEP.
 
-The surveyor binds the port. Requests and replies are plain JSON. An exception in a callback is sent as the
-reply `{"nep_error": …}`, as in the original's services.
+The surveyor binds the port. Requests and replies are plain JSON. If a respondent's callback raises, the
+reply is `{"nep_error": …}`, as in services of the original NEP.
 """
 
 from __future__ import annotations
@@ -88,7 +88,11 @@ class NanomsgSurveyor:
     def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> list[OpenCall]:
-        """Send a request and return one item per connected respondent; all items are the same survey."""
+        """Send a request to all respondents; return one entry per respondent.
+
+        All entries are the same object, because nng has no separate call for each respondent. See
+        `SurveyTransport.start_survey`.
+        """
         with self._changed:
             if self.is_closed:
                 raise self._closed_error()
@@ -118,7 +122,7 @@ class NanomsgSurveyor:
             survey.callback(ORIGINAL.read_reply([b"", data]).reply)
 
     def cancel_all(self, calls: Sequence[OpenCall]) -> None:
-        """Cancel the survey."""
+        """Cancel the survey; its callback isn't called."""
         for call in calls[:1]:
             with self._changed:
                 survey = self._surveys.pop(call.number, None)

@@ -1,6 +1,7 @@
-"""Transport of the back end `nanomsg`: messages over pynng, with the master as in `zeromq`.
+"""Transport of the back end `nanomsg`: messages over pynng, with the same master as `zeromq`.
 
-Derived from the `zeromq` transport with other sockets; sessions, threads, waiting and closing are the same.
+Derived from the transport of `zeromq`: only the sockets differ; sessions, threads, waiting and closing
+are shared.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from nep.system.addresses import is_loopback
 
 
 class NanomsgTransport(ZeromqTransport):
-    """Connection of one node to a network over pynng. Raises `BackendUnavailableError` without pynng."""
+    """Connection of one node over pynng. Raises `BackendUnavailableError` if pynng is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
         load_pynng()
@@ -47,7 +48,7 @@ class NanomsgTransport(ZeromqTransport):
         super().__init__(node)
 
     def create_server(self, spec: ServerSpec) -> ServerTransport:
-        """Create a server: REP or RESPONDENT for a direct connection, otherwise the one of `zeromq`."""
+        """Create a server: REP or RESPONDENT for a direct connection, otherwise as in `ZeromqTransport`."""
         direct = spec.configuration
         if isinstance(direct, Direct) and spec.service.startswith(SURVEY_PREFIX):
             check_direct(direct)
@@ -57,14 +58,14 @@ class NanomsgTransport(ZeromqTransport):
         return super().create_server(spec)
 
     def create_client(self, spec: ClientSpec) -> ClientTransport:
-        """Create a client: REQ for a direct connection, otherwise the one of `zeromq`."""
+        """Create a client: REQ for a direct connection, otherwise as in `ZeromqTransport`."""
         direct = spec.configuration
         if isinstance(direct, Direct) and direct.wire != "tcp":
             return self._direct_services.create_client(spec, direct)
         return super().create_client(spec)
 
     def create_surveyor(self, spec: ClientSpec) -> SurveyTransport:
-        """Create a surveyor: SURVEYOR for a direct connection, otherwise the one of `zeromq`."""
+        """Create a surveyor: SURVEYOR for a direct connection, otherwise as in `ZeromqTransport`."""
         if isinstance(spec.configuration, Direct):
             check_direct(spec.configuration)
             return self._direct_services.create_surveyor(spec, spec.configuration, DIRECT_WAIT_S)

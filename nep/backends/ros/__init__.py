@@ -1,8 +1,12 @@
 """Back end `ros`: ROS 1 over rospy. nep nodes and ROS nodes use the same ROS master.
 
-`library` loads rospy, `process` is the single ROS node of this process, `master` queries the ROS master,
-`definition` and `carried` convert ROS messages, and `transport` implements `nep.backends.base`. See
-docs/ros.md.
+See docs/ros.md. Modules:
+
+- `library`: loading of rospy
+- `process`: the single ROS node of this process
+- `master`: client for the ROS master
+- `definition`, `carried`: conversion of ROS messages
+- `transport`: implementation of `nep.backends.base`
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Address of the ROS master. A separate module, because every nep node imports it."""
+"""Address of the ROS master. A separate module without dependencies, because every nep node imports it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ _DEFAULT_PORT = 11311
 
 
 def ros_master_address(given: str | None) -> str:
-    """Return the ROS master's address as HOST:PORT: `given`, else $ROS_MASTER_URI, else 127.0.0.1:11311.
+    """Return the ROS master's address as `HOST:PORT`.
 
-    "http://HOST:PORT" is also accepted; the port defaults to 11311. Raises `NepError` if the address is
-    invalid.
+    Args:
+        given: `HOST:PORT` or `http://HOST:PORT`; the port defaults to 11311. None selects $ROS_MASTER_URI,
+            or 127.0.0.1:11311 if the variable is not set.
+
+    Raises:
+        NepError: The address is invalid.
     """
     text = given or os.environ.get("ROS_MASTER_URI") or f"127.0.0.1:{_DEFAULT_PORT}"
     if not isinstance(text, str):
@@ -39,6 +43,6 @@ def ros_master_address(given: str | None) -> str:
 
 
 def is_loopback_address(address: str) -> bool:
-    """Return True if the host of an address is this computer's loopback."""
+    """Return True if the host of an address is the loopback interface."""
     host = host_of(address)
     return host == "localhost" or host.startswith("127.")

@@ -32,7 +32,7 @@ from nep.messages.image_codec import picture_info, raw_array, raw_image, raw_lay
 from nep.text import escaped, shortened
 
 STAMP = struct.Struct("<III")
-"""Start of a message that has a header: seq, secs, nsecs."""
+"""Binary layout of the start of a message with a header: seq, secs and nsecs."""
 _LENGTH = struct.Struct("<I")
 _ROS_TYPE = re.compile(r"[A-Za-z]\w*/[A-Z]\w*", re.ASCII)
 _STRING_TYPE = "std_msgs/String"
@@ -46,7 +46,7 @@ _MD5SUMS = {
     _COMPRESSED_IMAGE_TYPE: "8f7a12909da2c9d3332d540a0977563f",
     _RAW_IMAGE_TYPE: "060021388200f6f0f447d0fcd9c64743",
 }
-"""Checksums of the built-in definitions."""
+"""MD5 sums of the built-in message definitions, by type."""
 _CARRIER_TYPES = {
     "string": _STRING_TYPE,
     "json": _STRING_TYPE,
@@ -56,9 +56,12 @@ _CARRIER_TYPES = {
 }
 _EMPTY_LAYOUT = bytes(8)
 _DEPTH_HEADER_BYTES = 12
-"""Size in bytes of the header of compressed_depth_image_transport. 16-bit images ignore it; a PNG follows."""
+"""Size in bytes of the header that compressed_depth_image_transport writes before the PNG.
+
+The header has no meaning for 16-bit images.
+"""
 _CODEC_NUMBER = 6
-"""Codec number of ROS messages; unused on the native wire, on which such messages aren't sent."""
+"""Codec number of ROS messages. Never sent, because the native wire doesn't transfer ROS messages."""
 _definitions: dict[str, Definition] = {}
 
 Unpacked = tuple[bytes | memoryview, Mapping[str, object] | None]
@@ -71,14 +74,14 @@ def is_ros_type(msg_type: str) -> bool:
 
 
 def ros_type_of(msg_type: str) -> str:
-    """Return the ROS message type that carries a message type."""
+    """Return the ROS message type in which messages of a nep message type are transferred."""
     return msg_type if is_ros_type(msg_type) else _CARRIER_TYPES[codec_for(msg_type).name]
 
 
 def installed_definition(name: str) -> Definition:
-    """Return the definition of an installed ROS message.
+    """Return the definition of an installed ROS message type.
 
-    Raises `NepError`, which names the package to install.
+    Raises `NepError`, whose message names the package to install.
     """
     if name not in _definitions:
         found = message_text(name)
@@ -89,7 +92,12 @@ def installed_definition(name: str) -> Definition:
 
 
 def not_installed_error(name: str, what: str) -> NepError:
-    """Return the error for a type that isn't installed; `what` names its kind in the message."""
+    """Return the error for a type that isn't installed.
+
+    Args:
+        name: Name of the type.
+        what: Kind of the type, for the error message, such as "message type".
+    """
     known = escaped(shortened(name, 100))
     return NepError(
         _(
@@ -113,7 +121,7 @@ def codec_of(msg_type: str) -> Codec:
 
 
 def ros_codec(definition: Definition) -> Codec:
-    """Return a codec that converts maps to and from a ROS message."""
+    """Return a codec that converts between maps and messages of a ROS type."""
 
     def encode(payload: object) -> Encoded:
         return Encoded(definition.encode(_with_stamp(payload) if definition.has_header else payload))
@@ -174,7 +182,13 @@ def _check_file(encoded: Encoded, kind: str) -> str:
 
 
 def to_ros(ros_type: str, codec: str, encoded: Encoded) -> bytes:
-    """Convert encoded data to the body of a ROS message. Raises `EncodeError`, `WireError`."""
+    """Convert encoded data to the body of a ROS message. Raises `EncodeError` and `WireError`.
+
+    Args:
+        ros_type: Type of the ROS message.
+        codec: Name of the codec of `encoded`.
+        encoded: Data and extension.
+    """
     data, extension = encoded.data, encoded.extension
     if codec == "image" and extension:
         head = bytes(4) + _current_stamp() + bytes(4)
@@ -232,7 +246,7 @@ class Unpacker:
         codec: Codec of the converted data.
         msg_type: Message type of the converted data.
         unpack: Converts the body of a ROS message to data and extension; raises `WireError` for an invalid
-            one.
+            body.
         has_header: True if the ROS message starts with a header.
     """
 
@@ -281,7 +295,7 @@ def _matching_definition(ros_type: str, md5sum: str) -> Definition:
 
 
 def version_error(ros_type: str) -> NepError:
-    """Return the error for a type whose definition differs between this program and the publisher."""
+    """Return the error for a type that the publisher defines differently from this program."""
     return NepError(
         _(
             "its '{ros_type}' has different fields from the definition on this computer; use the same "

@@ -1,9 +1,11 @@
 """Parser for ROS message definitions, and conversion between maps and bytes. Needs no ROS installation.
 
-A publisher sends the full definition to each subscriber, so messages of packages that aren't installed can be
-decoded, and no code is generated from untrusted input. A map has the fields by name; missing fields are zero
-or empty. `time` and `duration` are `{"secs": 1, "nsecs": 500000000}`; a number of seconds is accepted as well
-when encoding. Arrays are lists; `uint8[]` and `char[]` are bytes.
+A publisher sends the full definition to each subscriber. Messages of packages that aren't installed can
+therefore be decoded, and no code is generated from untrusted input.
+
+A map contains the fields by name; missing fields are zero or empty. `time` and `duration` are `{"secs":
+1, "nsecs": 500000000}`; a number of seconds is accepted as well when encoding. Arrays are lists;
+`uint8[]` and `char[]` are bytes.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ _MAX_DEPTH = 30
 _MAX_FIELDS = 2_000
 """Maximum number of fields including nested ones, because a publisher's definition is untrusted."""
 _MAX_EMPTY_MESSAGES = 10_000
-"""Maximum number of nested messages without content."""
+"""Maximum number of nested messages without content in a decoded message; they occupy no bytes."""
 
 
 class _FieldError(Exception):
@@ -73,8 +75,8 @@ class FieldKind:
 
     Attributes:
         name: Name of the type.
-        write: Encodes a value; its arguments are the value, its field path and the output.
-        read: Decodes a value; its arguments are the reader and the field path.
+        write: Encodes a value; called with the value, the field path and the output.
+        read: Decodes a value; called with the reader and the field path.
         min_bytes: Minimum size of an encoded value in bytes.
         fields: Fields of a message.
         element: Type of an array's items, or None.
@@ -100,26 +102,26 @@ class DefinitionField:
 
 @dataclass(frozen=True)
 class Definition:
-    """Message type. Created by `parse`.
+    """Definition of a message type. Created by `parse`.
 
     Attributes:
         name: Name of the type.
-        text: Its definition, including those of nested types.
-        fields: Its fields in order.
+        text: Text of the definition, including the definitions of nested types.
+        fields: Fields in order.
     """
 
     name: str
     text: str
     fields: tuple[DefinitionField, ...]
     has_header: bool
-    """True if the first field is a header: the data then begins with seq, secs and nsecs."""
+    """True if the first field is a header; the data then starts with seq, secs and nsecs."""
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
         return tuple(each.name for each in self.fields)
 
     def encode(self, payload: object) -> bytes:
-        """Encode a map. Raises `EncodeError` with the field path."""
+        """Encode a map. Raises `EncodeError` with the path of the invalid field."""
         out = bytearray()
         try:
             _write_fields(self.name, self.fields, payload, "", out)
@@ -131,7 +133,7 @@ class Definition:
         return bytes(out)
 
     def decode(self, data: bytes | memoryview) -> dict[str, object]:
-        """Decode a map. Raises `DecodeError` with the path of the field that is invalid."""
+        """Decode a map. Raises `DecodeError` with the path of the invalid field."""
         reader = _Reader(data)
         try:
             values = _read_fields(self.fields, reader, "")
@@ -147,7 +149,7 @@ class Definition:
         return values
 
     def check(self, payload: object) -> None:
-        """Raise `EncodeError` if the payload isn't a map."""
+        """Raise `EncodeError` if `payload` isn't a map."""
         if not isinstance(payload, Mapping):
             raise EncodeError(self.name, type(payload).__name__, _not_a_map_reason(self.fields))
 
@@ -156,7 +158,7 @@ class Definition:
 
 
 def parse(name: str, text: str) -> Definition:
-    """Parse the definition of a type such as "geometry_msgs/Twist". Raises `NepError`."""
+    """Parse the definition of a type such as "geometry_msgs/Twist". Raises `NepError` if it is invalid."""
     sections = _SEPARATOR.split(text)
     texts = {name: sections[0]}
     for section in sections[1:]:

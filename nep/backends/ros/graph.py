@@ -1,4 +1,4 @@
-"""Graph of a ROS master, with the statistics of nep nodes in this process."""
+"""Graph of a ROS network, with the statistics of the nep nodes of this process."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _GENERATION = "ros"
 
 @dataclass(frozen=True)
 class OwnNode:
-    """nep node in this process, with its statistics.
+    """nep node of this process, with its statistics.
 
     Attributes:
         node: Record of the node.
@@ -55,9 +55,14 @@ class OwnNode:
 
 
 def graph_view(known: RosNodes, own: list[OwnNode]) -> GraphView:
-    """Return the graph, in which this process's nep nodes replace its ROS node.
+    """Return the graph of a ROS network.
 
-    The rates of other nodes are unknown, because ROS doesn't report them.
+    The process's own ROS node is listed as its nep nodes. The rates of other nodes are unknown, because ROS
+    doesn't report them.
+
+    Args:
+        known: Snapshot of the ROS master.
+        own: nep nodes of this process.
     """
     graph = Graph(epoch=1, now=time.monotonic(), learn_s=0.0)
     for topic, name in _foreign_entries(known.publishers, own, lambda each: each.publishers):
@@ -128,7 +133,7 @@ def _node_record(name: str, uri: str) -> NodeRecord:
 
 
 def publisher_id(node: str, topic: str) -> int:
-    """Return the id of a ROS node's publisher on a topic. Both names are full names."""
+    """Return the id of a ROS node's publisher on a topic. `node` and `topic` are full names."""
     return _stable_id(node, topic, "o")
 
 

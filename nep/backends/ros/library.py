@@ -1,8 +1,8 @@
-"""Access to rospy, which is loaded with the first node, also in a venv beside Debian's Python.
+"""Access to rospy, which is loaded with the first node, even in a venv next to Debian's Python.
 
 rospy isn't on PyPI, and a venv doesn't search the folder of Debian's packages. A finder at the end of
-`sys.meta_path` searches that folder, but only for ROS and its dependencies, so that no other system package,
-such as numpy, is imported, and packages of the venv take precedence.
+`sys.meta_path` searches that folder, but only for ROS and its dependencies. No other system package,
+such as numpy, is imported from there, and packages of the venv take precedence.
 """
 
 from __future__ import annotations
@@ -35,7 +35,11 @@ _inherited_libraries: set[str] = set()
 
 
 class RosFinder(MetaPathFinder):
-    """Import finder for ROS and for the message packages in `extra`, searching a list of folders."""
+    """Import finder that searches system folders, but only for ROS packages.
+
+    Args:
+        places: Folders to search.
+    """
 
     def __init__(self, places: Sequence[str]) -> None:
         self._places = list(places)
@@ -47,7 +51,7 @@ class RosFinder(MetaPathFinder):
         path: Sequence[str] | None,
         target: ModuleType | None = None,  # noqa: ARG002 - signature of the base class
     ) -> importlib.machinery.ModuleSpec | None:
-        """Find a top-level package of ROS. Its submodules are found through the package."""
+        """Find a top-level package of ROS. Python finds submodules through their package."""
         if path is not None or not (
             name in _MODULE_NAMES or name in self.extra or name.endswith(_PACKAGE_SUFFIXES)
         ):
@@ -95,7 +99,10 @@ def get_rospy() -> Any:  # noqa: ANN401 - not typed
 
 
 def load_rospy(load: Callable[[str], ModuleType] = importlib.import_module) -> ModuleType:
-    """Import rospy without side effects on the program. Raises `BackendUnavailableError`."""
+    """Import rospy and undo the side effects of the import on the program.
+
+    Raises `BackendUnavailableError` if rospy is not installed.
+    """
     if _finder not in sys.meta_path:
         sys.meta_path.append(_finder)
     logger_class = logging.getLoggerClass()
@@ -131,7 +138,7 @@ def message_text(name: str) -> tuple[str, str] | None:
 
 
 def service_definition(name: str) -> ServiceDefinition | None:
-    """Return the definition of a service type such as "std_srvs/SetBool", or None if it is not installed."""
+    """Return the definition of a service type such as "std_srvs/SetBool"; None if it is not installed."""
     found = _installed_class(name, "srv")
     request, answer = (
         getattr(getattr(found, each, None), "_full_text", None)

@@ -1,4 +1,4 @@
-"""RosMaster: XML-RPC client for the ROS master, with timeouts. Works without rospy."""
+"""XML-RPC client for the ROS master, with timeouts. Works without rospy."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from nep.i18n import _
 
 _CALLER = "/nep"
 _REQUEST_TIMEOUT_S = 1.0
-"""Timeout of a single request to a master."""
+"""Timeout of a single request to a master in seconds."""
 _RETRY_S = 0.1
 _ROSPY_SERVICES = ("/get_loggers", "/set_logger_level")
 """Services that every ROS node provides."""
 _REQUEST_ERRORS = (
     OSError, xmlrpc.client.Error, http.client.HTTPException, ExpatError, ValueError, TypeError, LookupError
 )  # fmt: skip
-"""Exceptions of a failed request, also if the server at the address isn't a ROS master."""
+"""Exceptions that mean a failed request, including replies of servers that aren't ROS masters."""
 
 
 class RosMasterUnreachable(MasterUnreachable):
@@ -57,7 +57,7 @@ class _RefusedError(ValueError): ...
 
 
 def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noqa: ANN401 - any value
-    # Raises `_FAILURES`.
+    # Raises `_REQUEST_ERRORS`.
     with xmlrpc.client.ServerProxy(uri, transport=_Transport(max(0.01, timeout_s))) as proxy:
         code, status, value = getattr(proxy, method)(*args)
     if code != 1:
@@ -66,9 +66,14 @@ def _call(uri: str, timeout_s: float, method: str, *args: object) -> Any:  # noq
 
 
 def connections_of(uri: str, timeout_s: float) -> list[tuple[str, str, str]]:
-    """Return (peer, direction, topic) of a node's connections; direction is "i" or "o".
+    """Return a node's connections; empty if the node doesn't reply.
 
-    Returns an empty list if the node doesn't reply.
+    Args:
+        uri: Address of the node.
+        timeout_s: Seconds to wait for the reply.
+
+    Returns:
+        (peer, direction, topic) of each connection; the direction is "i" (in) or "o" (out).
     """
     try:
         buses = _call(uri, timeout_s, "getBusInfo", _CALLER)
@@ -98,7 +103,7 @@ class RosNodes:
 
 @dataclass(frozen=True)
 class NodeRegistrations:
-    """Registrations of a node.
+    """Registrations of a node at the ROS master.
 
     Attributes:
         publications: (topic, type) of each publisher.
@@ -112,14 +117,17 @@ class NodeRegistrations:
 
 
 class RosMaster:
-    """Client for the ROS master at `address`. Requests raise `RosMasterUnreachable` without a reply."""
+    """Client for the ROS master at `address`. Requests raise `RosMasterUnreachable` if no reply arrives."""
 
     def __init__(self, address: str) -> None:
         self.address = address
         self.uri = f"http://{address}/"
 
     def wait(self, timeout_s: float | None) -> None:
-        """Wait until the master replies; None waits forever."""
+        """Wait until the master replies.
+
+        Raises `RosMasterUnreachable` after `timeout_s` seconds; None waits forever.
+        """
         started = time.monotonic()
         pause = threading.Event()
         while True:
@@ -135,13 +143,13 @@ class RosMaster:
             pause.wait(_RETRY_S)
 
     def names(self, topic: str, timeout_s: float) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the names of the nodes that publish a topic, and of those that subscribe to it."""
+        """Return the names of a topic's publishing nodes and of its subscribing nodes."""
         state = self._request("getSystemState", timeout_s)
         found = [next((tuple(names) for each, names in part if each == topic), ()) for part in state[:2]]
         return found[0], found[1]
 
     def is_node_unknown(self, name: str, timeout_s: float) -> bool:
-        """Return True if the master replies but doesn't know the node, for example after a restart."""
+        """Return True if the master replies but doesn't list the node `name`, for example after a restart."""
         try:
             _call(self.uri, timeout_s, "lookupNode", _CALLER, name)
         except _RefusedError:
@@ -151,7 +159,14 @@ class RosMaster:
         return False
 
     def register(self, name: str, uri: str, node: NodeRegistrations, timeout_s: float) -> bool:
-        """Repeat a node's registrations after a restart of the master; return False on failure."""
+        """Register a node again after a restart of the master; return False on failure.
+
+        Args:
+            name: Name of the node.
+            uri: Address of the node.
+            node: Registrations to repeat.
+            timeout_s: Timeout of each request in seconds.
+        """
         try:
             for topic, kind in node.publications:
                 _call(self.uri, timeout_s, "registerPublisher", name, topic, kind, uri)
@@ -185,7 +200,7 @@ class RosMaster:
         return RosNodes(publishers, subscribers, served, types, self._uris(sorted(names), timeout_s))
 
     def services(self, timeout_s: float) -> tuple[str, ...]:
-        """Return the services that have a server."""
+        """Return the names of services that have a server."""
         services = self._request("getSystemState", timeout_s)[2]
         return tuple(str(name) for name, _nodes in services if not str(name).endswith(_ROSPY_SERVICES))
 

@@ -1,7 +1,8 @@
-"""RosProcess: the single ROS node of this process, shared by all its nep nodes.
+"""The ROS node of this process, shared by all its nep nodes.
 
-rospy allows one node per process and can't be restarted. The ROS node is therefore named after the first nep
-node and lives until the process ends; a nep node that closes only unregisters its publishers and subscribers.
+rospy allows one node per process and can't be restarted. The ROS node is therefore named after the
+first nep node and lives until the process ends; a nep node that closes only unregisters its publishers
+and subscribers.
 """
 
 from __future__ import annotations
@@ -36,13 +37,13 @@ _TOPIC = re.compile(r"[~/A-Za-z][\w/]*", re.ASCII)
 _POLL_S = 0.01
 _REQUEST_TIMEOUT_S = 0.5
 _MASTER_CHECK_S = 1.0
-"""Interval for detecting a restart of the master."""
+"""Interval in seconds for detecting a restart of the master."""
 _MIN_TIMEOUT_S = 0.2
-"""Minimum timeout of a request to the master in seconds, even if less time is left."""
+"""Minimum timeout in seconds of a request to the master, even if the caller's timeout is shorter."""
 
 
 def ros_topic(topic: str) -> str:
-    """Return `topic` if it is a valid ROS name. Raises `BadTopicError`."""
+    """Validate a topic as a ROS name and return it. Raises `BadTopicError`."""
     if not _TOPIC.fullmatch(topic) or "//" in topic or topic.endswith(("/", "~")):
         raise BadTopicError(
             topic,
@@ -52,9 +53,9 @@ def ros_topic(topic: str) -> str:
 
 
 class RosShutdownError(ClosedError):
-    """rospy was shut down.
+    """Error of operations after rospy was shut down.
 
-    Causes are the program itself, 'rosnode kill', or a new node with the same name.
+    rospy is shut down by the program itself, by 'rosnode kill', or by a new node with the same name.
     """
 
     def __init__(self) -> None:
@@ -67,7 +68,7 @@ class RosShutdownError(ClosedError):
 
 
 class RosProcess:
-    """The process's ROS node. Thread-safe."""
+    """ROS node of this process. Thread-safe."""
 
     def __init__(self, rospy: Any, address: str) -> None:  # noqa: ANN401 - rospy is not typed
         self.rospy = rospy
@@ -93,7 +94,7 @@ class RosProcess:
 
     @property
     def is_shut_down(self) -> bool:
-        """True after rospy was shut down; messages are no longer sent or received."""
+        """True after rospy was shut down; messages are then no longer sent or received."""
         return bool(self.rospy.core.is_shutdown_requested())
 
     def shut_down(self) -> None:
@@ -136,9 +137,16 @@ class RosProcess:
     # ---- publishers
 
     def advertise(self, topic: str, definition: Definition, *, is_latched: bool, queue: int) -> Any:  # noqa: ANN401 - rospy is not typed
-        """Create and return rospy's publisher on a topic (full name).
+        """Create a publisher of rospy and return it.
 
-        Raises `NepError` if the process already publishes another type on the topic.
+        Args:
+            topic: Full name of the topic.
+            definition: Message type.
+            is_latched: True to latch the newest message.
+            queue: Queue length per connection in messages.
+
+        Raises:
+            NepError: The process already publishes another type on the topic.
         """
         with self._lock:
             impl = self.rospy.impl.registration.get_topic_manager().get_publisher_impl(topic)
@@ -161,20 +169,20 @@ class RosProcess:
         return made
 
     def add_publisher(self, topic: str, id_: int, publisher: Any) -> None:  # noqa: ANN401 - rospy is not typed
-        """Add a nep publisher that uses the publisher returned by `advertise`."""
+        """Register a nep publisher that uses the rospy publisher returned by `advertise`."""
         with self._lock:
             self._published.setdefault(topic, {})[id_] = publisher
 
     def remove_publisher(self, topic: str, id_: int) -> None:
-        """Remove a closed publisher."""
+        """Remove a closed publisher that `add_publisher` registered."""
         with self._lock:
             self._published.get(topic, {}).pop(id_, None)
 
     def own_publisher_id(self, topic: str) -> int | None:
-        """Return the id of this process's publisher on a topic, or None if it is ambiguous.
+        """Return the id of this process's publisher on a topic; None if there isn't exactly one.
 
-        ROS reports only the process that a message came from. The publisher is ambiguous if there are
-        several, or if the program has publishers of its own.
+        ROS reports only the process that sent a message. The publisher is therefore unknown if nep nodes
+        have several publishers on the topic, or if the program itself also publishes on it.
         """
         with self._lock:
             found = self._published.get(topic, {})
@@ -185,7 +193,7 @@ class RosProcess:
             return id_ if impl is not None and impl.ref_count == 1 else None
 
     def unadvertise(self, topic: str, publisher: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
-        """Unregister a publisher."""
+        """Unregister a publisher returned by `advertise`, within `timeout_s` seconds."""
         if self.is_shut_down or not run_with_timeout(publisher.unregister, timeout_s):
             return  # rospy still has the topic
         with self._lock:
@@ -195,12 +203,17 @@ class RosProcess:
                 del self._types[topic]
 
     def unsubscribe(self, subscriber: Any, timeout_s: float) -> None:  # noqa: ANN401 - rospy is not typed
-        """Unregister a subscriber."""
+        """Unregister a subscriber of rospy, within `timeout_s` seconds."""
         if not self.is_shut_down:
             run_with_timeout(subscriber.unregister, timeout_s)
 
     def wait_until_sent(self, publisher: Any, deadline: float) -> int:  # noqa: ANN401 - rospy is not typed
-        """Wait until rospy has sent its queues; return the number of connections with unsent messages."""
+        """Wait until rospy has sent its queues; return the number of connections with unsent messages.
+
+        Args:
+            publisher: Publisher returned by `advertise`.
+            deadline: Time (`time.monotonic`) at which to stop waiting.
+        """
         impl = publisher.impl
         pause = threading.Event()
         while True:
@@ -210,9 +223,16 @@ class RosProcess:
             pause.wait(_POLL_S)
 
     def send(self, publisher: Any, definition: Definition, topic: str, body: bytes, room: QueueLimit) -> int:  # noqa: ANN401
-        """Publish a message body and return the number of older messages that were dropped from full queues.
+        """Publish a message body; return the number of older messages dropped from full queues.
 
         The header gets the next sequence number of its topic, as rospy would assign it.
+
+        Args:
+            publisher: Publisher returned by `advertise`.
+            definition: Message type.
+            topic: Full name of the topic.
+            body: Encoded message.
+            room: Limit in bytes for the publisher's queues.
         """
         message = self._message_class(definition)()
         impl = publisher.impl
@@ -252,7 +272,16 @@ class RosProcess:
     # ---- services
 
     def create_server(self, service: str, kind: type, handler: Callable[[Any], Any]) -> Any:  # noqa: ANN401 - rospy is not typed
-        """Create rospy's server for a service (full name). Raises `NepError` if the process has one."""
+        """Create a server of rospy and return it.
+
+        Args:
+            service: Full name of the service.
+            kind: Service class of rospy.
+            handler: Called with each request; returns the response.
+
+        Raises:
+            NepError: The process already serves the service.
+        """
         with self._lock:
             if self.rospy.impl.registration.get_service_manager().get_service(service) is not None:
                 raise NepError(
@@ -280,15 +309,16 @@ class RosProcess:
         return () if impl is None else tuple(str(each.endpoint_id) for each in impl.connections)
 
     def wait_for_subscribers(self, publisher: Any, topic: str, timeout_s: float) -> None:  # noqa: ANN401
-        """Wait up to `timeout_s` seconds until all registered subscribers are connected."""
+        """Wait up to `timeout_s` seconds until all registered subscribers of a publisher are connected."""
         expected = set(self.master.names(topic, _REQUEST_TIMEOUT_S)[1])
         with self.changed:
             self.changed.wait_for(lambda: expected <= set(self.connected_nodes(publisher)), timeout_s)
 
     def wait_for_publishers(self, topic: str, timeout_s: float) -> None:
-        """Wait until all publishers of a topic report a connection to this node.
+        """Wait up to `timeout_s` seconds until all publishers of a topic report a connection to this node.
 
-        rospy itself lists a connection before it is established.
+        rospy's own list of connections isn't used, because it contains connections that aren't established
+        yet.
         """
         deadline = time.monotonic() + timeout_s
         pause = threading.Event()
@@ -309,7 +339,7 @@ class RosProcess:
 
 
 def run_with_timeout(call: Callable[[], object], timeout_s: float) -> bool:
-    """Run `call` in a thread and wait for it; return False on timeout.
+    """Run `call` in a thread and wait up to `timeout_s` seconds for its end; return False on timeout.
 
     Needed because rospy's requests to a master have no timeout.
     """
@@ -345,7 +375,12 @@ call_in_child(_forked)
 
 
 def get_process(address: str, name: str, wait_s: float | None) -> RosProcess:
-    """Return the process's ROS node. If there is none, start it under the name `name`.
+    """Return the process's ROS node; start it as `name` if there is none.
+
+    Args:
+        address: Address of the ROS master.
+        name: Name for a new ROS node.
+        wait_s: Seconds to wait for the master; None waits forever.
 
     Raises:
         MasterUnreachable: The ROS master didn't reply within `wait_s` seconds.

@@ -7,7 +7,7 @@ from typing import Any
 from nep.messages.queue import MAX_BYTES
 
 _MEASURE_INTERVAL_BYTES = 8 * 2**20
-"""Published bytes after which the queues are measured; measuring them for each message would be slow."""
+"""Number of published bytes between measurements of the queues, which are slow."""
 
 
 class QueueLimit:
@@ -18,7 +18,14 @@ class QueueLimit:
         self._unmeasured = 0
 
     def make_room(self, connections: list[Any], size: int) -> int:
-        """Drop the oldest messages until `size` bytes fit; return the number of dropped messages."""
+        """Make room for a message in the queues; return the number of dropped messages.
+
+        The oldest messages are dropped.
+
+        Args:
+            connections: rospy's connections of the publisher.
+            size: Size of the new message in bytes.
+        """
         self._unmeasured += size
         is_measured = self._unmeasured >= min(_MEASURE_INTERVAL_BYTES, self._max_bytes)
         if is_measured:

@@ -1,4 +1,4 @@
-"""RosClient: calls a ROS service. Each call has its own connection and thread."""
+"""Client for ROS services. Each call has its own connection and thread."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Call:
 
 
 class RosClient(ClientCalls[_Call]):
-    """Client and its calls in flight."""
+    """Client with its calls in flight."""
 
     def __init__(self, process: RosProcess, spec: ClientSpec, forget: Callable[[RosClient], None]) -> None:
         super().__init__(spec)
@@ -57,7 +57,7 @@ class RosClient(ClientCalls[_Call]):
 
     @property
     def is_connected(self) -> bool:
-        """True if the master knows a server."""
+        """True if the master lists a server."""
         return not self.is_closed and bool(
             self.process.master.service_uri(self.service, _CONNECTED_TIMEOUT_S)
         )
@@ -65,7 +65,7 @@ class RosClient(ClientCalls[_Call]):
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> OpenCall:
-        """Send a call. See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.start_call`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -208,7 +208,7 @@ class RosClient(ClientCalls[_Call]):
         return SubscriberCount(self.spec.id, self._answered, self._failed)
 
     def close(self, timeout_s: float = _REQUEST_TIMEOUT_S) -> None:
-        """Unregister the client; calls in flight fail with `ClosedError`."""
+        """Unregister the client; calls in flight fail with `ClosedError`. Waits up to `timeout_s` seconds."""
         with self._lock:
             if self.is_closed:
                 return

@@ -1,4 +1,4 @@
-"""ServiceConnection: a single call of a ROS service over TCP. rospy's own implementation has no timeout."""
+"""Single call of a ROS service over TCP, with a timeout, which rospy's own implementation lacks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ _LENGTH = struct.Struct("<I")
 _HEADER_MAX_BYTES = 2**20
 _HANDSHAKE_TIMEOUT_S = 5.0
 _HANDSHAKES_MAX = 3
-"""Limit of concurrent handshakes with one server: rospy's backlog is five; others are delayed for seconds."""
+"""Maximum number of concurrent handshakes with one server.
+
+rospy's listen backlog is five; further connections would be delayed for seconds.
+"""
 _CHECK_INTERVAL_S = 0.1
 
 
@@ -28,7 +31,7 @@ class ServiceConnectionError(OSError):
 
 
 class HandshakeLimiter:
-    """Limits the concurrent handshakes with each server. Thread-safe."""
+    """Limiter of the concurrent handshakes with each server. Thread-safe."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition(threading.Lock())
@@ -36,7 +39,17 @@ class HandshakeLimiter:
 
     @contextlib.contextmanager
     def acquire(self, uri: str, is_over: Callable[[], bool], deadline: float) -> Iterator[None]:
-        """Hold a handshake; wait for a free one. Raises `TimeoutError`, `ServiceConnectionError`."""
+        """Wait until a handshake with a server may start, and count it within the context.
+
+        Args:
+            uri: Address of the server.
+            is_over: Returns True if the call has been cancelled.
+            deadline: Time (`time.monotonic`) at which to stop waiting.
+
+        Raises:
+            TimeoutError: The deadline has passed.
+            ServiceConnectionError: The call was cancelled.
+        """
         with self._changed:
             while self._counts[uri] >= _HANDSHAKES_MAX:
                 left = deadline - time.monotonic()
@@ -57,9 +70,15 @@ class HandshakeLimiter:
 
 
 class ServiceConnection:
-    """Connection to the server at `uri`, made within 5 seconds.
+    """Connection to a ROS service, which is opened by the constructor within 5 seconds.
 
-    All methods raise `TimeoutError` at `deadline`, or `OSError` if the connection fails.
+    The constructor and `call` raise `TimeoutError` at the deadline, and `OSError` if the connection fails.
+
+    Args:
+        uri: Address of the server.
+        service: Name of the service.
+        caller: Name of this process's ROS node.
+        deadline: Time (`time.monotonic`) at which the call times out.
     """
 
     def __init__(self, uri: str, service: str, caller: str, deadline: float) -> None:
@@ -135,10 +154,10 @@ class ServiceConnection:
         self._socket.settimeout(left)
 
     def interrupt(self) -> None:
-        """Interrupt the thread that uses the connection. Thread-safe."""
+        """Interrupt the thread that is using the connection. Thread-safe."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def close(self) -> None:
-        """Close the connection. Call it in the thread that uses the connection."""
+        """Close the connection. Call in the thread that uses the connection."""
         self._socket.close()

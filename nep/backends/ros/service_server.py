@@ -1,4 +1,4 @@
-"""RosServer: serves a ROS service. Each connection has a thread of rospy that waits for the reply."""
+"""Server for a ROS service. Each connection has a thread of rospy that waits for the reply."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ class RosServer:
                 self._rospy_service.shutdown()
 
     def close(self, timeout_s: float) -> None:
-        """Close the server; replies are still sent for up to `timeout_s` seconds."""
+        """Close the server; pending replies are sent for up to `timeout_s` seconds."""
         deadline = time.monotonic() + timeout_s
         self.begin_close()
         if self._unregistering is not None:

@@ -1,4 +1,4 @@
-"""ROS service types: installed ones, and `nep_msgs/Call` for calls between nep nodes."""
+"""ROS service types: the installed types, and `nep_msgs/Call` for calls between nep nodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _types: dict[str, ServiceType] = {}
 
 @dataclass(frozen=True)
 class ServiceType(TypedService):
-    """Service type with its MD5 sum."""
+    """Service type with the MD5 sum of its definition."""
 
     md5sum: str = ""
 
@@ -34,7 +34,10 @@ NEP_CALL = ServiceType(
 
 
 def installed_service(name: str) -> ServiceType:
-    """Return an installed service type, or `nep_msgs/Call`. Raises `NepError` with the package to install."""
+    """Return an installed service type, or `nep_msgs/Call`.
+
+    Raises `NepError`, whose message names the package to install.
+    """
     if name == NEP_CALL.name:
         return NEP_CALL
     if name not in _types:
@@ -49,7 +52,10 @@ def installed_service(name: str) -> ServiceType:
 
 
 def service_type_for(msg_type: str) -> ServiceType:
-    """Return the service type that serves a server's `msg_type`. Raises `NepError`."""
+    """Return the ROS service type for the `msg_type` of a server. Raises `NepError` for other types.
+
+    "json" and "msgpack" select `nep_msgs/Call`.
+    """
     if is_ros_type(msg_type):
         return installed_service(msg_type)
     if msg_type not in {"json", "msgpack"}:

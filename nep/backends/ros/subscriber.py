@@ -1,4 +1,4 @@
-"""RospySubscriber: queues messages received by rospy; the reader decodes them."""
+"""Subscriber over rospy. Messages are queued as received and decoded when they are read."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _MAX_SOURCES = 1_000
 
 
 class RospyOwner(Protocol):
-    """Transport that a subscriber belongs to."""
+    """Interface of the transport to its subscribers."""
 
     changed: threading.Condition
 
     def wait(self, subscribers: Any, timeout_s: float) -> None:  # noqa: ANN401 - see `Transport.wait`
-        """Wait for a message."""
+        """Wait up to `timeout_s` seconds for a message in `subscribers`."""
 
     def wake(self) -> None:
         """End all waits in progress."""
@@ -69,7 +69,7 @@ def _bytes_of(message: Any) -> bytes:  # noqa: ANN401 - rospy is not typed
 
 
 class RospySubscriber(WakingSubscriber):
-    """Subscriber that accepts messages of any ROS type, so that a wrong type can be reported as a problem."""
+    """Subscriber that accepts messages of any ROS type, so that it can report a wrong type."""
 
     def __init__(self, owner: RospyOwner, process: RosProcess, spec: SubscriberSpec, max_bytes: int) -> None:
         if is_ros_type(spec.msg_type):
@@ -203,7 +203,10 @@ class RospySubscriber(WakingSubscriber):
         return self.is_closed or self.process.is_shut_down or len(self.inbox) > 0
 
     def poll(self) -> Message | None:
-        """Return the next message, or None. Raises `RosShutdownError` after rospy was shut down."""
+        """Return the next message, or None if there is none.
+
+        Raises `RosShutdownError` after rospy was shut down.
+        """
         with self._owner.changed:
             message = None if self.is_closed else self.inbox.pop()
         if message is None and self.process.is_shut_down and not self.is_closed:
@@ -211,12 +214,12 @@ class RospySubscriber(WakingSubscriber):
         return message
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
         self._owner.wait((self,), timeout_s)
         return self.poll()
 
     def take_batch(self, most_bytes: int) -> list[Message]:
-        """Remove and return the messages for one call of the sink."""
+        """Remove and return up to `most_bytes` of messages for one call of the sink."""
         with self._owner.changed:
             return self.inbox.pop_all(most_bytes)
 
@@ -229,7 +232,7 @@ class RospySubscriber(WakingSubscriber):
         self.is_closed = True
 
     def close(self, timeout_s: float = 2.0) -> None:
-        """Unregister and discard unread messages."""
+        """Unregister within `timeout_s` seconds and discard unread messages."""
         with self._owner.changed:
             if self.is_closed:
                 return

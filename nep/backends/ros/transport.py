@@ -30,9 +30,12 @@ from nep.protocol.requests import NodeRecord, PublisherCount, SubscriberCount
 _logger = logging.getLogger("nep")
 _QUEUE_LENGTHS = {"image": 64, "bytes": 1000, "ros": 1000}
 _DEFAULT_QUEUE_LENGTH = 10_000
-"""Queue length per connection in messages; rospy silently drops the oldest message of a full queue."""
+"""Queue length per connection in messages. A full queue silently drops its oldest message."""
 _BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch. The inbox is smaller by this size, so that both stay within the bound."""
+"""Maximum size of a sink's batch in bytes, which is subtracted from the inbox's limit.
+
+The inbox and a batch together thus stay within the subscriber's `max_bytes`.
+"""
 _BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
@@ -45,7 +48,8 @@ def _master_address(configuration: Configuration) -> str:
 class RospyPublisher:
     """Publisher over rospy.
 
-    `count` is the number of this publisher's messages, whereas seq in a ROS header counts all of its topic.
+    `count` counts the messages of this publisher. seq in a ROS header counts all messages that the process
+    publishes on the topic.
     """
 
     def __init__(self, transport: RospyTransport, process: RosProcess, spec: PublisherSpec) -> None:
@@ -70,25 +74,29 @@ class RospyPublisher:
 
     @property
     def ros_type(self) -> str:
-        """ROS message type."""
+        """ROS message type of the published messages."""
         return self._definition.name
 
     @property
     def subscribers(self) -> int:
-        """Number of connected ROS nodes. This process counts with the number of its subscribers."""
+        """Number of subscribers: one per connected ROS node, and each subscriber of this process."""
         connected_nodes = () if self._is_closed else self.process.connected_nodes(self._publisher)
         own = max(1, self.process.subscribed[self.topic]) if self.process.name in connected_nodes else 0
         return sum(each != self.process.name for each in connected_nodes) + own
 
     @property
     def has_subscribers(self) -> bool:
-        """True if any node is connected, and after rospy was shut down, so that `send` raises the error."""
+        """True if any node is connected.
+
+        Also True after rospy was shut down, so that the next message is passed to `send`, which raises the
+        error.
+        """
         impl = self._publisher.impl
         return (impl is not None and bool(impl.connections)) or self.process.is_shut_down
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of registered subscribers that aren't connected."""
+        """Names of nodes whose subscribers are registered but not connected."""
         try:
             registered = self.process.master.names(self.topic, HANDSHAKE_TIMEOUT_S)[1]
         except RosMasterUnreachable:
@@ -111,9 +119,9 @@ class RospyPublisher:
         self.problem = problem
 
     def send(self, encoded: Encoded) -> None:
-        """Add a message to the queue of each connection. Raises as `to_ros` does, and `ClosedError`.
+        """Add a message to the queue of each connection. Full queues drop their oldest messages.
 
-        Full queues drop their oldest messages, which are counted.
+        Raises `ClosedError`, and the same errors as `to_ros`.
         """
         body = to_ros(self._definition.name, self.spec.codec.name, encoded)
         with self._lock:
@@ -176,7 +184,7 @@ class RospyTransport:
         _transports.add(self)
 
     def create_publisher(self, spec: PublisherSpec) -> RospyPublisher:
-        """Create a publisher and wait up to `HANDSHAKE_S` for the registered subscribers to connect."""
+        """Create a publisher; wait up to `HANDSHAKE_TIMEOUT_S` for registered subscribers to connect."""
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
         publisher = RospyPublisher(self, process, spec)
         with self._lock:
@@ -190,7 +198,7 @@ class RospyTransport:
         return publisher
 
     def create_subscriber(self, spec: SubscriberSpec) -> RospySubscriber:
-        """Create a subscriber and wait up to `HANDSHAKE_S` for the registered publishers to connect."""
+        """Create a subscriber; wait up to `HANDSHAKE_TIMEOUT_S` for registered publishers to connect."""
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
         batch = 0 if spec.sink is None else _BATCH_BYTES
         subscriber = RospySubscriber(self, process, spec, spec.max_bytes - batch)
@@ -222,7 +230,10 @@ class RospyTransport:
     # ---- services
 
     def create_server(self, spec: ServerSpec) -> RosServer:
-        """Create a server. Raises as `publisher` does, and `NepError` for a type that isn't installed."""
+        """Create a server.
+
+        Raises the same errors as `publisher`, and `NepError` for a type that isn't installed.
+        """
         process = get_process(_master_address(spec.configuration), self.node.name, spec.wait_s)
         server = RosServer(process, spec, self.discard)
         with self._lock:
@@ -250,9 +261,9 @@ class RospyTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in `subscribers`, a call in `calls`, or `wake`.
+        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`.
 
-        Raises `RosShutdownError` for servers after rospy was shut down.
+        Raises `RosShutdownError` if the node has servers and rospy was shut down.
         """
         own_subscribers = [each for each in subscribers if isinstance(each, RospySubscriber)]
         before = self._wakes
@@ -274,7 +285,7 @@ class RospyTransport:
             self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:
-        """Return the graph known to the ROS master. Raises `MasterUnreachable`."""
+        """Return the graph of the ROS network. Raises `MasterUnreachable`."""
         address = _master_address(configuration)
         known = RosMaster(address).nodes(timeout_s)
         # of the same class
@@ -282,7 +293,7 @@ class RospyTransport:
         return graph_view(known, own)
 
     def own_node(self, address: str) -> OwnNode:
-        """Return this node's entry for the graph, with its statistics."""
+        """Return this node's publishers, subscribers and services at the ROS master at `address`."""
         outs: list[RospyPublisher] = [
             each for each in self._publishers if each.process.master.address == address
         ]
@@ -309,7 +320,7 @@ class RospyTransport:
         )
 
     def begin_close(self) -> None:
-        """Reject queued calls. Messages are flushed by `close`."""
+        """Reject queued calls. `close` flushes the messages."""
         for server in self._servers:
             server.begin_close()
 

@@ -1,7 +1,10 @@
 """Back end `ros2`: nep nodes as ROS 2 nodes, over Cyclone DDS and rosbags. Needs no ROS installation.
 
-`names`, `message_types`, `fields` and `type_mapping` convert names and values; `participant` represents this
-process in DDS; `publisher`, `subscriber`, `graph` and `transport` implement `nep.backends.base`.
+Modules:
+
+- `names`, `message_types`, `fields`, `type_mapping`: conversion of names and values
+- `participant`: this process in a DDS domain
+- `publisher`, `subscriber`, `graph`, `transport`: implementation of `nep.backends.base`
 """
 
 from nep.backends.base import Backend

@@ -1,4 +1,4 @@
-"""Conversion between maps and rosbags' message objects. Errors contain the field path."""
+"""Conversion between maps and the message objects of rosbags. Errors contain the field path."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class RosField:
         name: Name of the field.
         kind: Type of the value, or of the items of an array or sequence.
         is_message: True if `kind` is a message type.
-        length: Number of items of an array, -1 for a sequence, None for a single value.
-        size: Maximum number of items of a sequence; 0 is unlimited.
-        max_text_bytes: Maximum size of each string in bytes; 0 is unlimited.
+        length: Number of items of an array; -1 for a sequence, None for a single value.
+        size: Maximum number of items of a sequence; 0 means unlimited.
+        max_text_bytes: Maximum size of each string in bytes; 0 means unlimited.
     """
 
     name: str
@@ -66,11 +66,14 @@ class TypeRegistry(Protocol):
         """Return the fields of a type."""
 
     def message_class(self, name: str) -> Any:  # noqa: ANN401 - created by rosbags
-        """Return rosbags' class of a type."""
+        """Return the message class that rosbags creates for a type."""
 
 
 def read_definition(entries: Sequence[tuple[str, Any]]) -> tuple[list[tuple[str, Any]], tuple[RosField, ...]]:
-    """Convert rosbags' description of a type; `char` becomes `uint8`.
+    """Convert a type description of rosbags. The type `char` becomes `uint8`.
+
+    Args:
+        entries: Name and type of each field, as in rosbags.
 
     Returns:
         The converted description, and the fields.
@@ -101,7 +104,17 @@ def _field(name: str, described: Any) -> RosField:  # noqa: ANN401 - nested pair
 
 
 def to_message(types: TypeRegistry, name: str, payload: object, path: str = "") -> Any:  # noqa: ANN401 - not typed
-    """Convert a map to a message object; missing fields are zero. Raises `RosFieldError`."""
+    """Convert a map to a message object of rosbags; missing fields are zero, empty or False.
+
+    Args:
+        types: Registry of message types.
+        name: Name of the type.
+        payload: Map to convert.
+        path: Field path of `payload`, for error messages.
+
+    Raises:
+        RosFieldError: A value is invalid.
+    """
     if not isinstance(payload, Mapping):
         raise (
             RosFieldError(
@@ -296,7 +309,7 @@ def _type_name(value: object) -> str:
 
 
 def from_message(types: TypeRegistry, name: str, message: Any) -> dict[str, object]:  # noqa: ANN401 - not typed
-    """Convert a message object to maps, lists, `bytes`, numbers and strings."""
+    """Convert a message object of rosbags to a map of maps, lists, `bytes`, numbers and strings."""
     return {
         each.name: _to_plain(types, each, getattr(message, each.name))
         for each in types.fields(name)

@@ -1,8 +1,8 @@
 """Graph of a domain, built from DDS discovery.
 
-Nodes of this program are listed with statistics and problems. For others, DDS discovery provides names,
-topics, types and owners, but no rates. Writers and readers that belong to no ROS 2 node, such as those of
-plain DDS programs, are listed under a node named after their participant.
+Nodes of this program are listed with statistics and problems. For other nodes, DDS discovery provides
+names, topics, types and owners, but no rates. Writers and readers outside a ROS 2 node, such as those
+of plain DDS programs, are listed under a node named after their participant.
 """
 
 from __future__ import annotations

@@ -22,11 +22,14 @@ _FD_FOLDER = "/proc/self/fd"
 _PORTS, _PORTS_OF_A_DOMAIN = 7400, 250
 """Base port of domain 0, and number of ports per domain, as the DDS wire protocol (RTPS) specifies."""
 _inherited_libraries: set[str] = set()
-"""Names of libraries that were in use before a fork. In the child process their threads don't exist."""
+"""Names of libraries that were in use in the parent process before a fork.
+
+They can't be used in the child process, because their threads don't exist there.
+"""
 
 
 class Dds(NamedTuple):
-    """Modules of cyclonedds. They have no type annotations."""
+    """Modules of cyclonedds, which have no type annotations."""
 
     core: Any
     domain: Any
@@ -59,7 +62,7 @@ def load_dds(load: Callable[[str], ModuleType] = importlib.import_module) -> Dds
 
 
 def load_typesys(load: Callable[[str], ModuleType] = importlib.import_module) -> Any:  # noqa: ANN401 - see `Dds`
-    """Return `rosbags.typesys`. Raises `BackendUnavailableError` if it is not installed."""
+    """Load and return `rosbags.typesys`. Raises `BackendUnavailableError` if rosbags is not installed."""
     try:
         return load("rosbags.typesys")
     except (ImportError, OSError) as error:
@@ -79,7 +82,7 @@ def _unavailable_error() -> BackendUnavailableError:
 def restrict_to_loopback(domain: int) -> None:
     """Restrict the receiving sockets of a domain to the loopback interface. Linux only.
 
-    Needed because Cyclone DDS always binds them to all addresses.
+    Needed because Cyclone DDS always binds its sockets to all addresses.
     """
     if not sys.platform.startswith("linux"):
         return

@@ -1,8 +1,8 @@
-"""Matches: nep programs tell each other which writers and readers they have matched.
+"""Exchange of discovery matches between nep programs.
 
-A DDS writer's messages reach a reader only after the reader's program has discovered the writer, which DDS
-doesn't report to the writer. Each program therefore publishes its matches on a topic hidden from ROS 2: the
-GUID of its participant, followed by pairs of GUIDs: its own endpoint and the match.
+A DDS writer's messages reach a reader only after the reader's program has discovered the writer, which
+DDS doesn't report to the writer. Each program therefore publishes its matches on a topic hidden from
+ROS 2: the GUID of its participant, followed by pairs of GUIDs (own endpoint, matched endpoint).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MAX_PAIRS, _MAX_PARTICIPANTS = 100_000, 4096
 
 
 def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds is not typed
-    """Return the GUIDs that a writer or reader has matched."""
+    """Return the GUIDs of the endpoints that a writer or reader is matched with."""
     if hasattr(entity, "get_matched_subscriptions"):
         handles, get_data = entity.get_matched_subscriptions(), entity.get_matched_subscription_data
     else:
@@ -32,7 +32,7 @@ def matched_gids(entity: Any) -> frozenset[bytes]:  # noqa: ANN401 - cyclonedds 
 
 
 class Matches:
-    """Matches of all programs; see the module docstring. Guarded by the participant's lock."""
+    """Matches of all nep programs. See the module docstring. Guarded by the participant's lock."""
 
     def __init__(self, library: Dds, types: MessageTypes, topics: DdsTopics, gid: bytes) -> None:
         self._types = types
@@ -63,7 +63,7 @@ class Matches:
         self._has_changes = True
 
     def publish_changes(self) -> None:
-        """Publish the matches of this program if they have changed."""
+        """Publish the matches of this program if they have changed since the last call."""
         for gid, entity in self._followed.items():
             if entity.take_status():
                 found = matched_gids(entity)
@@ -82,7 +82,7 @@ class Matches:
         return gid[:PREFIX_BYTES] == self._gid[:PREFIX_BYTES]
 
     def process(self, cdr: bytes) -> None:
-        """Process the matches of another program; malformed data is ignored."""
+        """Store the matches that another program published. Malformed data is ignored."""
         try:
             decoded = self._types.decode(_TYPE, cdr)
         except DecodeError:
@@ -105,20 +105,24 @@ class Matches:
         )
 
     def is_confirmed(self, own: bytes, other: bytes, participant: bytes) -> bool:
-        """Return True if a program has reported that its endpoint `other` is matched with our endpoint `own`.
+        """Return True if another program has reported a match of its endpoint with one of ours.
 
-        `participant` is the GUID of that program's participant.
+        Args:
+            own: GUID of our endpoint.
+            other: GUID of the other program's endpoint. Endpoints of this program count as confirmed.
+            participant: GUID of the other program's participant.
         """
         return self._is_own(other) or (other, own) in self._confirmed.get(participant, ())
 
     def unmatched_gids(
         self, entities: Iterable[Any], known: Iterable[tuple[bytes, bytes, bool]]
     ) -> set[bytes]:
-        """Return the GUIDs in `known` that aren't matched on both sides.
+        """Return the GUIDs of the known endpoints that aren't matched on both sides.
 
         Args:
             entities: Writers or readers of this program.
-            known: GUID of an endpoint, GUID of its participant, and True if its program reports its matches.
+            known: For each endpoint its GUID, the GUID of its participant, and True if its program
+                publishes its matches.
         """
         found = [(each.guid.bytes, matched_gids(each)) for each in entities]
         return {

@@ -1,7 +1,7 @@
-"""ROS 2 message types: their definitions, and conversion between maps and CDR by rosbags.
+"""ROS 2 message types: definitions, and conversion between maps and CDR by rosbags.
 
-rosbags includes the common packages of each ROS 2 release. `MessageTypes.add` adds a type from the text of a
-.msg file, `MessageTypes.add_folder` adds a folder of .msg files.
+rosbags includes the common packages of each ROS 2 release. `MessageTypes.add` adds a type from the text
+of a .msg file, `MessageTypes.add_folder` adds a folder of .msg files.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from nep.errors import DecodeError, EncodeError, NepError, did_you_mean
 from nep.i18n import _
 
 FOLDERS_VARIABLE = "NEP_ROS_MSG_PATH"
-"""Environment variable that lists folders of .msg files."""
+"""Name of the environment variable that lists folders of .msg files."""
 _MAX_FILE_BYTES = 2**20
 _MAX_FILES = 10_000
 _WIDE_STRING = "wstring"
@@ -74,7 +74,7 @@ class MessageTypes:
         return self._fields[_GID_TYPE][0].size if _GID_TYPE in self._fields else 24
 
     def checked(self, msg_type: str) -> str:
-        """Return the full name of a type. Raises `NepError` if the type is unknown."""
+        """Validate a message type and return its full name. Raises `NepError` if the type is unknown."""
         name = type_name(msg_type)
         if name in self._left_out and name not in self._fields:
             raise self._left_out[name]
@@ -109,7 +109,7 @@ class MessageTypes:
             raise EncodeError(name, kind, str(error) or type(error).__name__) from error
 
     def decode(self, name: str, data: bytes | memoryview) -> object:
-        """Decode CDR to a map; arrays of `uint8` become `bytes`, others lists. Raises `DecodeError`."""
+        """Decode CDR to a map. Arrays of `uint8` become `bytes`, other arrays lists. Raises `DecodeError`."""
         try:
             with self._lock:
                 message = self._store.deserialize_cdr(data, name)
@@ -118,14 +118,14 @@ class MessageTypes:
         return from_message(self, name, message)
 
     def message_class(self, name: str) -> Any:  # noqa: ANN401 - created by rosbags
-        """Return rosbags' class of a type."""
+        """Return the message class that rosbags creates for a type."""
         return self._store.types[name]
 
     def add(self, name: str, text: str) -> None:
         """Add a type such as "my_robot/msg/Arm" from the text of its .msg file.
 
-        Raises `NepError` if the text is invalid, uses unknown types, or differs from a known type of this
-        name.
+        Raises `NepError` if the text is invalid, uses unknown types, or differs from a known type with the
+        same name.
         """
         for wrong in self._add({type_name(name): text}).values():
             raise wrong
@@ -133,7 +133,7 @@ class MessageTypes:
     def add_part(self, name: str, text: str) -> None:
         """Add the request or response type of a service, such as "std_srvs/srv/SetBool_Request".
 
-        Raises `NepError` as `add` does.
+        Raises the same errors as `add`.
         """
         package, _srv, last = name.split("/")
         alike = f"{package}/msg/{last}"  # lets rosbags resolve the package's own messages
@@ -162,8 +162,8 @@ class MessageTypes:
     def add_folder(self, folder: Path) -> None:
         """Add all .msg files of a folder, such as `my_robot/msg/Arm.msg`.
 
-        The package of a file outside a `msg` folder is the name of its folder. An error in a file is reported
-        when its type is used. Raises as `add` does if no file is valid.
+        The package of a file outside a `msg` folder is the name of its folder. An error in a file is
+        reported when its type is used. Raises `NepError` if no file is valid.
         """
         texts: dict[str, str] = {}
         for path in sorted(folder.rglob("*.msg")):
@@ -254,9 +254,9 @@ _types_lock = threading.Lock()
 
 
 def message_types() -> MessageTypes:
-    """Return the types of the release in $ROS_DISTRO, with those of the folders in $NEP_ROS_MSG_PATH.
+    """Return the message types of the release in $ROS_DISTRO and of the folders in $NEP_ROS_MSG_PATH.
 
-    Raises `BackendUnavailableError`, and `NepError` as `MessageTypes.add_folder` does.
+    Raises `BackendUnavailableError`, and `NepError` if a folder has no valid file.
     """
     release = distribution(os.environ)
     with _types_lock:

@@ -1,6 +1,6 @@
-"""Alerts for writers and readers of a topic that DDS doesn't match because their type or QoS differs.
+"""Alerts for writers and readers that DDS doesn't match because their types or QoS differ.
 
-DDS itself reports this only in the program's log, if at all.
+DDS itself reports such mismatches only in the program's log, if at all.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from nep.protocol.graph_view import Alert
 _MAX_NAMES = 3
 """Maximum number of node names in an alert."""
 _MAX_ENDPOINTS = 100
-"""Maximum number of writers, and of readers, that are compared per topic."""
+"""Maximum number of writers, and maximum number of readers, that are compared per topic."""
 
 
 @dataclass(frozen=True)
 class NodeEndpoint:
-    """Writer or reader with the name of its node."""
+    """Writer or reader, with the name of its node."""
 
     node: str
     endpoint: DdsEndpoint

@@ -1,4 +1,4 @@
-"""Names in ROS 2 and DDS: topics, types, services, and entries of USER_DATA."""
+"""Names in ROS 2 and DDS: topics, types, services and USER_DATA entries."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ _TOPIC = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)(/msg)?/([A-Z]\w*)", re.ASCII)
 _DDS_TYPE = re.compile(r"(\w+)::msg::dds_::(\w+)_", re.ASCII)
 _PARAMETER_TOPIC = re.compile(r"(/?nep/parameters/)(\d[0-9a-f]{15})", re.ASCII)
-"""Parameter topics of nodes whose id starts with a digit. ROS 2 doesn't allow a digit after "/"."""
+"""Pattern for nep's parameter topics of nodes whose id starts with a digit.
+
+Such names need an escape, because ROS 2 allows no digit after "/".
+"""
 _ROS_PARAMETER_TOPIC = re.compile(r"(/nep/parameters/)_(\d[0-9a-f]{15})", re.ASCII)
 _SERVICE_TYPE = re.compile(r"([A-Za-z]\w*)(/srv)?/([A-Z]\w*)", re.ASCII)
 _DDS_REQUEST = re.compile(r"(\w+)::srv::dds_::(\w+)_Request_", re.ASCII)
@@ -22,7 +25,7 @@ _INVALID_CHARACTERS = re.compile(r"\W", re.ASCII)
 
 
 def dds_topic(topic: str) -> str:
-    """Return the DDS topic of a topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
+    """Return the DDS name of a topic: `rt/chatter` for "chatter" and "/chatter". Raises `BadTopicError`."""
     found = _PARAMETER_TOPIC.fullmatch(topic)
     if found is not None:
         topic = f"{found[1]}_{found[2]}"
@@ -38,7 +41,7 @@ def dds_topic(topic: str) -> str:
 
 
 def ros_topic(topic: str) -> str | None:
-    """Return the topic of a DDS topic: `/chatter` for "rt/chatter"; None for DDS topics outside ROS 2."""
+    """Return the ROS name of a DDS topic: `/chatter` for "rt/chatter"; None for topics outside ROS 2."""
     return _restore_parameter_topic(topic[2:]) if topic.startswith("rt/") else None
 
 
@@ -54,7 +57,10 @@ def is_type_name(msg_type: str) -> bool:
 
 
 def type_name(msg_type: str) -> str:
-    """Return the full name of a type: `std_msgs/msg/String`, for both forms. Raises `NepError`."""
+    """Return the full name of a message type, such as `std_msgs/msg/String`.
+
+    Accepts "std_msgs/msg/String" and "std_msgs/String". Raises `NepError` for other names.
+    """
     found = _TYPE.fullmatch(msg_type)
     if found is None:
         raise NepError(
@@ -66,15 +72,15 @@ def type_name(msg_type: str) -> str:
 
 
 def dds_type(ros_type: str) -> str:
-    """Return the DDS type of a ROS type, such as `std_msgs::msg::dds_::String_`."""
+    """Return the DDS name of a ROS type, such as `std_msgs::msg::dds_::String_`."""
     package, kind, name = ros_type.split("/")
     return f"{package}::{kind}::dds_::{name}_"
 
 
 def dds_service(service: str) -> tuple[str, str]:
-    """Return the DDS topics of a service: `rq/addRequest` and `rr/addReply` for "add" and "/add".
+    """Return the DDS topics for requests and responses of a service.
 
-    Raises `BadTopicError` as `dds_topic` does.
+    For "add" and "/add" these are `rq/addRequest` and `rr/addReply`. Raises `BadTopicError`.
     """
     name = dds_topic(service).removeprefix("rt/")
     return f"rq/{name}Request", f"rr/{name}Reply"
@@ -87,36 +93,45 @@ def ros_service(topic: str) -> str | None:
 
 
 def service_type_of(dds_type: str) -> str | None:
-    """Return the service type, `std_srvs/srv/SetBool`, whose requests have this DDS type, or None."""
+    """Return the service type whose requests have this DDS type, such as `std_srvs/srv/SetBool`.
+
+    Returns None for other DDS types.
+    """
     found = _DDS_REQUEST.fullmatch(dds_type)
     return None if found is None else f"{found[1]}/srv/{found[2]}"
 
 
 def service_type_name(msg_type: str) -> str | None:
-    """Return the full name of a service type, `std_srvs/srv/SetBool`, for both forms, or None."""
+    """Return the full name of a service type, such as `std_srvs/srv/SetBool`.
+
+    Accepts "std_srvs/srv/SetBool" and "std_srvs/SetBool"; returns None for other names.
+    """
     found = _SERVICE_TYPE.fullmatch(msg_type)
     return None if found is None else f"{found[1]}/srv/{found[3]}"
 
 
 def ros_type(dds_type: str) -> str:
-    """Return the ROS type of a DDS type: `std_msgs/msg/String`; unchanged if the type isn't from ROS 2."""
+    """Return the ROS name of a DDS type, such as `std_msgs/msg/String`; other types are unchanged."""
     found = _DDS_TYPE.fullmatch(dds_type)
     return dds_type if found is None else f"{found[1]}/msg/{found[2]}"
 
 
 def split_node_name(name: str) -> tuple[str, str]:
-    """Return a node's namespace and name as ROS 2 allows them; invalid characters become "_"."""
+    """Return the namespace and name of a ROS 2 node for a nep node.
+
+    Characters that ROS 2 doesn't allow are replaced by "_".
+    """
     *spaces, last = [_INVALID_CHARACTERS.sub("_", part) for part in name.split("/") if part] or ["_"]
     parts = [f"_{part}" if part[:1].isdigit() else part for part in (*spaces, last)]
     return "/" + "/".join(parts[:-1]), parts[-1]
 
 
 def encode_user_data(entries: Mapping[str, str]) -> bytes:
-    """Encode entries of USER_DATA as `key=value;`."""
+    """Encode USER_DATA entries as `key=value;`."""
     return "".join(f"{key}={value};" for key, value in entries.items()).encode("ascii")
 
 
 def decode_user_data(data: bytes) -> dict[str, str]:
-    """Decode the entries of USER_DATA. Malformed entries are skipped."""
+    """Decode the entries of USER_DATA; malformed entries are skipped."""
     entries = (entry.partition("=") for entry in data.decode("ascii", "replace").split(";"))
     return {key: value for key, _equals, value in entries if key and value}

@@ -1,8 +1,8 @@
-"""Participant: this process in one DDS domain, shared by its nodes. Its thread reads for all of them.
+"""DDS participant of this process in one domain, with a thread that reads for all its nodes.
 
-As in ROS 2, `ros_discovery_info` announces the nodes and their writers and readers to other participants. The
-USER_DATA of a writer or reader contains the type hash for ROS 2, and for other nep programs the ids of the
-node and of the publisher or subscriber.
+As in ROS 2, `ros_discovery_info` announces the nodes with their writers and readers to other
+participants. The USER_DATA of a writer or reader contains the type hash for ROS 2, and for other nep
+programs the ids of the node and of the publisher or subscriber.
 """
 
 from __future__ import annotations
@@ -42,16 +42,21 @@ _INFO_TOPIC = "ros_discovery_info"
 _MAX_PARTICIPANTS = 4096
 """Maximum number of other participants that are tracked."""
 _FDS_PER_PARTICIPANT = 16
-"""Number of file descriptors per participant."""
+"""Number of file descriptors that a participant needs."""
 _SETTLE_S = 0.3
-"""Time in seconds after which a new participant has discovered the others, which respond in milliseconds."""
+"""Time in seconds that a new participant waits to discover others, which respond within milliseconds."""
 _POLL_S = 0.01
 _READ_MAX = 10_000
 
 
 @dataclass(frozen=True)
 class RosNode:
-    """Node in `ros_discovery_info`, with the GUIDs of its writers and readers."""
+    """Node as announced in `ros_discovery_info`.
+
+    Attributes:
+        name: Full name of the node.
+        gids: GUIDs of its writers and readers.
+    """
 
     name: str
     gids: frozenset[bytes]
@@ -59,7 +64,17 @@ class RosNode:
 
 @dataclass(frozen=True)
 class DdsEndpoint:
-    """Discovered writer or reader, also of this program. `announced` has the entries of its USER_DATA."""
+    """Discovered writer or reader, of this program or another one.
+
+    Attributes:
+        gid: GUID of the endpoint.
+        participant: GUID of its participant.
+        topic: Name of the DDS topic.
+        type: Name of the DDS type.
+        is_latched: True if its durability is not VOLATILE.
+        is_reliable: True if its reliability is RELIABLE.
+        announced: Entries of its USER_DATA.
+    """
 
     gid: bytes
     participant: bytes
@@ -70,12 +85,12 @@ class DdsEndpoint:
     announced: dict[str, str]
 
     def has_type(self, kind: str, type_hash: str) -> bool:
-        """Return True if the endpoint has this type and doesn't announce another definition of the type."""
+        """Return True if the endpoint's type is `kind` and its type hash, if announced, is `type_hash`."""
         return self.type == kind and self.announced.get("typehash", type_hash) == type_hash
 
 
 class LocalNode(Protocol):
-    """Node of this process, as its participant uses it."""
+    """Interface of a node of this process to its participant."""
 
     node: NodeRecord
 
@@ -96,14 +111,14 @@ class LocalNode(Protocol):
         """Open clients."""
 
     def load(self) -> float | None:
-        """Return the CPU load of the process, as a share of one core."""
+        """Return the CPU load of the process as a share of one core; None if not measured yet."""
 
     def endpoints_changed(self) -> None:
-        """Handle added or removed endpoints. Called in the participant's thread, with its lock held."""
+        """Handle added or removed endpoints. Called in the participant's thread with its lock held."""
 
 
 class LocalPublisher(Protocol):
-    """Publisher of this process, as its participant uses it."""
+    """Interface of a publisher of this process to its participant."""
 
     spec: PublisherSpec
 
@@ -117,7 +132,7 @@ class LocalPublisher(Protocol):
 
 
 class LocalSubscriber(Protocol):
-    """Subscriber of this process, as its participant uses it."""
+    """Interface of a subscriber of this process to its participant."""
 
     spec: SubscriberSpec
 
@@ -131,7 +146,7 @@ class LocalSubscriber(Protocol):
 
 
 class LocalServer(Protocol):
-    """Server of this process, as its participant uses it."""
+    """Interface of a server of this process to its participant."""
 
     spec: ServerSpec
 
@@ -145,7 +160,7 @@ class LocalServer(Protocol):
 
 
 class LocalClient(Protocol):
-    """Client of this process, as its participant uses it."""
+    """Interface of a client of this process to its participant."""
 
     spec: ClientSpec
 
@@ -165,7 +180,7 @@ class _Member:
 
 
 class Participant:
-    """Participant of a DDS domain. Raises `NepError` if Cyclone DDS can't start."""
+    """Participant of a DDS domain. The constructor raises `NepError` if Cyclone DDS can't start."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -243,11 +258,11 @@ class Participant:
             return None  # the program has already created the domain, with its own settings
 
     def qos(self, *policies: Any) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Return a Qos object with these policies."""
+        """Return a Qos object of cyclonedds with these policies."""
         return self.dds.qos.Qos(*policies)
 
     def wait_for_discovery(self) -> None:
-        """Wait until existing participants are discovered. Returns immediately after the first time."""
+        """Wait until existing participants are discovered. Later calls return immediately."""
         if self._is_settled:
             return
         with self.changed:
@@ -277,7 +292,7 @@ class Participant:
             self._publish_nodes_locked()
 
     def remove(self, node_id: str) -> bool:
-        """Remove a node; return True if it was the last one."""
+        """Remove a node of this process; return True if no node is left."""
         with self.changed:
             self._members.pop(node_id, None)
             if self._members:
@@ -285,7 +300,13 @@ class Participant:
             return not self._members
 
     def assign(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """Assign a writer or reader (`kind`) to a node."""
+        """Announce that a writer or reader belongs to a node, and start watching its matches.
+
+        Args:
+            node_id: Id of the node.
+            kind: "writer" or "reader".
+            entity: Writer or reader of cyclonedds.
+        """
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].add(entity.guid.bytes)
@@ -294,7 +315,13 @@ class Participant:
             self._waitset.attach(entity)
 
     def remove_endpoint(self, node_id: str, kind: str, entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """Remove a writer or reader (`kind`) from a node and delete it."""
+        """Remove a writer or reader from a node and delete it.
+
+        Args:
+            node_id: Id of the node.
+            kind: "writer" or "reader".
+            entity: Writer or reader of cyclonedds.
+        """
         with self.changed:
             if node_id in self._members:
                 self._members[node_id].gids[kind].discard(entity.guid.bytes)
@@ -347,14 +374,14 @@ class Participant:
         )
 
     def names_of(self, gids: Iterable[bytes]) -> tuple[str, ...]:
-        """Return the names of the nodes of other programs that own these writers and readers."""
+        """Return the names of other programs' nodes that own the endpoints with these GUIDs."""
         wanted = set(gids)
         with self.changed:
             nodes = [node for others in self._others.values() for node in others if node.gids & wanted]
         return tuple(sorted({each.name for each in nodes}))
 
     def own_gids(self) -> dict[bytes, str]:
-        """Return the GUIDs of this process's writers and readers, each with the name of its node."""
+        """Return the node names of this process's writers and readers by GUID."""
         with self.changed:
             return {
                 gid: member.local.node.name
@@ -370,7 +397,11 @@ class Participant:
             return tuple(each.local for each in self._members.values())
 
     def remote_nodes(self, alive: frozenset[bytes]) -> dict[bytes, tuple[RosNode, ...]]:
-        """Return the nodes of other participants. Participants that are not in `alive` are removed."""
+        """Return the nodes of other participants by the participant's GUID.
+
+        Args:
+            alive: GUIDs of the existing participants; all others are removed.
+        """
         with self.changed:
             self._others = {gid: nodes for gid, nodes in self._others.items() if gid in alive}
             return dict(self._others)
@@ -378,7 +409,11 @@ class Participant:
     # ---- discovery
 
     def participants(self, *, with_nodes: bool = False) -> frozenset[bytes]:
-        """Return the GUIDs of all participants of the domain, or only of those with ROS 2 nodes."""
+        """Return the GUIDs of the domain's participants.
+
+        Args:
+            with_nodes: True to return only participants with ROS 2 nodes.
+        """
         core, builtin = self.dds.core, self.dds.builtin
         with self.changed:
             reader = builtin.BuiltinDataReader(self.entity, builtin.BuiltinTopicDcpsParticipant)
@@ -395,7 +430,12 @@ class Participant:
         )
 
     def endpoints(self, kind: str, topic: str | None = None) -> list[DdsEndpoint]:
-        """Return all endpoints of a kind ("writer" or "reader"), on all DDS topics or on one."""
+        """Return all endpoints of a kind, "writer" or "reader".
+
+        Args:
+            kind: Kind of the endpoints.
+            topic: DDS topic of the endpoints; None for all topics.
+        """
         with self.changed:
             if self._is_closing:
                 return []
@@ -408,7 +448,7 @@ class Participant:
         ]
 
     def to_endpoint(self, found: Any) -> DdsEndpoint:  # noqa: ANN401 - cyclonedds is not typed
-        """Convert discovery data of a writer or reader."""
+        """Return the endpoint that a discovery sample of cyclonedds describes."""
         policies = policy_classes(self.dds)
         has_data = policies.Userdata in found.qos
         return DdsEndpoint(
@@ -424,13 +464,19 @@ class Participant:
     # ---- the thread
 
     def watch(self, reader: Any, condition: Any, read: Callable[[], None]) -> None:  # noqa: ANN401 - see above
-        """Register a function that the participant's thread calls whenever `condition` becomes true."""
+        """Register a function that reads from a reader whenever its condition becomes true.
+
+        Args:
+            reader: Reader of cyclonedds.
+            condition: Read condition of the reader.
+            read: Called in the participant's thread.
+        """
         with self.changed:
             self._reads[id(reader)] = (reader, condition, read)
             self._waitset.attach(condition)
 
     def unwatch(self, reader: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
-        """Stop watching a reader."""
+        """Unregister the function that `watch` registered for a reader."""
         with self.changed:
             found = self._reads.pop(id(reader), None)
             if found is not None:
@@ -505,7 +551,7 @@ def _delete(entity: Any) -> None:  # noqa: ANN401 - cyclonedds is not typed
 
 
 def policy_classes(library: Dds) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-    """Return the policy classes of cyclonedds."""
+    """Return the QoS policy classes of cyclonedds."""
     return library.qos.Policy
 
 
@@ -516,7 +562,15 @@ _lock = threading.Lock()
 
 
 def join_domain(local: LocalNode, number: int) -> Participant:
-    """Add a node to the process's participant in a domain; return the participant. Raises `NepError`."""
+    """Add a node to the process's participant in a domain and return the participant.
+
+    Args:
+        local: Node to add.
+        number: Domain id.
+
+    Raises:
+        NepError: Cyclone DDS can't start.
+    """
     with _lock:
         if number not in _participants:
             _participants[number] = Participant(number)
@@ -525,7 +579,7 @@ def join_domain(local: LocalNode, number: int) -> Participant:
 
 
 def leave_domain(participant: Participant, node_id: str) -> None:
-    """Remove a closed node from a participant. The participant is closed with its last node."""
+    """Remove a closed node from a participant. Removing the last node closes the participant."""
     with _lock:
         if participant.remove(node_id):
             if _participants.get(participant.number) is participant:

@@ -1,4 +1,4 @@
-"""Ros2Publisher: a DDS writer."""
+"""Publisher over a DDS writer."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from nep.protocol.requests import PublisherCount, PublisherRecord
 _logger = logging.getLogger("nep")
 _PLAIN_TYPE = re.compile(r"[\w./-]{1,100}", re.ASCII)
 _READY_DELAY_S = 0.1
-"""Time in seconds that programs without nep need after discovery until they can receive."""
+"""Time in seconds after discovery until programs without nep are assumed to be ready to receive."""
 _POLL_S = 0.01
 
 
 def wait_for_matches(
     participant: Participant, known: Sequence[DdsEndpoint], entities: Callable[[], Sequence[Any]]
 ) -> tuple[str, ...]:
-    """Wait up to `HANDSHAKE_S` until the `known` endpoints are matched with ours.
+    """Wait up to `HANDSHAKE_TIMEOUT_S` seconds until the known endpoints are matched with ours.
 
-    Programs without nep don't report their matches, so a fixed time is waited for them.
+    Programs without nep don't report their matches, so `_READY_DELAY_S` is added for them.
 
     Args:
         participant: Participant of this process.
@@ -40,7 +40,7 @@ def wait_for_matches(
         entities: Returns our writers or readers.
 
     Returns:
-        The names of the nodes that are not matched.
+        Names of the nodes whose endpoints are not matched.
     """
     deadline = time.monotonic() + HANDSHAKE_TIMEOUT_S
     expected = [(each.gid, each.participant, "nepid" in each.announced) for each in known]
@@ -57,7 +57,13 @@ def wait_for_matches(
 
 
 def announcement(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberSpec) -> bytes:
-    """Return the USER_DATA of a writer or reader: entries for ROS 2 and for nep."""
+    """Return the USER_DATA of a writer or reader, with the entries for ROS 2 and for nep.
+
+    Args:
+        type_hash: Type hash of the ROS type.
+        node_id: Id of the node.
+        spec: Settings of the publisher or subscriber.
+    """
     announced = {"typehash": type_hash, "nepnode": node_id, "nepid": f"{spec.id:x}"}
     if _PLAIN_TYPE.fullmatch(spec.msg_type):
         announced["neptype"] = spec.msg_type
@@ -65,7 +71,7 @@ def announcement(type_hash: str, node_id: str, spec: PublisherSpec | SubscriberS
 
 
 class Ros2Publisher:
-    """Publisher over a DDS writer. Raises `BadTopicError`, `NepError`."""
+    """Publisher over a DDS writer. The constructor raises `BadTopicError` or `NepError`."""
 
     def __init__(
         self,
@@ -170,7 +176,7 @@ class Ros2Publisher:
         return None
 
     def send(self, encoded: Encoded) -> None:
-        """Publish a message. Blocks for up to 0.1 s if the queue of a slow reader is full."""
+        """Publish a message. Blocks for up to 0.1 s while the queue of a slow reader is full."""
         cdr = self._mapping.pack(encoded)
         sample = create_sample(self._kind, cdr)
         if self._is_closed:
@@ -194,11 +200,11 @@ class Ros2Publisher:
             self._bytes += len(encoded.data)
 
     def close(self, timeout_s: float) -> None:
-        """Wait up to `timeout_s` seconds for acknowledgements and close. Called once, by the publisher."""
+        """Wait up to `timeout_s` seconds for acknowledgements and close. Must be called only once."""
         self._on_close(self, timeout_s)
 
     def finish(self, timeout_s: float) -> None:
-        """Wait up to `timeout_s` seconds for acknowledgements and close. Idempotent."""
+        """Wait up to `timeout_s` seconds for acknowledgements and delete the writer. Idempotent."""
         if self._is_closed or has_forked():
             return
         if self._participant.has_closed():

@@ -2,12 +2,12 @@
 
 | name          | reliability | queue depth                                 |
 |---------------|-------------|---------------------------------------------|
-| "" "reliable" | RELIABLE    | see `depth_of`                              |
-| "best_effort" | BEST_EFFORT | see `depth_of`                              |
+| "" "reliable" | RELIABLE    | see `queue_depth`                              |
+| "best_effort" | BEST_EFFORT | see `queue_depth`                              |
 | "sensor"      | BEST_EFFORT | 5 messages, as ROS 2's sensor data profile  |
 
-Durability is TRANSIENT_LOCAL for latched topics, otherwise VOLATILE. The depth is local: it doesn't affect
-matching.
+Durability is TRANSIENT_LOCAL for latched topics, otherwise VOLATILE. The queue depth applies only
+locally; endpoints with different depths match.
 """
 
 from __future__ import annotations
@@ -21,22 +21,34 @@ from nep.backends.ros2.type_mapping import CDR
 QOS_PROFILES = ("reliable", "best_effort", "sensor")
 _SENSOR_DEPTH = 5
 _MAX_BLOCKING_NS = 100_000_000
-"""Maximum time in nanoseconds that a message waits for room in a queue before it is lost; DDS's default."""
+"""Maximum time in nanoseconds that a message waits for room in a queue before it is dropped.
+
+This is the default of DDS.
+"""
 _DEPTH_BY_CODEC = {"image": 16, "bytes": 200, CDR: 200}
 _DEFAULT_DEPTH = 8192
-"""Default queue depth in messages. The default of ROS 2, 10, would lose bursts of small messages."""
+"""Default queue depth in messages. The default of ROS 2 is 10, which would lose bursts of messages."""
 _UNLIMITED = -1
 
 
 def queue_depth(quality: str, codec: str) -> int:
-    """Return the queue depth in messages."""
+    """Return the queue depth in messages for a QoS profile and a codec."""
     return _SENSOR_DEPTH if quality == "sensor" else _DEPTH_BY_CODEC.get(codec, _DEFAULT_DEPTH)
 
 
 def qos_policies(
     library: Dds, quality: str, depth: int, *, is_latched: bool, announced: bytes, history: int = 1
 ) -> tuple[Any, ...]:
-    """Return the QoS policies of a writer or reader. `history` messages are kept for late readers."""
+    """Return the QoS policies of a writer or reader.
+
+    Args:
+        library: Modules of cyclonedds.
+        quality: Name of the QoS profile.
+        depth: Queue depth in messages.
+        is_latched: True to store messages for late readers, or to receive stored messages.
+        announced: USER_DATA.
+        history: Number of messages stored for late readers.
+    """
     policies = policy_classes(library)
     is_reliable = quality in ("", "reliable")
     found = [

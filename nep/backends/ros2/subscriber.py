@@ -1,8 +1,8 @@
-"""Ros2Subscriber: a DDS reader, and a second one for latching publishers.
+"""Subscriber over a DDS reader, and a second reader for latching publishers.
 
-A TRANSIENT_LOCAL reader isn't matched with volatile writers, and a VOLATILE reader doesn't receive older
-messages. The first reader is therefore volatile; a second one is added when a latching publisher is
-discovered. A message received by both is counted once.
+A TRANSIENT_LOCAL reader isn't matched with volatile writers, and a VOLATILE reader doesn't receive
+older messages. The first reader is therefore volatile; a second reader is added when a latching
+publisher is discovered. A message received by both readers is counted once.
 """
 
 from __future__ import annotations
@@ -38,7 +38,12 @@ _MAX_SOURCES = 4096
 
 
 def endpoint_id(gid: bytes, announced: str | None) -> int:
-    """Return the id of a publisher or subscriber: the announced one, else one derived from its GUID."""
+    """Return the id of a publisher or subscriber.
+
+    Args:
+        gid: GUID of the writer or reader.
+        announced: Id in its USER_DATA, in hexadecimal; without a valid one, the id is derived from `gid`.
+    """
     try:
         number = int(announced or "", 16)
     except ValueError:
@@ -49,13 +54,13 @@ def endpoint_id(gid: bytes, announced: str | None) -> int:
 
 
 class ReaderOwner(Protocol):
-    """Transport that a subscriber belongs to."""
+    """Interface of the transport to its subscribers."""
 
     node: NodeRecord
     changed: threading.Condition
 
     def wait(self, subscribers: Sequence[SubscriberTransport], timeout_s: float) -> None:
-        """Wait for a message in `subscribers`, or for `wake`."""
+        """Wait up to `timeout_s` seconds for a message in `subscribers`, or for `wake`."""
 
     def wake(self) -> None:
         """End all waits in progress."""
@@ -72,11 +77,11 @@ class _Source:
     newest_ns: int = -1
     is_caught_up: bool = False
     held_messages: list[tuple[int, Message]] = field(default_factory=list)
-    """Messages with their time stamps that arrived before the publisher's history and are held back."""
+    """Messages with their time stamps that arrived before the publisher's history and wait for it."""
 
 
 class Ros2Subscriber(WakingSubscriber):
-    """Subscriber over DDS readers. Raises `BadTopicError`, `NepError`."""
+    """Subscriber over DDS readers. The constructor raises `BadTopicError` or `NepError`."""
 
     def __init__(self, transport: ReaderOwner, participant: Participant, spec: SubscriberSpec) -> None:
         super().__init__(transport.changed)
@@ -133,7 +138,7 @@ class Ros2Subscriber(WakingSubscriber):
         participant.watch(reader, ready, lambda: self._read(reader, ready))
 
     def update_latched_reader(self) -> None:
-        """Add the second reader if a latching publisher has appeared. Runs in the participant's thread."""
+        """Add the second reader if a latching publisher has appeared. Called in the participant's thread."""
         if not self._has_latched and not self.is_closed:
             for handle in self._readers[0].get_matched_publications():
                 if self._source(self._readers[0], handle).kind.is_latched:
@@ -251,7 +256,7 @@ class Ros2Subscriber(WakingSubscriber):
             return None if self.is_closed else self.inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
         self._transport.wait((self,), timeout_s)
         return self.poll()
 
@@ -262,7 +267,7 @@ class Ros2Subscriber(WakingSubscriber):
 
     @property
     def lost(self) -> int | None:
-        """Number of messages that DDS reports as lost, plus those dropped from the full queue."""
+        """Number of messages that DDS reports as lost or that were dropped from the full queue."""
         with self._participant.changed:
             return self._lost_before + self._lost_in_transit() + self._dropped
 

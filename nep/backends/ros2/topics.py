@@ -1,7 +1,7 @@
-"""DdsTopics: topics of Cyclone DDS whose samples are already encoded as CDR.
+"""Topics of Cyclone DDS whose samples are already encoded as CDR.
 
-The class of a topic's samples has the members of the ROS message, for the type description in discovery.
-rosbags does the encoding and decoding.
+The sample class of a topic has the members of the ROS message, for the type description in discovery.
+rosbags encodes and decodes the samples.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _IDL_NAMES = {"byte": "uint8"}
 
 
 class DdsTopics:
-    """Topics of one participant, by name and type. Guarded by the participant's lock."""
+    """DDS topics of one participant, by name and type. Guarded by the participant's lock."""
 
     def __init__(self, library: Dds, types: MessageTypes, entity: Any) -> None:  # noqa: ANN401 - see `Dds`
         self._dds = library
@@ -28,21 +28,21 @@ class DdsTopics:
         self._topics: dict[tuple[str, str], Any] = {}
 
     def topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Return the DDS topic with this name, whose samples are CDR of a ROS type."""
+        """Return a DDS topic whose samples are the CDR of a ROS type; create it if needed."""
         key = (name, ros_type)
         if key not in self._topics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.sample_class(ros_type))
         return self._topics[key]
 
     def service_topic(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Return the DDS topic for a service's requests or responses."""
+        """Return the DDS topic for a service's requests or responses; create it if needed."""
         key = (name, ros_type)
         if key not in self._topics:
             self._topics[key] = self._dds.topic.Topic(self._entity, name, self.service_class(ros_type))
         return self._topics[key]
 
     def create_state_writer(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Create a writer that keeps its last sample for late readers."""
+        """Create a writer whose last sample is also delivered to late readers."""
         policies = self._dds.qos.Policy
         last = policies.History.KeepLast(1)
         history = (last, policies.DurabilityService(0, last, -1, -1, -1))
@@ -51,7 +51,7 @@ class DdsTopics:
         )
 
     def create_state_reader(self, name: str, ros_type: str) -> Any:  # noqa: ANN401 - cyclonedds is not typed
-        """Create a reader that also receives the last sample of each `state_writer`."""
+        """Create a reader that receives the last sample of each writer created by `create_state_writer`."""
         history = self._dds.qos.Policy.History.KeepLast(1000)
         return self._dds.sub.DataReader(
             self._entity, self.topic(name, ros_type), self._state_qos(ros_type, history)
@@ -110,7 +110,7 @@ class DdsTopics:
 
 
 def create_sample(kind: Any, cdr: bytes) -> Any:  # noqa: ANN401 - created dynamically
-    """Return a sample of class `kind` with this content."""
+    """Return a sample of class `kind` with the content `cdr`."""
     created = kind.__new__(kind)
     created.cdr = cdr
     return created

@@ -30,7 +30,10 @@ _BATCH_INTERVAL_S = 0.005  # at most 200 calls of a sink per second
 
 
 class Ros2Transport:
-    """Connection of one node to a DDS domain. Raises `BackendUnavailableError` without its packages."""
+    """Connection of one node to a DDS domain.
+
+    The constructor raises `BackendUnavailableError` if the required packages are not installed.
+    """
 
     def __init__(self, node: NodeRecord) -> None:
         load_dds()
@@ -88,12 +91,12 @@ class Ros2Transport:
             raise
 
     def endpoints_changed(self) -> None:
-        """Handle added or removed endpoints. Called in the participant's thread, with its lock held."""
+        """Handle added or removed endpoints. Called in the participant's thread with its lock held."""
         for each in self._subscribers:
             each.update_latched_reader()
 
     def create_publisher(self, spec: PublisherSpec) -> Ros2Publisher:
-        """Create a writer and wait until it is matched with the known readers."""
+        """Create a publisher and wait until its writer is matched with the discovered readers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             publisher = Ros2Publisher(participant, self.node.id, spec, self._close_publisher)
@@ -105,7 +108,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def create_subscriber(self, spec: SubscriberSpec) -> Ros2Subscriber:
-        """Create a reader and wait until it is matched with the known writers."""
+        """Create a subscriber and wait until its reader is matched with the discovered writers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             subscriber = Ros2Subscriber(self, participant, spec)
@@ -122,7 +125,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def create_server(self, spec: ServerSpec) -> Ros2Server:
-        """Create a server and wait until it is matched with the known clients."""
+        """Create a server and wait until it is matched with the discovered clients."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             server = Ros2Server(participant, self.node.id, spec, self._discard_service)
@@ -134,7 +137,7 @@ class Ros2Transport:
         raise ClosedError(f"node '{self.node.name}'")
 
     def create_client(self, spec: ClientSpec) -> Ros2Client:
-        """Create a client and wait until it is matched with the known servers."""
+        """Create a client and wait until it is matched with the discovered servers."""
         with self._translate_closed_errors():
             participant = self._join_domain(spec.configuration)
             client = Ros2Client(participant, self.node.id, spec, self._deadlines, self._discard_service)
@@ -167,7 +170,7 @@ class Ros2Transport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
+        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, Ros2Subscriber)]
         before = self._wakes
         with wake_on_call(calls, self.wake) as is_empty:
@@ -189,7 +192,7 @@ class Ros2Transport:
             self.changed.notify_all()
 
     def graph(self, configuration: Configuration, timeout_s: float) -> GraphView:  # noqa: ARG002 - immediate
-        """Return the graph of discovered endpoints."""
+        """Return the graph of the domain, built from discovered endpoints."""
         with self._translate_closed_errors():
             return current_graph(self._join_domain(configuration))
 
@@ -214,7 +217,7 @@ class Ros2Transport:
         return self._clients
 
     def load(self) -> float | None:
-        """Return the CPU load of the process, as a share of one core."""
+        """Return the CPU load of the process as a share of one core; None if not measured yet."""
         return self._load.ratio()
 
     def begin_close(self) -> None:

@@ -31,7 +31,7 @@ from nep.messages.message import MessageKind
 from nep.protocol.wire import extension_part
 
 CDR = "cdr"
-"""Codec of messages whose readers receive ROS messages."""
+"""Name of the codec of ROS types, whose data is the CDR of the message."""
 _STRING_TYPE = "std_msgs/msg/String"
 _BYTES_TYPE = "std_msgs/msg/UInt8MultiArray"
 _IMAGE_TYPE = "sensor_msgs/msg/CompressedImage"
@@ -58,17 +58,17 @@ class TypeMapping:
     unpack: Callable[[bytes], bytes | memoryview]
 
     def kind(self, topic: str, msg_type: str, *, is_latched: bool) -> MessageKind:
-        """Return the properties shared by all messages of a publisher."""
+        """Return the properties that all messages of a publisher have in common."""
         return MessageKind(topic, self.codec.name, msg_type, is_latched, self.codec.decode)
 
 
 def codec_for(msg_type: str) -> Codec:
-    """Return the codec of a message type. Raises `NepError` for an unknown ROS type."""
+    """Return the codec for a message type. Raises `NepError` for an unknown ROS type."""
     return mapping_for(msg_type).codec
 
 
 def mapping_for(msg_type: str) -> TypeMapping:
-    """Return the mapping of a message type. Raises `NepError` for an unknown ROS type."""
+    """Return the mapping for a message type. Raises `NepError` for an unknown ROS type."""
     if is_type_name(msg_type):
         return _ros_mapping(message_types().checked(msg_type))
     codec = codecs.codec_for(msg_type)

@@ -1,8 +1,13 @@
 """Back end `zenoh`: messages over Eclipse Zenoh, without a master.
 
-`places` parses the places where nodes connect, `rendezvous` connects the nodes of one computer, `keys`
-defines the key expressions, `session` is the session of one node, `roster` lists the known nodes, and
-`library` loads zenoh.
+Modules:
+
+- `places`: network addresses, and sessions opened at them
+- `rendezvous`: connections between the nodes of one computer
+- `keys`: key expressions
+- `session`: session of one node
+- `roster`: known nodes
+- `library`: loading of zenoh
 """
 
 from nep.backends.base import Backend

@@ -1,4 +1,4 @@
-"""EarlyMessages: messages that arrive before the publisher's reply to the hello. No network, no lock.
+"""Queue for messages that arrive before the publisher's reply to the hello. Performs no I/O.
 
 A publisher's history and its new messages arrive on different paths. New messages that arrive first are
 queued until the history is complete.
@@ -17,16 +17,16 @@ from nep.protocol.wire import Header
 
 T = TypeVar("T")
 _MAX_QUEUED_S = 15.0
-"""Maximum time in seconds that a message is queued. A greeting takes ten seconds at most."""
+"""Maximum time in seconds that a message is queued. A publisher replies to a hello within ten seconds."""
 
 
 class EarlyMessages(Generic[T]):
-    """Queue of one subscriber's early messages, guarded by the subscriber's lock.
+    """Queue for the early messages of one subscriber. Guarded by the subscriber's lock.
 
     Args:
-        sources: Publishers of the subscriber.
+        sources: Publishers that the subscriber receives from.
         max_messages: Maximum number of queued messages per publisher.
-        clock: Monotonic clock in seconds.
+        clock: Returns a monotonic time in seconds.
     """
 
     def __init__(
@@ -40,7 +40,13 @@ class EarlyMessages(Generic[T]):
         self._bytes = 0
 
     def queue_if_early(self, header: Header, message: T, size_bytes: int) -> bool:
-        """Queue a message that arrived too early; return False if the message can be delivered now."""
+        """Queue a message that arrived too early; return False if it can be delivered now.
+
+        Args:
+            header: Header of the message.
+            message: Object to queue.
+            size_bytes: Size of the message in bytes.
+        """
         source = self._sources.find(header.publisher)
         if source is None or source.remote is None or source.has_echoed:
             return False
@@ -56,7 +62,10 @@ class EarlyMessages(Generic[T]):
         return count < self._max_messages and self._bytes < MAX_HISTORY_BYTES
 
     def pop(self, publisher: int) -> list[T]:
-        """Remove and return a publisher's queued messages in order, without those received since then."""
+        """Remove a publisher's queued messages and return them in order.
+
+        Messages that the history contained as well are left out.
+        """
         self._until.pop(publisher, None)
         queued = self._queued.pop(publisher, [])
         self._bytes -= sum(size_bytes for _seq, _message, size_bytes in queued)

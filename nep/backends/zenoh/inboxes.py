@@ -1,4 +1,4 @@
-"""Inboxes: condition variable and sink thread, shared by the subscribers of one node."""
+"""Condition variable and sink thread that the subscribers of one node share."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _WAIT_S = 0.1
 
 
 class SinkSubscriber(Protocol):
-    """Subscriber, as the sink thread uses it."""
+    """Interface of a subscriber to the sink thread."""
 
     is_closed: bool
 
@@ -33,7 +33,7 @@ class SinkSubscriber(Protocol):
 
 
 class Inboxes:
-    """Inboxes of one node. The condition `changed` guards the inboxes of all its subscribers."""
+    """Shared state of one node's inboxes. The condition `changed` guards all these inboxes."""
 
     def __init__(self, name: str) -> None:
         self.changed = threading.Condition()
@@ -53,8 +53,9 @@ class Inboxes:
 
         Args:
             subscribers: Subscribers to wait for.
-            timeout_s: Time limit in seconds.
-            wakes: Value of `wakes` that the caller has seen; returns immediately if `wake` was called since.
+            timeout_s: Maximum time to wait in seconds.
+            wakes: Earlier value of the property `wakes`; returns immediately if `wake` was called since
+                then.
         """
         with self.changed:
             before = self._wakes if wakes is None else wakes
@@ -84,7 +85,7 @@ class Inboxes:
             self._sinks = tuple(each for each in self._sinks if each is not subscriber)
 
     def close(self, timeout_s: float) -> None:
-        """Stop and join the sink thread."""
+        """Stop the sink thread and wait up to `timeout_s` seconds for it to end."""
         self._closing.set()
         self.wake()
         thread = self._thread

@@ -1,4 +1,4 @@
-"""Key expressions for messages, greetings and liveliness tokens of nep. Pure functions.
+"""Key expressions for messages, hellos and liveliness tokens of nep. Pure functions.
 
     nep/v1/data/TOPIC              messages: payload, with header and extension as attachment
     nep/v1/hello/TOPIC/PUBLISHER   a publisher replies with its history and the number of its last message
@@ -33,7 +33,7 @@ _NODE_CHUNKS, _PUBLISHER_CHUNKS, _SUBSCRIBER_CHUNKS = 7, 6, 4
 
 
 class LiveToken(NamedTuple):
-    """Parsed liveliness token: a record and the id of the node that it belongs to."""
+    """Parsed liveliness token: a record, and the id of the node that owns the token."""
 
     node_id: str
     record: NodeRecord | PublisherRecord | SubscriberRecord
@@ -53,12 +53,15 @@ def data_key(topic: str) -> str:
 
 
 def pattern_data_key(pattern: str) -> str:
-    """Return the key expression for messages of matching topics. It may also match other topics."""
+    """Return the key expression for messages of all topics that match a pattern.
+
+    The expression may match further topics, so received topics must be checked.
+    """
     return f"{_ROOT}/data/{_pattern_chunk(pattern)}"
 
 
 def hello_key(topic: str, publisher: int) -> str:
-    """Return the key at which a publisher replies to new subscribers."""
+    """Return the key at which a publisher replies to the hellos of new subscribers."""
     return f"{_ROOT}/hello/{_encode_chunk(topic)}/{publisher:016x}"
 
 
@@ -68,7 +71,10 @@ def hellos_key(topic: str) -> str:
 
 
 def pattern_hellos_key(pattern: str) -> str:
-    """Return the key expression for hellos to all publishers of the topics that `data_keys` matches."""
+    """Return the key expression for hellos to the publishers of all topics that match a pattern.
+
+    The expression may match further topics, as that of `pattern_data_key` does.
+    """
     return f"{_ROOT}/hello/{_pattern_chunk(pattern)}/*"
 
 
@@ -83,7 +89,7 @@ def _pattern_chunk(pattern: str) -> str:
 
 
 def topic_of(key: str) -> str:
-    """Return the topic from the key of a message or of a reply to a hello."""
+    """Return the topic of a message, or of a reply to a hello, from its key."""
     return _decode_chunk(key.split("/")[_TOPIC_AT]) if key.count("/") >= _TOPIC_AT else ""
 
 
@@ -93,34 +99,39 @@ def call_key(node_id: str) -> str:
 
 
 def node_key(node: NodeRecord) -> str:
-    """Return the liveliness token of a node."""
+    """Return the key of a node's liveliness token."""
     words = (node.name, node.host, str(node.pid or 0), node.language, node.generation, str(node.since_ns))
     return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node.id)}/node", *map(_encode_chunk, words)))
 
 
 def publisher_key(node_id: str, record: PublisherRecord) -> str:
-    """Return the liveliness token of a publisher."""
+    """Return the key of a publisher's liveliness token."""
     latched = "latched" if record.latched else "plain"
     words = (f"{record.id:016x}", record.topic, record.msg_type, record.codec, latched)
     return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/pub", *map(_encode_chunk, words)))
 
 
 def subscriber_key(node_id: str, record: SubscriberRecord) -> str:
-    """Return the liveliness token of a subscriber."""
+    """Return the key of a subscriber's liveliness token."""
     words = (f"{record.id:016x}", record.topic, record.msg_type)
     return "/".join((f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/sub", *map(_encode_chunk, words)))
 
 
 def service_key(service: str, since_ns: int, server: int) -> str:
-    """Return the key of a server.
+    """Return the key at which a server receives calls.
 
-    The keys sort by age, and all clients call the first server in this order: the oldest.
+    The keys of a service sort by age. All clients call the first server in this order, which is the oldest.
+
+    Args:
+        service: Name of the service.
+        since_ns: Start time of the server, in nanoseconds since the epoch.
+        server: Id of the server.
     """
     return f"{_ROOT}/serve/{_encode_chunk(service)}/{since_ns:016x}/{server:016x}"
 
 
 def server_key(node_id: str, record: PublisherRecord) -> str:
-    """Return the liveliness token of a server."""
+    """Return the key of a server's liveliness token."""
     since = record.endpoints[0].split("/")[_SINCE_AT]
     return "/".join(
         (
@@ -133,7 +144,7 @@ def server_key(node_id: str, record: PublisherRecord) -> str:
 
 
 def client_key(node_id: str, record: SubscriberRecord) -> str:
-    """Return the liveliness token of a client."""
+    """Return the key of a client's liveliness token."""
     return "/".join(
         (
             f"{_LIVE_PREFIX}{_encode_chunk(node_id)}/cli",
@@ -144,7 +155,7 @@ def client_key(node_id: str, record: SubscriberRecord) -> str:
 
 
 def parse_token(key: str) -> LiveToken | None:
-    """Parse a liveliness token; return None for other keys."""
+    """Parse the key of a liveliness token; return None for other keys."""
     if not key.startswith(_LIVE_PREFIX):
         return None
     node_id, *words = map(_decode_chunk, key[len(_LIVE_PREFIX) :].split("/"))

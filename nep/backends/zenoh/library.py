@@ -17,9 +17,9 @@ from nep.system.forks import call_in_child
 _logger = logging.getLogger("nep")
 _sessions: list[Any] = []
 _inherited_libraries: set[str] = set()
-"""Names of libraries that were in use before a fork.
+"""Names of libraries that were in use in the parent process before a fork.
 
-In the child process zenoh would wait for threads that don't exist there.
+They can't be used in the child process, because zenoh would wait for threads that don't exist there.
 """
 
 
@@ -47,19 +47,24 @@ def load_zenoh(load: Callable[[str], ModuleType] = importlib.import_module) -> A
 
 
 def create_handler(take: Callable[[Any], None], drop: Callable[[], None] | None = None) -> Any:  # noqa: ANN401 - zenoh is not typed
-    """Return a handler that runs in zenoh's network thread, so that messages stay in order."""
+    """Return a zenoh handler that calls `take` in zenoh's network thread, which preserves the order.
+
+    Args:
+        take: Called with each sample, reply or query.
+        drop: Called when no further call of `take` follows; None if not needed.
+    """
     return importlib.import_module("zenoh.handlers").Callback(take, drop, indirect=False)
 
 
 def open_session(config: Any) -> Any:  # noqa: ANN401 - zenoh is not typed
-    """Open a session. Raises zenoh's `ZError`."""
+    """Open a session with a zenoh configuration. Raises zenoh's `ZError`."""
     session = load_zenoh().open(config)
     _sessions.append(session)
     return session
 
 
 def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-    """Close a session. Errors of zenoh are logged."""
+    """Close a session. Errors of zenoh are logged, not raised."""
     try:
         session.close()
     except BaseException as error:
@@ -73,7 +78,10 @@ def close_session(session: Any) -> None:  # noqa: ANN401 - zenoh is not typed
 
 
 def prevent_finalization(owned: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-    """Prevent an object from being finalized in a forked child process, which would notify the network."""
+    """Prevent an object from ever being finalized.
+
+    In a forked child process, finalizing an object of zenoh would notify the network.
+    """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(owned))
 
 

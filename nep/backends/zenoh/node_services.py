@@ -1,4 +1,4 @@
-"""ZenohServices: servers, clients and surveyors of one node. Part of `ZenohTransport`."""
+"""Servers, clients and surveyors of one node. Part of `ZenohTransport`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ SessionProvider = Callable[[Configuration, float | None], ZenohSession]
 class ZenohServices:
     """Servers, clients and surveyors of one node.
 
-    `session` returns the node's session for a configuration; it raises `ClosedError` if the node is closed.
+    Args:
+        session: Returns the node's session for a configuration; raises `ClosedError` if the node is closed.
+        node_name: Name of the node.
     """
 
     def __init__(self, session: SessionProvider, node_name: str) -> None:
@@ -33,7 +35,7 @@ class ZenohServices:
         self._is_closed = False
 
     def create_server(self, spec: ServerSpec) -> ZenohServer:
-        """Create a server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.create_server`."""
         session = self._session(spec.configuration, spec.wait_s)
         session.join()
         server = ZenohServer(session, spec, self._discard)
@@ -49,7 +51,7 @@ class ZenohServices:
         return server
 
     def create_client(self, spec: ClientSpec) -> ZenohClient:
-        """Create a client or surveyor. See `ServiceTransport.client`."""
+        """Create a client or surveyor. See `ServiceTransport.create_client`."""
         session = self._session(spec.configuration, spec.wait_s)
         session.join()
         client = ZenohClient(session, spec, self._deadlines, self._discard)

@@ -1,10 +1,10 @@
-"""Places: values of a node's `master` for this back end, and sessions opened at them.
+"""Network addresses of this back end (values of a node's `master`), and sessions opened at them.
 
     local, local/NAME         nodes of this user on this computer, over loopback
     tcp/HOST:7447,tls/...     a zenoh router or peer: the node connects to it and doesn't listen
     FILE.json5                a zenoh configuration file: TLS, access control, other modes
 
-`place_name` validates a place, `open_place` opens a session at it.
+`validate_address` validates an address, `open_session_at` opens a session at it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from nep.i18n import _
 from nep.system.descriptors import check_free_descriptors
 
 CONFIG_VARIABLE = "NEP_ZENOH_CONFIG"
-"""Environment variable with the default place: any value that `master` accepts."""
+"""Name of the environment variable with the default network address, in any form that `master` accepts."""
 _LOCAL_ADDRESS = re.compile(r"local(?:/([\w.-]{1,100}))?", re.ASCII)
 _ENDPOINT = re.compile(r"(?:tcp|tls|quic|udp|ws|unixsock-stream|serial|vsock)/[^\s,]{1,400}", re.ASCII)
 _SECURE_PROTOCOL = re.compile(r"\b(?:tls|quic)/")
@@ -35,14 +35,14 @@ _DEFAULT_LISTEN_ENDPOINTS = {"router": ["tcp/[::]:7447"], "peer": ["tcp/[::]:0"]
 _MESSAGE_WAIT_S = 0.05
 """Time in seconds that a message, or the first fragment of a large one, waits for room in a connection.
 
-On a busy computer zenoh's default of one millisecond passes before its thread has run once. A suspended
-subscriber delays the publisher by this time once; then zenoh drops messages immediately until there is room
-again.
+zenoh's default of one millisecond is too short for a busy computer, where zenoh's thread may not run
+within this time. A suspended subscriber delays the publisher once by this time; after that, zenoh drops
+messages immediately until there is room again.
 """
 _FRAGMENTS_WAIT_S = 1.0
-"""Total time in seconds that the fragments of a large message wait for room before the message is dropped.
+"""Total time in seconds that the fragments of a large message wait for room before it is dropped.
 
-zenoh's default of 50 ms passes before 8 MB are sent over a link of 100 MB/s, or on a busy computer.
+zenoh's default of 50 ms is too short to send 8 MB over a link of 100 MB/s, or on a busy computer.
 """
 _MAX_TIMEOUT_S = 10**6
 _FDS_PER_SESSION = 16
@@ -54,14 +54,14 @@ _SOURCE_LOCATION = re.compile(r" at /\S+\.rs:\d+\.?")
 
 @dataclass(frozen=True)
 class OpenSession:
-    """Open session and its rendezvous entry.
+    """Open session, with its entry in the rendezvous.
 
     Attributes:
         session: Session of zenoh.
-        meeting: Rendezvous of a local place, or None.
+        meeting: Rendezvous of a local network; None for other networks.
         entry: Entry of this session in `meeting`, or None.
         endpoints: Endpoints to close in a forked child process (`forks.give_up`).
-        routers: Routers, one of which must be connected to reach other nodes; empty for peers.
+        routers: Endpoints of routers. At least one must be connected to reach other nodes. Empty for peers.
     """
 
     session: Any
@@ -72,18 +72,22 @@ class OpenSession:
 
     @property
     def is_router_lost(self) -> bool:
-        """True if the connection to the router is lost. zenoh reconnects automatically."""
+        """True if no router is connected. zenoh reconnects automatically."""
         info = self.session.info
         return bool(self.routers) and not (info.routers_zid() or info.peers_zid())
 
     def unregister(self) -> None:
-        """Remove the session from the rendezvous, so that no other session connects to its address."""
+        """Remove the session from the rendezvous, so that no other session connects to it any more."""
         if self.rendezvous is not None and self.entry is not None:
             self.rendezvous.remove(self.entry)
 
 
 def validate_address(master: str | None = None) -> str:
-    """Validate a place and return it; None selects $NEP_ZENOH_CONFIG, else "local". Raises `NepError`."""
+    """Validate a network address and return it. Raises `NepError`.
+
+    Args:
+        master: Network address; None selects $NEP_ZENOH_CONFIG, or "local" if the variable is not set.
+    """
     if master is not None and not isinstance(master, str):
         raise WrongTypeError(
             _("a zenoh address must be a 'str', not a '{kind}'").format(kind=type(master).__name__)
@@ -106,7 +110,12 @@ def _parse_endpoints(place: str) -> tuple[str, ...]:
 
 
 def open_session_at(place: str, wait_s: float | None) -> OpenSession:
-    """Open a session at a place; wait up to `wait_s` seconds for a router. Raises `NepError` on failure."""
+    """Open a session at a network address. Raises `NepError` on failure.
+
+    Args:
+        place: Network address returned by `validate_address`.
+        wait_s: Seconds to wait for a router; None waits forever.
+    """
     local = _LOCAL_ADDRESS.fullmatch(place)
     if local is not None:
         return _open_local(local.group(1) or "nodes")

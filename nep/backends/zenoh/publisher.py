@@ -1,4 +1,4 @@
-"""ZenohPublisher: publishes messages and replies to the hello of new subscribers."""
+"""Publisher over zenoh, which also replies to the hellos of new subscribers."""
 
 from __future__ import annotations
 
@@ -19,9 +19,15 @@ from nep.protocol.wire import EXTENSION, LATCHED, SIZE_MAX, Header, extension_pa
 
 
 class ZenohPublisher:
-    """Publisher of a session. zenoh drops messages for subscribers without room; they count the losses.
+    """Publisher of a session.
 
-    `count_subscribers` returns the number of subscribers of a topic; `on_close` unregisters and flushes.
+    zenoh drops messages for subscribers whose queues are full; the subscribers count the losses.
+
+    Args:
+        session: Session of zenoh.
+        spec: Settings of the publisher.
+        count_subscribers: Returns the number of subscribers of a topic.
+        on_close: Unregisters and flushes the publisher within a time limit in seconds.
     """
 
     def __init__(
@@ -133,7 +139,7 @@ class ZenohPublisher:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Flush for up to `timeout_s` seconds and unregister. Called once, by the publisher."""
+        """Flush for up to `timeout_s` seconds and unregister. Must be called only once."""
         self._on_close(self, timeout_s)
 
     def mark_closed(self) -> bool:
@@ -143,7 +149,7 @@ class ZenohPublisher:
             return not was_closed
 
     def release(self) -> None:
-        """Undeclare the publisher's key expressions and token at the session."""
+        """Undeclare the publisher's key expressions at the session."""
         for each in (self._hellos, self._listener, self._out):
             with suppress(load_zenoh().ZError):  # closing the session has undeclared it
                 each.undeclare()

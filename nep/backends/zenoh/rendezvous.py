@@ -1,8 +1,8 @@
 """Rendezvous: connects the sessions of one user on one computer without a fixed port.
 
-Each session listens on a free loopback port and creates a file with the port's number in a folder of the
-user. Under a lock, a new session connects to all sessions that have a file and then creates its own. Any two
-sessions are therefore connected, whatever the order in which they start and end.
+Each session listens on a free loopback port and creates a file, named after the port, in a folder of
+the user. Under a lock, a new session connects to all sessions that have a file and then creates its own
+file. Any two sessions are therefore connected, regardless of the order in which they start and end.
 """
 
 from __future__ import annotations
@@ -35,7 +35,13 @@ _SUSPENDED_STATUSES = frozenset({psutil.STATUS_STOPPED, psutil.STATUS_TRACING_ST
 
 
 class SessionEntry(NamedTuple):
-    """Port and process of a session, encoded in a file name. `began` distinguishes reused process ids."""
+    """Port and process of a session, encoded in a file name.
+
+    Attributes:
+        port: Port of the session.
+        pid: Id of its process.
+        start_time: Start time of the process, which detects a reused process id.
+    """
 
     port: int
     pid: int
@@ -43,7 +49,7 @@ class SessionEntry(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name of the file."""
+        """Name of the session's file."""
         return f"{self.port}-{self.pid}-{self.start_time}"
 
 
@@ -59,14 +65,21 @@ def free_port() -> int:
 
 
 class Rendezvous:
-    """Folder of the sessions with one name. Raises `NepError` if the folder doesn't belong to the user."""
+    """Folder of all sessions of a local network. Raises `NepError` if the folder isn't owned by the user.
+
+    Args:
+        name: Name of the local network.
+    """
 
     def __init__(self, name: str) -> None:
         self._folder = _create_private_folder(_create_private_folder(_root_folder()) / name)
 
     @contextmanager
     def exclusive(self) -> Iterator[None]:
-        """Hold the lock for opening a session. A process that hangs with the lock delays others by 5 s."""
+        """Hold the lock that is needed for opening a session.
+
+        If another process hangs while it holds the lock, the context is entered without the lock after 5 s.
+        """
         with (self._folder / "lock").open("ab") as file:
             is_held = _lock(file.fileno())
             if not is_held:
@@ -81,7 +94,7 @@ class Rendezvous:
                     _unlock(file.fileno())
 
     def entries(self) -> list[SessionEntry]:
-        """Return the sessions of running processes; delete the files of others."""
+        """Return the sessions of running processes; delete the files of processes that have ended."""
         found = []
         for path in self._folder.iterdir():
             entry = _parse_entry(path.name)
@@ -99,7 +112,7 @@ class Rendezvous:
         return found
 
     def add(self, port: int) -> SessionEntry:
-        """Create the file of a session that listens on `port`."""
+        """Create and return the entry of a session of this process, which listens on `port`."""
         entry = SessionEntry(port, os.getpid(), _start_time(os.getpid()))
         (self._folder / entry.name).touch(mode=0o600)
         return entry

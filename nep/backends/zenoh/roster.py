@@ -1,4 +1,4 @@
-"""Roster: known nodes, publishers and subscribers, from their liveliness tokens. No network. Thread-safe."""
+"""Known nodes, publishers and subscribers, from their liveliness tokens. Performs no I/O. Thread-safe."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from nep.protocol.topic_pattern import is_pattern, matches
 
 _Record = TypeVar("_Record", PublisherRecord, SubscriberRecord)
 _MAX_TOKENS = 100_000
-"""Maximum number of tokens; limited because any program in the network can create them."""
+"""Maximum number of liveliness tokens, because any program in the network can create tokens."""
 
 
 class Roster:
-    """Known nodes, publishers and subscribers. Changed only by `note`. Thread-safe."""
+    """Known nodes, publishers and subscribers. `update` updates the roster. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -33,7 +33,12 @@ class Roster:
         self._count = 0
 
     def update(self, alive: LiveToken, *, is_there: bool) -> None:
-        """Add or remove a token. Idempotent."""
+        """Add or remove a node, publisher or subscriber. Idempotent.
+
+        Args:
+            alive: Liveliness token.
+            is_there: True to add the token, False to remove it.
+        """
         with self._lock:
             if is_there and self._count >= _MAX_TOKENS:
                 return
@@ -78,7 +83,7 @@ class Roster:
             return tuple(name for each in self._publishers if (name := service_of(each)) is not None)
 
     def servers_of(self, service: str) -> tuple[str, ...]:
-        """Return the keys of a service's servers, the oldest first."""
+        """Return the keys of a service's servers, oldest server first."""
         with self._lock:
             entries = self._publishers.get(topic_of(service), {}).values()
             return tuple(sorted(record.endpoints[0] for _node_id, record in entries if record.endpoints))
@@ -104,14 +109,14 @@ class Roster:
             )
 
     def remote_publisher(self, node_id: str, record: PublisherRecord) -> RemotePublisher:
-        """Return a publisher's record with the name of its node."""
+        """Return a publisher's record together with the id and name of its node."""
         with self._lock:
             return RemotePublisher(record, node_id, self._node_name(node_id))
 
     def members(
         self,
     ) -> list[tuple[NodeRecord, tuple[PublisherRecord, ...], tuple[SubscriberRecord, ...]]]:
-        """Return all nodes with their publishers and subscribers."""
+        """Return all nodes, each with its publishers and subscribers."""
         with self._lock:
             publishers = _by_node(self._publishers)
             subscribers = _by_node(self._subscribers)

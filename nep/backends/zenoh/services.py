@@ -1,7 +1,7 @@
-"""Servers and clients over zenoh: a server is a queryable, a call is a query to it.
+"""Servers and clients over zenoh: a server is a queryable, and a call is a query to its key.
 
-Payloads are sent as is, with the header of `nep.protocol.service_wire` as attachment. When a server ends,
-zenoh finishes its queries without a reply, so the client knows that its calls are lost.
+Payloads are sent as is, with the header of `nep.protocol.service_wire` as attachment. When a server
+ends, zenoh finishes its queries without a reply, so the client knows that its calls are lost.
 """
 
 from __future__ import annotations
@@ -47,16 +47,16 @@ from nep.protocol.service_wire import NATIVE, PAYLOAD_MAX_BYTES, SERVICE_TYPE, R
 
 _logger = logging.getLogger("nep")
 _LATE_REPLY_S = 30.0
-"""Time in seconds after a timeout during which a reply is still counted as late."""
+"""Time in seconds after a call's timeout in which its reply is still received, and counted as late."""
 _UNLIMITED_S = 1e9
 _TOKEN_DELAY_S = 0.5
-"""Maximum time in seconds between the end of a server's queries and the removal of its token."""
+"""Maximum time in seconds from the end of a server's queries to the removal of its liveliness token."""
 
 OutcomeCallback = Callable[[Outcome], None]
 
 
 class ZenohServer:
-    """Server with its queryable, its call queue and the queries that have no reply yet."""
+    """Server with a call queue. Owns the queryable and the queries that have no reply yet."""
 
     def __init__(
         self, session: ZenohSession, spec: ServerSpec, on_close: Callable[[ZenohServer], object]
@@ -134,7 +134,7 @@ class ZenohServer:
             call.reply(rejection_reply(self.spec.service, is_closed=True))
 
     def close(self, timeout_s: float) -> None:  # noqa: ARG002 - replies are flushed by the session
-        """Close the server; calls without a reply fail."""
+        """Close the server; calls that have no reply yet fail."""
         self.begin_close()
         with self._lock:
             if self.is_closed:
@@ -174,7 +174,7 @@ class _Call:
 
 
 class ZenohClient(ClientCalls[_Call]):
-    """Client or surveyor and its calls in flight."""
+    """Client or surveyor, with its calls in flight."""
 
     def __init__(
         self,
@@ -210,7 +210,7 @@ class ZenohClient(ClientCalls[_Call]):
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> OpenCall:
-        """Send a call. See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.start_call`."""
         call = self._new_call(data, timeout_s, then)
         self._send(call, next(iter(self._servers), ""))
         self._deadlines.add(call.deadline)
@@ -219,7 +219,7 @@ class ZenohClient(ClientCalls[_Call]):
     def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> list[OpenCall]:
-        """Send a call to each server. See `SurveyTransport.begin_all`."""
+        """Send a call to each server. See `SurveyTransport.start_survey`."""
         calls: list[OpenCall] = []
         try:
             for key in self._servers:
@@ -321,11 +321,11 @@ class ZenohClient(ClientCalls[_Call]):
     # ---- events
 
     def servers_changed(self) -> None:
-        """Handle a change of the servers: the timeout thread sends the waiting calls."""
+        """Let the timeout thread send the waiting calls, because the servers of the service have changed."""
         self._deadlines.add(0.0)
 
     def expire(self, now: float) -> float:
-        """Send waiting calls, fail expired ones, and return the next deadline."""
+        """Send waiting calls, fail expired ones, return the next deadline. See `ExpiringClient.expire`."""
         key = next(iter(self._servers), "")
         with self._lock:
             waiting = [each for each in self._calls.values() if not each.key and each.deadline > now]

@@ -1,4 +1,4 @@
-"""ZenohSession: session of one node at one place, with discovery, registrations and requests."""
+"""Session of one node at one network address, with discovery, registrations and requests."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ from nep.system.cpu import CpuLoad
 
 _logger = logging.getLogger("nep")
 _GRACE_S = 1.0
-"""Extra time in seconds before a query times out here; zenoh normally reports the timeout earlier."""
+"""Time in seconds that is added to a query's timeout here, because zenoh normally reports the timeout."""
 _HANDSHAKE_TIMEOUT_S = 10.0
 _MAX_REPLIES, _MAX_LIST_ITEMS = 100, 20_000
 
 
 class ListedServer(Protocol):
-    """Server, as the session uses it."""
+    """Interface of a server to the session."""
 
     record: PublisherRecord
 
@@ -68,7 +68,7 @@ class ListedServer(Protocol):
 
 
 class ListedClient(Protocol):
-    """Client, as the session uses it."""
+    """Interface of a client to the session."""
 
     record: SubscriberRecord
 
@@ -80,7 +80,7 @@ class ListedClient(Protocol):
 
 
 class PendingQuery:
-    """Query in progress, with the replies received so far by key."""
+    """Query in progress. `replies` has the replies received so far by key."""
 
     def __init__(self, timeout_s: float, on_finished: Callable[[], None] | None = None) -> None:
         self._on_finished = on_finished
@@ -105,14 +105,11 @@ class PendingQuery:
             self._on_finished()
 
     def wait(self, wanted: frozenset[str] | None = None, deadline: float | None = None) -> frozenset[str]:
-        """Wait for replies, until `deadline` at the latest.
+        """Wait for replies and return the keys in `wanted` that have no reply yet.
 
         Args:
             wanted: Keys whose replies to wait for; None waits until the query is finished.
             deadline: Time (`time.monotonic`) at which to stop waiting; None for the query's timeout.
-
-        Returns:
-            Those of `wanted` without a reply.
         """
         ends_at = self._ends_at if deadline is None else min(deadline, self._ends_at)
         with self._changed:
@@ -125,7 +122,16 @@ class PendingQuery:
 
 
 class ZenohSession:
-    """Session at `place`. Raises `NepError` if it can't be opened within `wait_s` seconds."""
+    """Session of a node at a network address.
+
+    Args:
+        node: Record of the node.
+        place: Network address returned by `validate_address`.
+        wait_s: Seconds to wait for a router; None waits forever.
+
+    Raises:
+        NepError: The session can't be opened.
+    """
 
     def __init__(self, node: NodeRecord, place: str, wait_s: float | None) -> None:
         self.node = node
@@ -165,7 +171,7 @@ class ZenohSession:
         over: Callable[[], None] | None = None,
         is_last: bool = False,
     ) -> PendingQuery:
-        """Send a query to all nodes that reply at `key`. Doesn't wait.
+        """Send a query to all nodes that reply at a key, without waiting for the replies.
 
         Args:
             key: Key expression.
@@ -173,10 +179,10 @@ class ZenohSession:
             timeout_s: Seconds until the query is finished.
             take: Called with each reply, in a zenoh thread.
             over: Called when the query is finished.
-            is_last: True to send the query after all messages published before.
+            is_last: True to send the query after all messages that were published before.
 
         Returns:
-            The query, whose replies can be waited for.
+            The query, which can be waited for.
         """
         zenoh = load_zenoh()
         query = PendingQuery(timeout_s, over)
@@ -199,9 +205,9 @@ class ZenohSession:
         return query
 
     def sync_all(self, timeout_s: float) -> Mapping[str, bytes]:
-        """Send a query to every node, wait for the replies and return them by key.
+        """Send a query to every node, wait up to `timeout_s` seconds, and return the replies by key.
 
-        Afterwards both sides know all declarations that the other made before.
+        After a reply, this node knows all earlier declarations of the replying node, and vice versa.
         """
         if self._opened.rendezvous is None:
             self._sync_routers(timeout_s)
@@ -308,9 +314,9 @@ class ZenohSession:
         )
 
     def query_graph(self, timeout_s: float) -> GraphView:
-        """Return the graph. Nodes that don't reply in time are listed without statistics.
+        """Return the graph. Nodes that don't reply within `timeout_s` seconds have no statistics.
 
-        Raises `NepError` while the router is disconnected.
+        Raises `NepError` while no router is connected.
         """
         if self._opened.is_router_lost:
             raise NepError(
@@ -336,14 +342,14 @@ class ZenohSession:
     # ---- publishers and subscribers
 
     def check(self, record: PublisherRecord | SubscriberRecord) -> None:
-        """Raise `RequestRefusedError` for a record that a master would reject."""
+        """Raise `RequestRefusedError` if a master would reject this record."""
         try:
             check_record(record)
         except WireError as error:
             raise RequestRefusedError(error.reason) from error
 
     def join(self) -> None:
-        """Announce this node by its token."""
+        """Announce this node by declaring its liveliness token."""
         with self._lock:
             if self.node.id not in self._tokens:
                 self._tokens[self.node.id] = self._declare_token(node_key(self.node))
@@ -352,13 +358,13 @@ class ZenohSession:
         return self._zenoh.liveliness().declare_token(key)
 
     def add_publisher(self, publisher: ZenohPublisher) -> None:
-        """Announce a publisher by its token."""
+        """Announce a publisher by declaring its liveliness token."""
         with self._lock:
             self._publishers = (*self._publishers, publisher)
             self._tokens[publisher] = self._declare_token(publisher_key(self.node.id, publisher.record))
 
     def add_subscriber(self, subscriber: ZenohSubscriber) -> None:
-        """Subscribe at zenoh and announce a subscriber by its token."""
+        """Subscribe to the messages and announce the subscriber by declaring its liveliness token."""
         spec = subscriber.spec
         record = SubscriberRecord(spec.id, spec.topic, spec.msg_type)
         for remote in self._publishers_for(subscriber):  # messages that arrive before the greeting are queued
@@ -372,9 +378,10 @@ class ZenohSession:
             self._tokens[subscriber] = self._declare_token(subscriber_key(self.node.id, record))
 
     def perform_handshake(self, subscriber: ZenohSubscriber, timeout_s: float) -> None:
-        """Send a hello to all publishers of a subscriber's topic.
+        """Send a hello to all publishers of a subscriber's topic and wait for the replies.
 
-        They reply with their history and the sequence number of their last message.
+        Waits up to `timeout_s` seconds. A publisher replies with its history and the sequence number of its
+        last message.
         """
         there = self._publishers_for(subscriber)
         for remote in there:
@@ -394,11 +401,15 @@ class ZenohSession:
         )
 
     def create_publisher(self, make: Callable[[Any], ZenohPublisher]) -> ZenohPublisher:
-        """Create a publisher. `make` receives zenoh's session."""
+        """Create a publisher in this session.
+
+        Args:
+            make: Called with the zenoh session; returns the publisher.
+        """
         return make(self._zenoh)
 
     def discard(self, closed: ZenohPublisher | ZenohSubscriber) -> None:
-        """Remove a closed publisher or subscriber and its token."""
+        """Remove a closed publisher or subscriber and undeclare its liveliness token."""
         with self._lock:
             self._publishers = tuple(each for each in self._publishers if each is not closed)
             self._subscribers = tuple(each for each in self._subscribers if each is not closed)
@@ -413,19 +424,19 @@ class ZenohSession:
     # ---- servers and clients
 
     def add_server(self, server: ListedServer) -> None:
-        """Announce a server by its token."""
+        """Announce a server by declaring its liveliness token."""
         with self._lock:
             self._servers = (*self._servers, server)
             self._tokens[server] = self._declare_token(server_key(self.node.id, server.record))
 
     def add_client(self, client: ListedClient) -> None:
-        """Announce a client by its token."""
+        """Announce a client by declaring its liveliness token."""
         with self._lock:
             self._clients = (*self._clients, client)
             self._tokens[client] = self._declare_token(client_key(self.node.id, client.record))
 
     def discard_service(self, closed: ListedServer | ListedClient) -> None:
-        """Remove a closed server or client and its token. Idempotent."""
+        """Remove a closed server or client and undeclare its liveliness token. Idempotent."""
         with self._lock:
             self._servers = tuple(each for each in self._servers if each is not closed)
             self._clients = tuple(each for each in self._clients if each is not closed)
@@ -435,7 +446,12 @@ class ZenohSession:
                 token.undeclare()
 
     def declare_queryable(self, key: str, take: Callable[[Any], None]) -> Any:  # noqa: ANN401 - zenoh is not typed
-        """Declare a queryable at `key`; `take` is called with each query."""
+        """Declare a queryable and return it.
+
+        Args:
+            key: Key expression of the queryable.
+            take: Called with each query, in a zenoh thread.
+        """
         return self._zenoh.declare_queryable(key, create_handler(take))
 
     def call(
@@ -446,7 +462,15 @@ class ZenohSession:
         take: Callable[[Any], None],
         over: Callable[[], None],
     ) -> None:
-        """Send a call to the server at `key`. Raises zenoh's `ZError`."""
+        """Send a call to a server, without waiting for the reply. Raises zenoh's `ZError`.
+
+        Args:
+            key: Key of the server.
+            parts: Header and payload of the call.
+            timeout_s: Seconds until zenoh finishes the query.
+            take: Called with each reply, in a zenoh thread.
+            over: Called when the query is finished.
+        """
         zenoh = load_zenoh()
         header, data = (each if isinstance(each, bytes) else bytes(each) for each in parts)
         self._zenoh.get(
@@ -463,7 +487,10 @@ class ZenohSession:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Remove all tokens, wait until the other nodes know that, and close the session."""
+        """Remove all tokens, wait until other nodes have noticed the removal, and close the session.
+
+        Waits up to `timeout_s` seconds.
+        """
         self._opened.unregister()
         with self._lock:
             tokens = list(self._tokens.values())

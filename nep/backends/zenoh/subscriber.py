@@ -1,4 +1,4 @@
-"""ZenohSubscriber: queues messages received from zenoh for a reader."""
+"""Subscriber over zenoh: queues received messages for a reader."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ from nep.protocol.wire import HEADER_BYTES, hello_part, read_header, topic_part
 _logger = logging.getLogger("nep")
 _MAX_TOPIC_PARSERS = 10_000
 _BATCH_BYTES = 64 * 2**20
-"""Maximum size of a sink's batch. The inbox is smaller by this size, so that both stay within the bound."""
+"""Maximum size of a sink's batch in bytes, which is subtracted from the inbox's limit.
+
+The inbox and a batch together thus stay within the subscriber's `max_bytes`.
+"""
 
 
 class _TopicParser(NamedTuple):
@@ -39,7 +42,13 @@ class _TopicParser(NamedTuple):
 
 
 class ZenohSubscriber(WakingSubscriber):
-    """Subscriber with an inbox or a sink. `on_close` unregisters it; called once, without a lock."""
+    """Subscriber with an inbox or a sink.
+
+    Args:
+        spec: Settings of the subscriber.
+        inboxes: Shared state of the node's inboxes.
+        on_close: Unregisters the subscriber. Called once, without a lock.
+    """
 
     def __init__(
         self, spec: SubscriberSpec, inboxes: Inboxes, on_close: Callable[[ZenohSubscriber], None]
@@ -94,7 +103,7 @@ class ZenohSubscriber(WakingSubscriber):
             return None if self.is_closed else self._inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
         self._inboxes.wait((self,), timeout_s)
         return self.poll()
 
@@ -140,7 +149,7 @@ class ZenohSubscriber(WakingSubscriber):
     # ---- callbacks in zenoh's threads
 
     def receive_message(self, sample: Any) -> None:  # noqa: ANN401 - zenoh is not typed
-        """Handle a message of the topic."""
+        """Parse and queue a message of the topic. Called in a zenoh thread."""
         topic_parser = self._topic_parser_for(sample)
         if topic_parser is not None:
             self._process(sample, topic_parser, topic_parser.topic)
@@ -203,20 +212,20 @@ class ZenohSubscriber(WakingSubscriber):
             self._enqueue(topic_parser.parser.parse(topic_parser.topic, rest))
 
     def end_handshake(self, publishers: Iterable[int]) -> None:
-        """Stop waiting for these publishers' replies to a hello."""
+        """Stop waiting for the replies of these publishers to a hello, and deliver their queued messages."""
         with self._inboxes.changed:
             for publisher in publishers:
                 self._release_early(publisher)
 
     def add_publisher(self, remote: RemotePublisher) -> None:
-        """Add a publisher."""
+        """Add a publisher, which removes silent publishers that it replaces."""
         with self._inboxes.changed:
             for old in self._sources.replaced_publishers(remote):
                 self._sources.pop(old)
             self._sources.add_listed(remote).is_silent = False
 
     def mark_silent(self, publisher: int) -> None:
-        """Mark a publisher as not responding. It is not removed, because it may only be unreachable."""
+        """Mark a publisher as not responding. It isn't removed, because it may only be unreachable."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:
@@ -225,7 +234,7 @@ class ZenohSubscriber(WakingSubscriber):
                 self._sources.pop(each)
 
     def handle_bye(self, publisher: int, last_seq: int) -> None:
-        """Handle a publisher's bye, which states `last_seq` as its last message."""
+        """Remove a publisher that has closed, and count its missing messages up to `last_seq` as lost."""
         with self._inboxes.changed:
             source = self._sources.find(publisher)
             if source is not None:

@@ -1,4 +1,4 @@
-"""Transport of the back end `zenoh`: one session per node and place, without a master."""
+"""Transport of the back end `zenoh`: one session per node and network address, without a master."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class _PendingFlush:
 
 
 class ZenohTransport:
-    """Connection of one node. Raises `BackendUnavailableError` if zenoh is not installed."""
+    """Connection of one node over zenoh. Raises `BackendUnavailableError` if zenoh is not installed."""
 
     def __init__(self, node: NodeRecord) -> None:
         load_zenoh()
@@ -61,7 +61,7 @@ class ZenohTransport:
     # ---- publishers and subscribers
 
     def create_publisher(self, spec: PublisherSpec) -> ZenohPublisher:
-        """Create a publisher. See `Transport.publisher`."""
+        """Create a publisher. See `Transport.create_publisher`."""
         with self._translate_closed_errors():
             return self._create_publisher(spec)
 
@@ -90,7 +90,7 @@ class ZenohTransport:
         return publisher
 
     def create_subscriber(self, spec: SubscriberSpec) -> ZenohSubscriber:
-        """Create a subscriber. See `Transport.subscriber`."""
+        """Create a subscriber. See `Transport.create_subscriber`."""
         with self._translate_closed_errors():
             return self._create_subscriber(spec)
 
@@ -112,17 +112,17 @@ class ZenohTransport:
         return subscriber
 
     def create_server(self, spec: ServerSpec) -> ZenohServer:
-        """Create a server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.create_server`."""
         with self._translate_closed_errors():
             return self._services.create_server(spec)
 
     def create_client(self, spec: ClientSpec) -> ZenohClient:
-        """Create a client. See `ServiceTransport.client`."""
+        """Create a client. See `ServiceTransport.create_client`."""
         with self._translate_closed_errors():
             return self._services.create_client(spec)
 
     def create_surveyor(self, spec: ClientSpec) -> ZenohClient:
-        """Create a surveyor. See `ServiceTransport.survey`."""
+        """Create a surveyor. See `ServiceTransport.create_surveyor`."""
         return self.create_client(spec)
 
     @contextmanager
@@ -230,7 +230,7 @@ class ZenohTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
+        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
         own_subscribers = [each for each in subscribers if isinstance(each, ZenohSubscriber)]
         before = self._inboxes.wake_count
         with wake_on_call(calls, self.wake) as is_empty:

@@ -1,4 +1,4 @@
-"""Back end `zeromq`: the native wire, and direct connections on the original NEP's wire."""
+"""Back end `zeromq`: the native wire, and direct connections on the wire of the original NEP."""
 
 from nep.backends.base import Backend
 from nep.backends.zeromq.transport import ZeromqTransport

@@ -1,10 +1,10 @@
 """Endpoints that a publisher's socket binds, and selection of the endpoint that a subscriber connects to.
 
-`Bindings` binds one endpoint per address and, on Linux, an abstract Unix socket in addition to the loopback
-endpoint. For small messages between programs of one computer it is faster than TCP
-(docs/adr/0011-local-sockets.md), but messages of hundreds of kilobytes stall on its small buffer. Only Linux
-has abstract names, which need no clean-up after a crash. The name contains the publisher's loopback port,
-which makes it unique.
+`Bindings` binds one endpoint per address and, on Linux, an abstract Unix socket in addition to the
+loopback endpoint. For small messages between programs of one computer, Unix sockets are faster than TCP
+(docs/adr/0011-local-sockets.md), but messages of hundreds of kilobytes stall on the small socket
+buffer. Only Linux has abstract names, which need no clean-up after a crash. The name contains the
+publisher's loopback port, which makes it unique.
 
 Set `NEP_LOCAL=0` to disable Unix sockets, for example to capture the traffic with a network tool.
 """
@@ -28,14 +28,17 @@ from nep.system.descriptors import has_free_descriptors
 
 _logger = logging.getLogger("nep")
 SMALL_CODECS = frozenset({"json", "string", "msgpack"})
-"""Codecs whose messages are usually small: commands, replies, states."""
+"""Codecs whose messages are usually small, such as commands, replies and states."""
 _TCP_PREFIX = f"tcp://{LOOPBACK}:"
 _UNIX_SOCKET_PREFIX = "ipc://@nep-"
 _MIN_FREE_FDS_TO_BIND = 384
 _MIN_FREE_FDS_TO_ACCEPT = 192
-"""Number of descriptors to keep free: enough for the connections that can arrive between two checks."""
+"""Minimum number of free file descriptors for using Unix sockets.
+
+Enough for all connections that can arrive between two checks.
+"""
 _probe_results: set[bool] = set()
-"""Contains True after a successful probe, so that later probes are skipped."""
+"""Set that contains True after the first successful probe; later probes are then skipped."""
 
 
 def has_unix_sockets() -> bool:
@@ -46,7 +49,8 @@ def has_unix_sockets() -> bool:
 def has_room_for_unix_sockets() -> bool:
     """Return True if this process has enough free descriptors to accept connections on a Unix socket.
 
-    libzmq 4.3 aborts the process when it has none left; TCP connections wait in the kernel instead.
+    Without a free descriptor, libzmq 4.3 aborts the process when a connection arrives on a Unix socket; TCP
+    connections wait in the kernel instead.
     """
     return has_free_descriptors(_MIN_FREE_FDS_TO_ACCEPT)
 
@@ -91,9 +95,9 @@ def _is_reachable(name: str) -> bool:
 
 
 def select_endpoint(remote: RemotePublisher, master: str) -> RemotePublisher:
-    """Return a publisher with only the endpoint that this node should connect to.
+    """Return a publisher's record with only the endpoint that this node should connect to.
 
-    On the master's computer this is the publisher's Unix socket, if it has one.
+    If the master is on this computer and the publisher has a Unix socket, this is the Unix socket.
 
     Args:
         remote: Publisher with all its endpoints.
@@ -110,7 +114,7 @@ def select_endpoint(remote: RemotePublisher, master: str) -> RemotePublisher:
 
 
 class Bindings:
-    """Endpoints to which `socket` is bound. Guarded by the lock of the socket's owner.
+    """Endpoints to which a socket is bound. Guarded by the lock of the socket's owner.
 
     Args:
         socket: Socket to bind.
@@ -137,10 +141,10 @@ class Bindings:
         return (*self._bound.values(), *self._local.values())
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind these hosts and no others, each at its own port; return the endpoints in the same order.
+        """Bind these hosts and unbind all others; return the endpoints in the order of `hosts`.
 
-        Hosts that can't be bound are skipped. Raises `AddressInUseError` or `TooManyFilesError` if none is
-        left.
+        Each host gets its own port. Hosts that can't be bound are skipped. Raises `AddressInUseError` or
+        `TooManyFilesError` if no host is bound.
         """
         for host in [known for known in self._bound if known not in hosts]:
             self._unbind_host(host)

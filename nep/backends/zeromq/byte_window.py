@@ -1,7 +1,8 @@
-"""Flow control in bytes, because libzmq limits its queues only by number of messages. No sockets.
+"""Flow control in bytes, because libzmq limits its queues only by number of messages. Performs no I/O.
 
-`SendWindow` is for subscribers that acknowledge messages; it covers the queues of both sockets and of the
-kernel. `Backlog` is for all others; it covers only the messages that libzmq still queues in this process.
+`SendWindow` is for subscribers that acknowledge messages; it covers the queues of both sockets and of
+the kernel. `Backlog` is for all other subscribers; it covers only the messages that libzmq still queues
+in this process.
 """
 
 from __future__ import annotations
@@ -10,24 +11,30 @@ from collections import deque
 from typing import Protocol
 
 WINDOW_BYTES = 192 * 2**20
-"""Maximum number of unacknowledged bytes per subscriber. Together with a batch in its sink this is 256 MB."""
+"""Maximum number of unacknowledged bytes per subscriber; 256 MB together with a batch in the sink."""
 MIN_WINDOW_BYTES = 24 * 2**20
-"""Smallest window that a subscriber may request.
+"""Smallest window in bytes that a subscriber may request.
 
-It is two steps long, so that sending continues while an acknowledgement is under way.
+Twice `ACK_INTERVAL_BYTES`, so that sending continues while an acknowledgement is in transit.
 """
 ACK_INTERVAL_BYTES = 12 * 2**20
 """Number of bytes after which an acknowledgement is requested from a subscriber."""
 TRACKING_INTERVAL_BYTES = 2**20
-"""Number of bytes after which a message is tracked for subscribers without acknowledgements."""
+"""Number of bytes between tracked messages for subscribers that don't acknowledge messages."""
 _MAX_ENTRY_BYTES = 2**20
-"""Maximum size of an entry that several small messages share; acknowledged with its newest message."""
+"""Maximum total size in bytes of small messages that share an entry.
+
+A shared entry is acknowledged with its newest message.
+"""
 _ACK_RETRY_S = 0.5
-"""Interval in seconds for repeating a request. libzmq drops requests while the subscriber's queue is full."""
+"""Interval in seconds for repeating a request for an acknowledgement.
+
+Needed because libzmq drops requests while the subscriber's queue is full.
+"""
 
 
 class SendWindow:
-    """Unacknowledged messages of one subscriber. Guarded by the publisher's lock."""
+    """Window of unacknowledged messages of one subscriber. Guarded by the publisher's lock."""
 
     def __init__(self) -> None:
         self.unacked_bytes = 0
@@ -46,7 +53,12 @@ class SendWindow:
         return self.unacked_bytes <= ACK_INTERVAL_BYTES or self.unacked_bytes + size_bytes <= self._bound
 
     def add_sent(self, seq: int, size_bytes: int) -> None:
-        """Add `size_bytes` that were sent up to and including message `seq`."""
+        """Add sent bytes to the window.
+
+        Args:
+            seq: Sequence number of the newest message that the bytes belong to.
+            size_bytes: Number of bytes sent since the previous call.
+        """
         if self._sent and self._sent[-1][1] + size_bytes <= _MAX_ENTRY_BYTES:
             self._sent.append((seq, self._sent.pop()[1] + size_bytes))
         else:
@@ -59,20 +71,33 @@ class SendWindow:
         self._has_drops = True
 
     def should_notify(self) -> bool:
-        """Return True once when the subscriber has room again after a drop and should be notified."""
+        """Return True if the subscriber must be notified that the window has room again after a drop.
+
+        Returns True only once for all drops since the last notification.
+        """
         if not self._has_drops or self.unacked_bytes > ACK_INTERVAL_BYTES:
             return False
         self._has_drops = False
         return True
 
     def acknowledge(self, seq: int, bound_bytes: int) -> None:
-        """Handle an acknowledgement of all messages up to `seq`, and adopt `bound_bytes` as the window."""
+        """Handle an acknowledgement.
+
+        Args:
+            seq: Sequence number up to which all messages are acknowledged.
+            bound_bytes: Window requested by the subscriber, in bytes.
+        """
         self._bound = max(MIN_WINDOW_BYTES, min(bound_bytes, WINDOW_BYTES))
         while self._sent and self._sent[0][0] <= seq:
             self.unacked_bytes -= self._sent.popleft()[1]
 
     def should_request_ack(self, now: float, *, has_room: bool) -> bool:
-        """Return True, and restart the interval, if an acknowledgement should be requested."""
+        """Return True if an acknowledgement should be requested now, and restart the retry interval.
+
+        Args:
+            now: Current time (`time.monotonic`).
+            has_room: True if the window had room for the last message.
+        """
         if self._bytes_since_request < ACK_INTERVAL_BYTES and (
             has_room or now < self._requested_at + _ACK_RETRY_S
         ):
@@ -83,7 +108,7 @@ class SendWindow:
 
 
 class ReleaseTracker(Protocol):
-    """Object that reports when libzmq has released a message, as `zmq.MessageTracker` does."""
+    """Interface of `zmq.MessageTracker`, which reports when libzmq has released a message."""
 
     @property
     def done(self) -> bool:
@@ -91,10 +116,10 @@ class ReleaseTracker(Protocol):
 
 
 class Backlog:
-    """Estimated backlog of the slowest subscriber without acknowledgements: an upper bound of libzmq's queue.
+    """Estimate of libzmq's queue for the slowest subscriber that doesn't acknowledge messages.
 
-    Only some messages are tracked. libzmq releases messages in order, so while a tracked message is queued,
-    all messages after it are counted as queued, too.
+    The estimate is an upper bound. Only some messages are tracked. libzmq releases messages in order, so
+    while a tracked message is queued, all later messages are counted as queued, too.
     """
 
     def __init__(self) -> None:
@@ -108,6 +133,11 @@ class Backlog:
         return self._bytes <= TRACKING_INTERVAL_BYTES or self._bytes + size_bytes <= WINDOW_BYTES
 
     def add_sent(self, tracker: ReleaseTracker, size_bytes: int) -> None:
-        """Add `size_bytes` that were sent since the last call; `tracker` belongs to the newest message."""
+        """Add sent bytes to the backlog.
+
+        Args:
+            tracker: Tracker of the newest message.
+            size_bytes: Number of bytes sent since the previous call.
+        """
         self._held.append((tracker, size_bytes))
         self._bytes += size_bytes

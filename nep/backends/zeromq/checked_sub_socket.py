@@ -1,8 +1,8 @@
-"""SubSocket that verifies over which connection each message arrived.
+"""`SubSocket` that verifies the connection over which each message arrived.
 
-The header of a message contains the id of its publisher, which any sender could forge. libzmq reports the
-descriptor of a message's connection (ZMQ_SRCFD) and the system reports its peer address, which must be the
-endpoint that the master lists for this publisher. docs/trust.md describes the remaining risks.
+The header of a message contains the id of its publisher, which any sender could forge. libzmq reports
+the descriptor of a message's connection (ZMQ_SRCFD) and the system reports its peer address, which must
+be the endpoint that the master lists for this publisher. docs/trust.md describes the remaining risks.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from nep.i18n import _
 from nep.protocol.wire import HEADER_BYTES, unpack_header, unpack_header_at
 
 CHECKED_TYPES = frozenset({"robot/answer"})
-"""Message types that are accepted only from their listed publisher: the confirmation of a robot's stop."""
+"""Message types that are accepted only from their listed publisher: confirmations of a robot's stop."""
 
 _DONTWAIT = int(zmq.DONTWAIT)
 _SRCFD = int(zmq.SRCFD)
@@ -27,7 +27,7 @@ _IPV4_ADDRESS = re.compile(r"\d+\.\d+\.\d+\.\d+", re.ASCII)
 
 
 class CheckedSubSocket(SubSocket):
-    """SubSocket that rejects messages with a forged publisher id. Costs 10 µs per message."""
+    """`SubSocket` that rejects messages with a forged publisher id, at a cost of 10 µs per message."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         super().__init__(socket, spec)

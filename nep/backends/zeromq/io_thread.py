@@ -1,14 +1,15 @@
-"""IoThread: event loop for the sockets of all nodes in a process, or for the sinks of one node.
+"""Event loop thread for the sockets of all nodes in a process, or for the sinks of one node.
 
-One thread serves all nodes; each node with sinks has another one for them.
+One thread serves all nodes; each node with sinks has another thread for its sinks.
 
-A ZeroMQ socket may be used by any thread that holds its owner's lock, so this thread polls only file
-descriptors, never sockets. When a descriptor is readable, the owner takes the lock and processes input until
-the socket is empty. ZMQ_FD is edge-triggered, and any use of the socket may consume the edge; a thread that
-uses a socket must therefore either empty it or call `serve_soon`.
+A ZeroMQ socket may be used by any thread that holds its owner's lock, so the event loop polls only file
+descriptors, never sockets. When a descriptor is readable, the owner takes the lock and processes input
+until the socket is empty. ZMQ_FD is edge-triggered, and any use of the socket may consume the edge; a
+thread that uses a socket must therefore either empty the socket or call `serve_soon`.
 
-Only `close` ends the thread: an owner that raises is served again after a second, and when polling itself
-fails (a descriptor was closed while it was polled), the poller is rebuilt without the broken descriptors.
+Only `close` ends the thread. An owner that raises is served again after a second. If polling itself
+fails because a descriptor was closed while being polled, the poller is rebuilt without the broken
+descriptors.
 
 `SharedContext` holds the process's ZeroMQ context and its I/O thread, created with the first node and
 terminated with the last. A context per node would cost three threads and a dozen descriptors each.
@@ -49,7 +50,10 @@ _logger = logging.getLogger("nep.io")
 _RETRY_S = 1.0
 
 _MAX_SOCKETS = 65_535
-"""libzmq's upper limit; the limit on open files is reached first."""
+"""Maximum number of sockets per context, which is the upper limit of libzmq.
+
+The limit on open files is reached earlier.
+"""
 _FDS_PER_CONTEXT = 12
 _FDS_PER_SOCKET = 4
 """Number of descriptors per socket: the socket, its port, its Unix socket and a connection."""
@@ -59,16 +63,16 @@ _ReadyKey = tuple[selectors.SelectorKey, int]
 _EPOLL_TICK_S = 0.001
 _EPOLL_SELECTOR = getattr(selectors, "EpollSelector", ())
 _SELECT_MAX_FD = 1024
-"""Limit of `select`, which supports only descriptors below this number."""
+"""Limit of `select`, which supports only file descriptors below this number."""
 
 
 class PollState(NamedTuple):
-    """Condition for serving a socket's owner again.
+    """Conditions under which the I/O thread serves an owner again.
 
     Attributes:
-        pause_reading: True to pause reading until `due`.
+        pause_reading: True to ignore input until `due`.
         due: Time (`time.monotonic`) at which to serve the owner; None to wait for input only.
-        sends: True to serve the owner also when its descriptor is writable. Not for ZeroMQ sockets.
+        wants_write: True to serve the owner also when its descriptor is writable. Not for ZeroMQ sockets.
     """
 
     pause_reading: bool = False
@@ -77,7 +81,7 @@ class PollState(NamedTuple):
 
 
 class Pollable(Protocol):
-    """Owner of a socket that an `IoThread` serves."""
+    """Interface of a socket's owner to the `IoThread` that serves it."""
 
     @property
     def fd(self) -> int:
@@ -88,7 +92,7 @@ class Pollable(Protocol):
 
 
 class IoThread:
-    """Event loop thread. See the module docstring.
+    """Thread with an event loop. See the module docstring.
 
     Args:
         name: Name of the thread.
@@ -125,7 +129,7 @@ class IoThread:
         self._thread.start()
 
     def add(self, served: Pollable) -> None:
-        """Start serving `served`, immediately and then on input. May be called before `start`."""
+        """Start serving `served`: once immediately, then on input. May be called before `start`."""
         self._queue_command("add", served, None)
 
     def serve_soon(self, served: Pollable) -> None:
@@ -133,10 +137,10 @@ class IoThread:
         self._queue_command("soon", served, None)
 
     def remove(self, served: Pollable, timeout_s: float = 2.0) -> None:
-        """Stop serving `served`; afterwards its socket may be closed.
+        """Stop serving `served`, whose socket may be closed afterwards.
 
-        While the thread is blocked by a sink that doesn't return, only the first call waits for `timeout_s`
-        seconds.
+        Waits up to `timeout_s` seconds for the thread. If a sink blocks the thread, only the first call
+        waits.
         """
         if threading.current_thread() is self._thread or not self._thread.is_alive():
             self._unregister(served)
@@ -157,7 +161,7 @@ class IoThread:
             self._thread.join(timeout_s)
 
     def forked(self) -> None:
-        """Mark the thread as closed in a forked child process, where only the parent's poller exists."""
+        """Mark the thread as closed in a forked child process, where the thread doesn't exist."""
         self._is_closing = True
         self._pause = threading.Event()
         self._served.clear()
@@ -321,7 +325,7 @@ def _select(selector: selectors.BaseSelector, timeout_s: float | None) -> Sequen
 
 
 class SharedContext:
-    """ZeroMQ context of the process. Each call of `shared_context` must be followed by one of `leave`."""
+    """ZeroMQ context of the process. Match each call of `shared_context` with a call of `release`."""
 
     def __init__(self) -> None:
         check_free_descriptors(_FDS_PER_CONTEXT, "a node")
@@ -342,7 +346,15 @@ class SharedContext:
             raise
 
     def socket(self, kind: int, what: str) -> Socket:
-        """Create a socket with a linger of 0. Raises `TooManyFilesError`, whose message contains `what`."""
+        """Create a socket with a linger of 0.
+
+        Args:
+            kind: Socket type of zmq.
+            what: Owner of the socket, for error messages.
+
+        Raises:
+            TooManyFilesError: The process is out of file descriptors.
+        """
         self._wait_for_room(what)
         try:
             created = self._context.socket(kind)
@@ -378,12 +390,12 @@ class SharedContext:
         waker.close()
 
     def acquire(self) -> None:
-        """Add a user, so that the context isn't terminated before the matching `leave`."""
+        """Add a user, so that the context isn't terminated before the matching `release`."""
         with _lock:
             self.users += 1
 
     def release(self) -> None:
-        """Remove a user, which must have closed all its sockets.
+        """Remove a user, which must have closed all its sockets before.
 
         The last user stops the thread and terminates the context.
         """
@@ -410,11 +422,17 @@ _shared_context: SharedContext | None = None
 _inherited_contexts: list[SharedContext] = []
 
 
-"""Contexts inherited by a forked child process. They are kept: destroying them would affect the parent."""
+"""Contexts inherited by a forked child process.
+
+Never destroyed, because destroying them would affect the parent process.
+"""
 
 
 def shared_context() -> SharedContext:
-    """Return the context of this process; create it if needed. Raises `TooManyFilesError`."""
+    """Add a user to the ZeroMQ context of this process and return the context; create it if needed.
+
+    Raises `TooManyFilesError`.
+    """
     global _shared_context  # noqa: PLW0603 - one per process
     with _lock:
         if _shared_context is None:

@@ -1,8 +1,9 @@
-"""Direct connections on the original NEP's wire: a fixed address without a master.
+"""Direct connections on the wire of the original NEP: a fixed address without a master.
 
-A frame has one part with one payload. In generation A (up to 0.5.4.5) the topic precedes the payload (`topic
-{"a":1}`); in generation B (from 0.5.4.8 on) only for the type `dictionary`. `image` always has the prefix;
-`images`, `bytes` and `msgpack` never have it. Images are base64.
+A frame has one part with one payload. In generation A (up to 0.5.4.5), the topic precedes the payload
+(`topic {"a":1}`). In generation B (from 0.5.4.8 on), the topic precedes only payloads of the type
+`dictionary`. In both generations, `image` always has this prefix, and `images`, `bytes` and `msgpack`
+never have it. Images are base64.
 """
 
 from __future__ import annotations
@@ -45,29 +46,43 @@ _HIGH_WATER_MARKS = {"image": 64, "bytes": 1000}
 _DEFAULT_HIGH_WATER_MARK = 10_000
 """High-water mark in messages per connection.
 
-For small messages this stays below the byte limit shared by all connections, so that one subscriber that
-doesn't read can't use up the room of the others.
+Full queues of small messages stay below the byte limit that all connections share, so that one
+subscriber that doesn't read can't block the others.
 """
 _logger = logging.getLogger("nep")
 _CLOSE_EVENT_MS = 100
-"""Time in milliseconds after the linger period in which libzmq reports a socket as closed."""
+"""Time in milliseconds after the linger period within which libzmq reports that a socket is closed."""
 
 
 def has_prefix(generation: str, msg_type: str) -> bool:
-    """Return True if programs of this generation send the topic as a prefix."""
+    """Return True if programs of a generation send the topic before the payload.
+
+    Args:
+        generation: "A" or "B".
+        msg_type: Message type of the topic.
+    """
     return msg_type in _PREFIXED_TYPES or (generation == "A" and msg_type not in _UNPREFIXED_TYPES)
 
 
 def to_frame(topic: str, generation: str, msg_type: str, codec: str, data: bytes | memoryview) -> bytes:
-    """Encode a payload, given in its native encoding, as a frame."""
+    """Convert a payload from its native encoding to a frame.
+
+    Args:
+        topic: Name of the topic.
+        generation: "A" or "B".
+        msg_type: Message type of the topic.
+        codec: Name of the codec of `data`.
+        data: Encoded payload.
+    """
     body = base64.b64encode(data) if codec == "image" else bytes(data)
     return topic.encode() + b" " + body if has_prefix(generation, msg_type) else body
 
 
 def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | None:
-    """Decode a frame of either generation; return None if it belongs to another topic of the same port.
+    """Convert a frame of either generation to the native encoding of its payload.
 
-    Raises `WireError` for an image that is not valid base64.
+    Returns None if the frame belongs to another topic on the same port. Raises `WireError` for an image
+    that is not valid base64.
     """
     prefix = topic.encode() + b" "
     if msg_type in _UNPREFIXED_TYPES and codec != "image":
@@ -87,7 +102,17 @@ def from_frame(topic: str, msg_type: str, codec: str, frame: bytes) -> bytes | N
 
 
 def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
-    """Bind or connect, depending on the mode, and return the endpoint. Raises `AddressInUseError`."""
+    """Bind or connect, depending on the mode, and return the endpoint.
+
+    Args:
+        socket: Socket of zmq.
+        direct: Address and mode.
+        is_publisher: True for a publisher's socket, False for a subscriber's.
+
+    Raises:
+        AddressInUseError: The address can't be bound.
+        NepError: The address to connect to is invalid.
+    """
     if direct.mode == "many2many":
         # both sides connect, to the two ports of the original NEP's proxy
         return connect(socket, f"{direct.ip}:{direct.port + (0 if is_publisher else 1)}")
@@ -97,9 +122,9 @@ def attach(socket: Socket, direct: Direct, *, is_publisher: bool) -> str:
 
 
 class OriginalPublisher:
-    """Publisher on the original NEP's wire.
+    """Publisher on the wire of the original NEP.
 
-    Owns `socket`, an XPUB that programs of the original NEP treat as a PUB.
+    Owns its socket, an XPUB, which programs of the original NEP can't distinguish from a PUB.
     """
 
     def __init__(
@@ -134,12 +159,12 @@ class OriginalPublisher:
 
     @property
     def has_subscribers(self) -> bool:
-        """True if any filter is set."""
+        """True if there is at least one subscription."""
         return self._filters > 0
 
     @property
     def subscribers(self) -> int:
-        """Number of filters, which is the number of subscribers; a proxy in between counts as one."""
+        """Number of subscriptions. A proxy counts as one subscriber."""
         return self._filters
 
     def wait_for_any(self, timeout_s: float) -> None:
@@ -189,7 +214,7 @@ class OriginalPublisher:
         return PollState()
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, flush and close the socket. Called once, by the publisher."""
+        """Unregister, flush for up to `timeout_s` seconds and close the socket. Must be called only once."""
         self._on_close(self, timeout_s)
 
     def send_bye(self) -> None:
@@ -198,16 +223,16 @@ class OriginalPublisher:
             self._is_closed = True
 
     def finish(self, deadline: float) -> None:
-        """Set the deadline for flushing; `release` waits for it.
+        """Set the deadline (`time.monotonic`) for flushing, until which `release` waits.
 
-        The original wire has no acknowledgements.
+        The wire of the original NEP has no acknowledgements to wait for.
         """
         self._deadline = deadline
 
     def flush(self, deadline: float) -> None:
-        """Close the socket. libzmq continues sending until `deadline`.
+        """Close the socket, while libzmq continues to send until `deadline` (`time.monotonic`).
 
-        The I/O thread must have stopped serving it.
+        The I/O thread must have stopped serving the socket.
         """
         with self._changed:
             self._is_closed = True
@@ -215,7 +240,10 @@ class OriginalPublisher:
             self._socket.close(self._remaining_ms())
 
     def release(self) -> None:
-        """Wait until libzmq has sent everything and closed the socket; log a warning at the deadline."""
+        """Wait until libzmq has sent all messages and closed the socket.
+
+        If the deadline set by `finish` passes, log a warning.
+        """
         if not self._socket.closed:
             self.flush(self._deadline)
         with self._changed:
@@ -243,7 +271,7 @@ class OriginalPublisher:
 
 
 class OriginalSubSocket(UnbatchedReader):
-    """SUB socket for frames of both generations. They have no sequence numbers, so losses are unknown."""
+    """SUB socket for frames of both generations, which have no sequence numbers, so losses are unknown."""
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
         self.fd = int(socket.getsockopt(zmq.FD))
@@ -264,7 +292,7 @@ class OriginalSubSocket(UnbatchedReader):
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:  # noqa: ARG002 - never batched
-        """Return the next message of the topic, or None."""
+        """Return the next message of the topic, or None if there is none. See `Readable.read`."""
         while True:
             try:
                 parts = self._socket.recv_multipart(0 if may_wait else zmq.DONTWAIT)
@@ -287,7 +315,7 @@ class OriginalSubSocket(UnbatchedReader):
                 return Message(self._spec.topic, data, self._codec.name, self._spec.msg_type)
 
     def count_dropped(self, count: int) -> None:
-        """Count messages dropped from the full queue, the only detectable losses."""
+        """Add messages dropped from the full queue to the losses. Other losses can't be detected."""
         self.received -= count
         self.lost = (self.lost or 0) + count
 

@@ -1,4 +1,4 @@
-"""Sequence numbers of a subscriber's publishers, and the number of lost messages. No sockets."""
+"""Sequence numbers of a subscriber's publishers, and the number of lost messages. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -15,39 +15,45 @@ from nep.system.addresses import is_loopback
 from nep.system.computer import computer_id
 
 BYE_TIMEOUT_S = 3.0
-"""Time in seconds during which the last messages of an unregistered publisher may still arrive."""
+"""Maximum time in seconds in which the last messages of an unregistered publisher can still arrive."""
 EARLY_MESSAGES_S = 5.0
 GAP_MAX = 2**32
-"""Maximum accepted gap in sequence numbers: an hour at a million messages per second."""
+"""Maximum accepted gap in sequence numbers, which is an hour at a million messages per second."""
 MIN_RECONNECT_S, MAX_RECONNECT_S = 2.0, 30.0
 UNLISTED_MAX = 1000
-"""Maximum number of tracked publishers that the master doesn't list; any sender can invent ids."""
+"""Maximum number of tracked publishers that the master doesn't list.
+
+Limited because any sender can invent publisher ids.
+"""
 _UNKNOWN_KIND = message_kind("", "", "")
 
 
 @dataclass
 class TrackedPublisher:
-    """State of one publisher.
+    """State of a publisher, as tracked by a subscriber.
 
     Attributes:
-        form: Header form of its last message, to which `kind` belongs; 0 if there is none.
-        last: Sequence number of its newest message that was received or counted as lost. None while unknown;
-            0 if all its messages are expected.
+        form: Header form of the publisher's last message, to which `kind` belongs; 0 if there is none.
+        last: Sequence number of the newest message that was received or counted as lost; None if unknown. 0
+            if all messages of the publisher are expected.
     """
 
     form: int = 0
     shared_form: int = 0
-    """Header form of its last message in shared memory."""
+    """Header form of the publisher's last message in shared memory."""
     kind: MessageKind = _UNKNOWN_KIND
     clock: PublisherClock = field(default_factory=PublisherClock)
-    """Clock of the publisher's computer; its messages refer to it."""
+    """Clock of the publisher's computer, to which the time stamps of its messages refer."""
     remote: RemotePublisher | None = None
     endpoint: str = ""
     failed_endpoint: str = ""
-    """Endpoint to which connecting failed; `problem` has the reason."""
+    """Endpoint to which connecting failed, for the reason in `problem`."""
     problem: str = ""
     early_until: float | None = None
-    """Time until which messages before the echo are skipped. See `PublisherTracker.is_early`."""
+    """Time (`time.monotonic`) until which messages before the echo are skipped.
+
+    See `PublisherTracker.is_early`.
+    """
     last: int | None = None
     has_responded: bool = False
     """True if a message, echo or bye was received."""
@@ -59,19 +65,19 @@ class TrackedPublisher:
     is_silent: bool = False
     bye_deadline: float | None = None
     announced_seq: int = 0
-    """Newest sequence number reported by the master, or stated when the publisher was unregistered."""
+    """Newest sequence number reported by the master; the final one after the publisher has unregistered."""
     late_from: int = 0
     late_to: int = 0
-    """Last message of the range from `late_from` that was counted as lost and may still arrive.
+    """Last message of a range of messages that were counted as lost but may still arrive.
 
-    These messages can arrive only while `late_to` equals `last`, because a later message would have been sent
-    after them.
+    The range starts at `late_from`. Its messages can arrive only while `late_to` equals `last`, because a
+    later message would have been sent after them.
     """
     jump_seq: int = 0
-    """Sequence number of a message rejected because of a too large gap before it; 0 if there is none."""
+    """Sequence number of a message rejected because the gap before it is too large; 0 if there is none."""
 
     def reset_connection(self, endpoint: str) -> None:
-        """Reset the state of the connection before the same socket connects to `endpoint`."""
+        """Reset the state of the connection. Call before the socket connects to `endpoint`."""
         is_retry = endpoint == self.endpoint
         self.reconnect_s = min(MAX_RECONNECT_S, 2 * self.reconnect_s) if is_retry else MIN_RECONNECT_S
         self.reconnect_at = time.monotonic() + self.reconnect_s
@@ -81,7 +87,10 @@ class TrackedPublisher:
 
 
 class PublisherTracker:
-    """Counter of received and lost messages, from gaps in the sequence numbers."""
+    """Tracker of a subscriber's publishers, which counts received and lost messages.
+
+    Losses are derived from gaps in the sequence numbers.
+    """
 
     def __init__(self) -> None:
         self.received = 0
@@ -93,7 +102,10 @@ class PublisherTracker:
         """Ids of publishers that the master doesn't list, oldest first."""
 
     def get(self, publisher: int) -> TrackedPublisher:
-        """Return a publisher's state; create it if needed, which may evict the oldest unlisted publisher."""
+        """Return a publisher's state; create it if needed.
+
+        Creating the state of an unlisted publisher may evict the oldest unlisted publisher.
+        """
         source = self.by_id.get(publisher)
         if source is None:
             source = self.by_id[publisher] = TrackedPublisher()
@@ -103,13 +115,13 @@ class PublisherTracker:
         return source
 
     def expect_all_messages(self, publisher: int) -> None:
-        """Count losses from the first message of a new publisher. No effect after its first message."""
+        """Count losses from the first message of a new publisher. No effect after a message was received."""
         source = self.get(publisher)
         if source.last is None:
             source.last = 0
 
     def add_listed(self, remote: RemotePublisher) -> TrackedPublisher:
-        """Return the state of a publisher that the master lists; create it if needed."""
+        """Store the master's record of a publisher and return the publisher's state, created if needed."""
         source = self.get(remote.publisher.id)
         source.remote = remote
         source.clock.difference = self._clock_difference(remote)
@@ -117,7 +129,7 @@ class PublisherTracker:
         return source
 
     def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """Set the clock differences of other computers by node id."""
+        """Set the clock differences of other computers, given by node id."""
         self._clocks = clocks
         for source in self.by_id.values():
             if source.remote is not None:
@@ -127,16 +139,16 @@ class PublisherTracker:
         return SAME_CLOCK if _is_on_this_computer(remote) else self._clocks.get(remote.node_id)
 
     def find(self, publisher: int) -> TrackedPublisher | None:
-        """Return a publisher's state, or None."""
+        """Return a publisher's state, or None if the publisher isn't tracked."""
         return self.by_id.get(publisher)
 
     def pop(self, publisher: int) -> TrackedPublisher | None:
-        """Remove and return a publisher's state."""
+        """Remove and return a publisher's state; return None if the publisher isn't tracked."""
         self._unlisted.pop(publisher, None)
         return self.by_id.pop(publisher, None)
 
     def items(self) -> list[tuple[int, TrackedPublisher]]:
-        """Return all publishers and their states."""
+        """Return (publisher id, state) of all publishers."""
         return list(self.by_id.items())
 
     @property
@@ -147,9 +159,17 @@ class PublisherTracker:
     def count_message(self, publisher: int, seq: int, *, is_alone: bool) -> bool:
         """Count a message; return False if it is a duplicate.
 
-        Only messages that were sent to this subscriber alone (`is_alone`), such as latched ones, can be
-        duplicates. Raises `WireError` if the gap before the message exceeds `GAP_MAX`. If the publisher
-        continues from there, counting restarts with an unknown number of losses.
+        If the gap before a message exceeds `GAP_MAX` and the publisher continues from there, counting
+        restarts with an unknown number of losses.
+
+        Args:
+            publisher: Id of the publisher.
+            seq: Sequence number of the message.
+            is_alone: True if the message was sent only to this subscriber, as latched messages are. Only
+                such messages can be duplicates.
+
+        Raises:
+            WireError: The gap before the message exceeds `GAP_MAX`.
         """
         source = self.get(publisher)
         source.has_responded = source.is_connected = True
@@ -174,11 +194,11 @@ class PublisherTracker:
         return True
 
     def is_early(self, publisher: int) -> bool:
-        """Return True if a message to all subscribers will be sent again before the echo.
+        """Return True if a message to all subscribers must be skipped because the history will contain it.
 
-        A publisher with a history may read this subscriber's filter before its hello. Messages sent in
-        between are newer than the messages of the history, which follows and contains all of them. Messages
-        of publishers that send no echo are accepted after `EARLY_MESSAGES_S`.
+        A publisher with a history may process this subscriber's topic filter before its hello. Messages
+        sent in between are sent again as part of the history, which precedes the echo. If a publisher sends
+        no echo, its messages are accepted after `EARLY_MESSAGES_S`.
         """
         source = self.by_id.get(publisher)
         if source is None or source.has_echoed or source.has_responded or source.remote is None:
@@ -191,9 +211,10 @@ class PublisherTracker:
         return now < source.early_until
 
     def advance_to(self, publisher: int, seq: int) -> bool:
-        """Handle an echo or bye: all messages up to `seq` were sent before it on the same connection.
+        """Handle an echo or bye, before which all messages up to `seq` were sent on the same connection.
 
-        Returns False, and counts nothing, if the gap exceeds `GAP_MAX`.
+        Messages up to `seq` that have not been received are counted as lost. Returns False, and counts
+        nothing, if the gap exceeds `GAP_MAX`.
         """
         source = self.get(publisher)
         source.has_responded = source.is_connected = True
@@ -208,9 +229,9 @@ class PublisherTracker:
     def expect_up_to(self, publisher: int, seq: int) -> None:
         """Handle the master's report that `seq` was sent. Call only when the socket is empty.
 
-        Messages that were already reported at the previous renewal and not received since are counted as
-        lost; if they arrive after all, the number is corrected. Also for unlisted publishers, which may have
-        ended while this computer was disconnected.
+        Messages that the previous report already contained and that have not been received since then are
+        counted as lost. If they arrive later, the count is corrected. Publishers that aren't listed are
+        included, because they may have ended while this computer was disconnected.
         """
         source = self.by_id.get(publisher)
         if source is None or source.last is None or seq - source.last > GAP_MAX:
@@ -228,21 +249,32 @@ class PublisherTracker:
         self.lost += count
 
     def mark_closing(self, publisher: int, final: int, now: float) -> None:
-        """Record that a publisher was unregistered or replaced. `final` is its last message, 0 if unknown."""
+        """Record that a publisher was unregistered or replaced.
+
+        Args:
+            publisher: Id of the publisher.
+            final: Sequence number of its last message, 0 if unknown.
+            now: Current time (`time.monotonic`).
+        """
         source = self.by_id.get(publisher)
         if source is not None and source.bye_deadline is None:
             source.bye_deadline = now + BYE_TIMEOUT_S
             source.announced_seq = max(source.announced_seq, final)
 
     def mark_silent(self, publisher: int, final: int) -> None:
-        """Record that a publisher is no longer listed. `final` is the newest message known to the master."""
+        """Record that the master no longer lists a publisher.
+
+        Args:
+            publisher: Id of the publisher.
+            final: Sequence number of the newest message known to the master.
+        """
         source = self.by_id.get(publisher)
         if source is not None:
             source.is_silent = True
             source.announced_seq = max(source.announced_seq, final)
 
     def count_missing(self, publisher: int) -> None:
-        """Count the missing messages of a publisher as lost, before the publisher is removed."""
+        """Count the missing messages of a publisher as lost. Call before removing the publisher."""
         source = self.by_id.get(publisher)
         if source is not None and source.last is not None:
             self.advance_to(publisher, source.announced_seq)
@@ -250,8 +282,8 @@ class PublisherTracker:
     def expired_publishers(self, now: float) -> list[int]:
         """Return the ids of publishers to remove.
 
-        These are unregistered publishers whose bye is overdue, and the oldest silent ones beyond
-        `UNLISTED_MAX`.
+        These are unregistered publishers whose bye is overdue at `now`, and the oldest silent publishers
+        beyond `UNLISTED_MAX`.
         """
         all_ = self.by_id.items()
         silent = [each for each, source in all_ if source.is_silent and source.bye_deadline is None]
@@ -261,7 +293,7 @@ class PublisherTracker:
         return silent[: max(0, len(silent) - UNLISTED_MAX)] + over
 
     def unresponsive_publishers(self, now: float) -> list[int]:
-        """Return publishers from which nothing was received in time after connecting to them."""
+        """Return the ids of publishers from which nothing was received before the reconnection time."""
         return [
             each
             for each, source in self.by_id.items()
@@ -269,7 +301,7 @@ class PublisherTracker:
         ]
 
     def replaced_publishers(self, remote: RemotePublisher) -> list[int]:
-        """Return the silent publishers that `remote` replaces, because its program was restarted."""
+        """Return the ids of silent publishers that `remote` replaces, because their program was restarted."""
         return [
             each
             for each, source in self.by_id.items()

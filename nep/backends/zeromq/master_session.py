@@ -1,6 +1,6 @@
-"""MasterSession: a node's registrations at one master, renewed periodically.
+"""Registrations of a node at one master, renewed periodically.
 
-Stores everything that is registered, so that a restarted master receives it again immediately. `RenewalTimer`
+All registrations are stored, so that a restarted master receives them again immediately. `RenewalTimer`
 schedules the renewals.
 """
 
@@ -62,12 +62,12 @@ from nep.system.addresses import MasterName, is_endpoint, is_loopback, resolve_h
 from nep.system.cpu import CpuLoad
 
 _MAX_RENEW_S = 30.0
-"""Maximum renewal interval in seconds that a master may request."""
+"""Longest renewal interval in seconds that is accepted from a master."""
 
 _logger = logging.getLogger("nep")
 
 _ADDRESS_CHECK_S = 1.0
-"""Interval in seconds for checking whether the publishers have to move to other addresses."""
+"""Interval in seconds for checking whether the publishers must bind other addresses."""
 _JOIN_RETRY_S = 0.5
 _RECONNECT_S, _RECONNECT_FAR_S = 2.0, 2 * CONNECT_TIMEOUT_MS / 1000
 """Reconnection intervals for a master on this and on another computer.
@@ -77,7 +77,7 @@ libzmq gives up after a failed handshake, for example with a PUB socket at the m
 
 
 class SessionPublisher(Protocol):
-    """Publisher, as its session uses it."""
+    """Interface of a publisher to its master session."""
 
     @property
     def is_local(self) -> bool:
@@ -87,20 +87,20 @@ class SessionPublisher(Protocol):
         """Return the statistics that a renewal reports."""
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind to these addresses of this computer and no others; return the endpoints."""
+        """Bind these addresses of this computer and unbind all others; return the endpoints."""
 
     def unbind_local(self) -> None:
-        """Accept only TCP connections from now on."""
+        """Stop accepting connections other than TCP."""
 
 
 class SessionSubscriber(Protocol):
-    """Subscriber, as its session uses it."""
+    """Interface of a subscriber to its master session."""
 
     def counts(self) -> SubscriberCount:
         """Return the statistics that a renewal reports."""
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to further publishers."""
+        """Connect to publishers in addition to the existing ones."""
 
     def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
         """Handle the removal of a publisher.
@@ -115,7 +115,12 @@ class SessionSubscriber(Protocol):
         """Replace the list of publishers."""
 
     def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Handle a renewal: the newest sequence numbers known to the master, as (publisher id, number)."""
+        """Handle a renewal.
+
+        Args:
+            now: Current time (`time.monotonic`).
+            last_seqs: (publisher id, newest sequence number known to the master) of each publisher.
+        """
 
     def reconnect_remote(self) -> None:
         """Reconnect to publishers on other computers, because the address of this computer has changed."""
@@ -124,7 +129,8 @@ class SessionSubscriber(Protocol):
 class RenewalTimer:
     """Schedule of renewals: every second, unless the master requests another interval.
 
-    `due_at` is the time of the next renewal (`time.monotonic`).
+    Attributes:
+        due_at: Time of the next renewal (`time.monotonic`).
     """
 
     def __init__(self) -> None:
@@ -132,11 +138,19 @@ class RenewalTimer:
         self._renew_s = RENEW_S
 
     def start(self, now: float) -> None:
-        """Record a renewal sent at `now`; schedule the next one in case the master doesn't reply."""
+        """Record a renewal sent at `now` (`time.monotonic`) and schedule the next one.
+
+        The next renewal takes place even if the master doesn't reply.
+        """
         self.due_at = now + self._renew_s
 
     def set_interval(self, renew_s: float, now: float) -> None:
-        """Set the interval requested by the master."""
+        """Set the interval that the master requests.
+
+        Args:
+            renew_s: Interval in seconds.
+            now: Current time (`time.monotonic`).
+        """
         self._renew_s = min(_MAX_RENEW_S, max(RENEW_S, renew_s))
         self.due_at = now + self._renew_s
 
@@ -149,7 +163,7 @@ class MasterSession:
         io: Thread that serves the socket.
         node: Record of the node.
         address: Address of the master.
-        look_up: Resolves a host name.
+        look_up: Resolves a host name to an address.
     """
 
     def __init__(
@@ -200,10 +214,11 @@ class MasterSession:
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """Addresses of this computer to which publishers bind.
+        """Addresses of this computer that publishers bind.
 
-        On the master's computer these are the loopback address and those at which the master serves other
-        computers; on other computers it is the address of the interface that reaches the master.
+        On the master's computer, these are the loopback address and the addresses at which the master
+        serves other computers. On other computers, it is the address of the interface that reaches the
+        master.
         """
         return (LOOPBACK, *self._served_hosts) if self._is_near else (self._own_host,)
 
@@ -216,7 +231,10 @@ class MasterSession:
             return not self._publishers and not self._subscribers and not self._calls.has_waiting_calls
 
     def wait_for_address(self, wait_s: float | None) -> None:
-        """Wait until the master's address is resolved; None waits forever. Raises `MasterUnreachable`."""
+        """Wait up to `wait_s` seconds until the master's address is resolved; None waits forever.
+
+        Raises `MasterUnreachable` on timeout.
+        """
         if not self._name.wait(wait_s) and wait_s is not None:
             raise MasterUnreachable(self.address, wait_s, is_known=False)
 
@@ -228,7 +246,15 @@ class MasterSession:
     def add_publisher(
         self, record: PublisherRecord, publisher: SessionPublisher, wait_s: float | None
     ) -> Added:
-        """Register a publisher; return the subscribers to wait for. Raises as `RpcClient.ask` does."""
+        """Register a publisher and return the master's reply with the subscribers to wait for.
+
+        Args:
+            record: Record of the publisher.
+            publisher: Publisher, which binds the addresses that the master returns.
+            wait_s: Seconds to wait for each reply; None waits forever.
+
+        Raises the same errors as `RpcClient.request`.
+        """
         with self._lock:
             self._publishers[record.id] = (record, publisher)
         try:
@@ -254,7 +280,10 @@ class MasterSession:
         subscriber: SessionSubscriber | PatternSubscriber,
         wait_s: float | None,
     ) -> Found:
-        """Register a subscriber; return the publishers to connect to. Raises as `RpcClient.ask` does."""
+        """Register a subscriber and return the master's reply with the publishers to connect to.
+
+        Raises the same errors as `RpcClient.request`.
+        """
         with self._lock:
             self._subscribers[record.id] = (record, subscriber)
         try:
@@ -269,7 +298,12 @@ class MasterSession:
         return replace(reply, publishers=self._select_endpoints(reply.publishers))
 
     def remove_publisher(self, publisher: int, last_seq: int) -> None:
-        """Unregister a publisher, whose last message is `last_seq`. Doesn't wait."""
+        """Unregister a publisher, without waiting.
+
+        Args:
+            publisher: Id of the publisher.
+            last_seq: Sequence number of its last message.
+        """
         with self._lock:
             known = self._publishers.pop(publisher, None)
             self._confirmed.discard(publisher)
@@ -277,7 +311,7 @@ class MasterSession:
             self._calls.notify(RemovePublisher(self._node.id, publisher, last_seq))
 
     def remove_subscriber(self, subscriber: int) -> None:
-        """Unregister a subscriber. Doesn't wait."""
+        """Unregister a subscriber by its id, without waiting."""
         with self._lock:
             known = self._subscribers.pop(subscriber, None)
             self._confirmed.discard(subscriber)
@@ -285,11 +319,11 @@ class MasterSession:
             self._calls.notify(RemoveSubscriber(self._node.id, subscriber))
 
     def report_missing(self, publisher: int, subscribers: Iterable[int]) -> None:
-        """Report subscribers that did not complete the handshake with a publisher."""
+        """Report the ids of subscribers that have not completed the handshake with a publisher."""
         self._calls.notify(ReportMissing(self._node.id, publisher, tuple(subscribers)))
 
     def query_graph(self, timeout_s: float) -> GraphView:
-        """Request the graph. Raises as `RpcClient.ask` does."""
+        """Request the graph from the master. Raises the same errors as `RpcClient.request`."""
         self.wait_for_address(timeout_s)
         reply = self._calls.request(QueryGraph(), timeout_s)
         if not isinstance(reply, GraphReply):
@@ -299,7 +333,7 @@ class MasterSession:
         return reply.view
 
     def begin_leave(self) -> None:
-        """Unregister the node if the master is connected. Doesn't wait."""
+        """Unregister the node if the master is connected, without waiting for the reply."""
         with self._lock:
             if self._is_closed:
                 return
@@ -315,7 +349,7 @@ class MasterSession:
             self._left_at = time.monotonic()
 
     def leave(self, timeout_s: float) -> None:
-        """Wait for the reply to `begin_leave` until `timeout_s` seconds after it was sent."""
+        """Wait for the reply to the request of `begin_leave`, until `timeout_s` seconds after it was sent."""
         if self._leaving is None:
             return
         left = timeout_s + self._left_at - time.monotonic()
@@ -333,7 +367,7 @@ class MasterSession:
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Process replies. Renew when due, and immediately after a reconnection."""
+        """Process replies; renew when a renewal is due, and immediately after a reconnection."""
         answers = self._calls.read()
         self._read_at = self._clock.now() if answers else self._read_at
         for answer in answers:

@@ -1,8 +1,9 @@
-"""PatternSubscriber: one subscriber for all topics that match a pattern.
+"""Subscriber for all topics that match a pattern.
 
-It creates a member for each published topic: a subscriber with its own socket that says hello with the same
-id. The master lists one subscriber and reports every matching publisher to its node, so publishers wait for
-it as for any other subscriber, and its first message isn't lost.
+A `PatternSubscriber` creates a member for each published topic: a subscriber with its own socket whose
+hello has the same subscriber id. The master lists one subscriber and reports every matching publisher
+to its node. Publishers therefore wait for the member as for any other subscriber, and their first
+messages aren't lost.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from nep.system.wakeup import Waker
 
 _logger = logging.getLogger("nep")
 _MAX_MEMBERS = 2_000
-"""Maximum number of topics per subscriber; limited because any program can publish any number of topics."""
+"""Maximum number of topics per subscriber, because any program can publish on any number of topics."""
 
 
 class PatternSubscriber(WakingSubscriber):
@@ -37,8 +38,8 @@ class PatternSubscriber(WakingSubscriber):
     Args:
         new_readable: Creates the socket of a member.
         io: Thread that serves the members.
-        spec: Settings; `topic` is the pattern.
-        on_close: Unregisters the subscriber.
+        spec: Settings; the topic is the pattern.
+        on_close: Unregisters the subscriber with this id.
     """
 
     def __init__(
@@ -57,7 +58,7 @@ class PatternSubscriber(WakingSubscriber):
         self._on_close = on_close
         self._members: dict[str, NativeSubscriber] = {}
         self._closed_early: set[int] | None = set()
-        """Ids of publishers that closed before `begin`; None after `begin`."""
+        """Ids of publishers that closed before `connect_listed`; None after `connect_listed`."""
         self._inbox = Inbox(spec.keep, spec.max_messages, spec.max_bytes)
         self._removed_totals = _RemovedTotals()
         self._dropped = 0
@@ -73,7 +74,7 @@ class PatternSubscriber(WakingSubscriber):
             return None if self.is_closed else self._inbox.pop()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait up to `timeout_s` seconds."""
+        """Wait up to `timeout_s` seconds for the next message; return None on timeout."""
         with self._changed:
             self._changed.wait_for(lambda: self.is_closed or len(self._inbox), timeout_s)
             return None if self.is_closed else self._inbox.pop()
@@ -140,9 +141,11 @@ class PatternSubscriber(WakingSubscriber):
     # ---- publishers
 
     def member(self, topic: str, *, may_create: bool = True) -> NativeSubscriber | None:
-        """Return the member for a topic, or None.
+        """Return the member for a topic, or None if there is none.
 
-        With `may_create`, a missing member is created unless there are already `_MAX_MEMBERS`.
+        Args:
+            topic: Name of the topic.
+            may_create: True to create a missing member, unless there are already `_MAX_MEMBERS`.
         """
         with self._members_lock:
             member = self._members.get(topic)
@@ -177,7 +180,7 @@ class PatternSubscriber(WakingSubscriber):
         return NativeSubscriber(self._new_readable(spec), self._io, spec, lambda _id: None)
 
     def connect_listed(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to the publishers listed at registration, except those that have closed since."""
+        """Connect to the publishers listed at registration, except those that have closed in the meantime."""
         with self._members_lock:
             closed, self._closed_early = self._closed_early or set(), None
             members = list(self._members.values())
@@ -190,13 +193,13 @@ class PatternSubscriber(WakingSubscriber):
                     found.connect((remote,))
 
     def record_early_close(self, publisher: int) -> None:
-        """Record that a publisher closed, because the reply to the registration may still list it."""
+        """Record the id of a closed publisher, which the reply to the registration may still list."""
         with self._members_lock:
             if self._closed_early is not None:
                 self._closed_early.add(publisher)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
-        """Wait until these publishers have sent their echo. See `NativeSubscriber.wait_for`."""
+        """Wait for the echo of these publishers; return False on timeout. See `NativeSubscriber.wait_for`."""
         ids = tuple(publishers)
         deadline = time.monotonic() + timeout_s
         members = list(self._members.values())
@@ -204,16 +207,16 @@ class PatternSubscriber(WakingSubscriber):
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Topics that have a member."""
+        """Names of the topics that have a member."""
         return tuple(self._members)
 
     def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """Set the clock differences of other computers, by node id."""
+        """Set the clock differences of other computers, given by node id."""
         for member in list(self._members.values()):
             member.set_clock_differences(clocks)
 
     def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
-        """Handle a renewal as `NativeSubscriber.tick` does, and remove members without publishers."""
+        """Handle a renewal like `NativeSubscriber.handle_renewal`; remove members without publishers."""
         seqs = tuple(last_seqs)
         for topic, member in list(self._members.items()):
             member.handle_renewal(now, seqs)

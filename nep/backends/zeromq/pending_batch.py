@@ -1,7 +1,7 @@
-"""PendingBatch: messages published in quick succession, which are sent in one part. No sockets.
+"""Messages published in quick succession, which are sent in one part. Performs no I/O.
 
-A message is sent immediately unless the previous one was published less than `BATCH_WINDOW_NS` ago. Otherwise
-it waits for others until there are `MAX_PENDING`, or until `MAX_DELAY_NS` have passed. See
+A message is sent immediately unless the previous one was published less than `BATCH_WINDOW_NS` ago.
+Otherwise it waits for others until there are `MAX_PENDING`, or until `MAX_DELAY_NS` have passed. See
 docs/adr/0009-one-part.md.
 """
 
@@ -21,9 +21,9 @@ BATCH_WINDOW_NS = 20_000
 MAX_DELAY_NS = 100_000
 MAX_PENDING = 64
 FULL_BATCH_BYTES = 65_536
-"""Size in bytes at which a batch is sent, because copying more takes longer than sending separately."""
+"""Size in bytes at which a batch is sent. Copying more would take longer than sending separately."""
 MAX_BATCHED_BYTES = 16_384
-"""Maximum size in bytes of a message in a batch, because copying larger ones costs more than it saves."""
+"""Maximum size in bytes of a message in a batch. Copying larger messages would cost more than it saves."""
 _BURST_CHECK_S = 500e-6
 """Interval in seconds of the I/O thread's checks while the publisher itself sends full batches."""
 
@@ -32,7 +32,7 @@ _time_ns = time.time_ns
 
 
 class SendPath(Protocol):
-    """Sending end of a publisher, as the batch uses it."""
+    """Interface of a publisher to its batch."""
 
     has_subscribers: bool
     """True if any subscriber is connected."""
@@ -52,7 +52,8 @@ class SendPath(Protocol):
 class PendingBatch:
     """Pending messages of one publisher. Guarded by the publisher's lock, except `pending`.
 
-    `may_wait` is False to disable batches.
+    Args:
+        may_wait: False to disable batches.
     """
 
     def __init__(self, *, may_wait: bool) -> None:
@@ -77,13 +78,21 @@ class PendingBatch:
         self._may_wait = may_wait
 
     def set_allowed(self, *, reads_batches: bool) -> None:
-        """Set whether all current subscribers accept batches."""
+        """Enable batches only while all current subscribers accept them.
+
+        Args:
+            reads_batches: True if all current subscribers accept batches.
+        """
         self.is_allowed = self._may_wait and reads_batches
         if not self.is_allowed:
             self.until_ns = 0
 
     def open_window(self, stamp_ns: int) -> None:
-        """Open the batching window after a message with this time stamp was sent alone."""
+        """Open the batching window after a message was sent alone.
+
+        Args:
+            stamp_ns: Time stamp of the message in nanoseconds.
+        """
         if self.is_allowed:
             self.until_ns = stamp_ns + BATCH_WINDOW_NS
 
@@ -92,11 +101,11 @@ class PendingBatch:
     ) -> Callable[..., None]:
         """Return the function that implements `Publisher.publish`.
 
-        It is one closure because nearly all of the time for a small message is spent here.
+        The function is one closure, because nearly all of the time for a small message is spent in it.
 
         Args:
             hooks: Functions for encoding and for the slow path.
-            path: Sending end.
+            path: Sending end of the publisher.
             lock: Lock of `path`.
         """
         owner, kind, encode, on_null, fallback = hooks
@@ -140,7 +149,7 @@ class PendingBatch:
     def pop_batch(self) -> list[tuple[bytes, int]]:
         """Remove and return up to `BATCH_MAX` pending messages, oldest first.
 
-        There must be at least one.
+        At least one message must be pending.
         """
         taken = self.pending[:BATCH_MAX]
         del self.pending[: len(taken)]  # more may have been appended meanwhile
@@ -148,9 +157,12 @@ class PendingBatch:
         return taken
 
     def next_check_s(self, now_ns: int) -> float:
-        """Return the seconds until the I/O thread must check again; 0 if pending messages must be sent now.
+        """Return the time in seconds until the I/O thread must check again.
 
-        Only for the I/O thread.
+        0 means that pending messages must be sent now. Call only in the I/O thread.
+
+        Args:
+            now_ns: Current time in nanoseconds.
         """
         had_full, self.has_sent_full = self.has_sent_full, False
         # Must precede reading: a thread that appends afterwards requests a check itself.
@@ -164,5 +176,5 @@ class PendingBatch:
 
     @property
     def burst_check_s(self) -> float:
-        """Return the seconds until the next check while nothing is pending; 0 after the end of a burst."""
+        """Time in seconds until the next check while nothing is pending; 0 after the end of a burst."""
         return _BURST_CHECK_S if self.is_flush_scheduled else 0.0

@@ -1,8 +1,8 @@
-"""NativePublisher: a publisher's XPUB socket and its subscribers.
+"""Publisher on the native wire: an XPUB socket and its subscribers.
 
-Messages are sent in the publishing thread. Subscriptions are read in whichever thread uses the socket next,
-the publishing thread or the I/O thread. A subscriber counts as connected when its hello was read. See
-docs/wire.md.
+Messages are sent in the publishing thread. Subscriptions are read by the thread that uses the socket
+next, which is the publishing thread or the I/O thread. A subscriber counts as connected when its hello
+has been read. See docs/wire.md.
 """
 
 from __future__ import annotations
@@ -59,11 +59,15 @@ _POLLIN = int(zmq.POLLIN)
 _time_ns = time.time_ns
 _NO_COPY_BYTES = 65_536
 _MAX_ONE_PART_BYTES = MAX_BATCHED_BYTES
-"""Maximum size of messages sent in one part if all subscribers accept it. See docs/adr/0009-one-part.md."""
+"""Maximum size in bytes of messages sent in one part if all subscribers accept this form.
+
+See docs/adr/0009-one-part.md.
+"""
 _READ_INTERVAL_NS = 500_000
 """Interval in nanoseconds at which a busy publishing thread reads subscriptions.
 
-The I/O thread checks afterwards, because sending may have consumed the edge of ZMQ_FD.
+The I/O thread checks for subscriptions afterwards, because sending may have consumed the edge of
+ZMQ_FD.
 """
 _IO_CHECK_S = 0.02
 _BYE_RETRY_S = 0.05
@@ -74,14 +78,17 @@ def _reject_payload(payload: object) -> NoReturn:
 
 
 class HandshakePublisher:
-    """Publisher that waits for the hellos of listed subscribers. `changed` guards its state."""
+    """Base class of publishers that wait for the hellos of registered subscribers.
+
+    The condition `changed` guards the publisher's state.
+    """
 
     def __init__(self, changed: threading.Condition, seen: dict[int, int]) -> None:
         """Initialize the publisher.
 
         Args:
             changed: Condition that guards the publisher's state.
-            seen: Number of messages at the hello of each connected subscriber, by id.
+            seen: Number of messages published before the hello of each connected subscriber, by its id.
         """
         self._changed, self._seen = changed, seen
         self._names: dict[int, str] = {}
@@ -100,14 +107,14 @@ class HandshakePublisher:
             return tuple(sorted({self._names[each] for each in self._expected - set(self._seen)}))
 
     def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
-        """Add registered subscribers that will connect."""
+        """Add registered subscribers whose hellos are expected."""
         with self._changed:
             for each in expected:
                 self._expected.add(each.id)
                 self._names[each.id] = each.node_name
 
     def wait_for(self, expected: Iterable[ExpectedSubscriber], timeout_s: float) -> tuple[int, ...]:
-        """Wait for the hellos of these subscribers; return the ids of those that are still missing."""
+        """Wait up to `timeout_s` seconds for the hellos of these subscribers; return the missing ids."""
         wanted = {each.id for each in expected}
         with self._changed:
             wait_until(self._changed, lambda: wanted <= self._seen.keys(), timeout_s)
@@ -115,7 +122,7 @@ class HandshakePublisher:
 
 
 class NativePublisher(HandshakePublisher):
-    """Publisher on the native wire. Owns `socket`, an XPUB that is already bound or connected."""
+    """Publisher on the native wire. Owns its socket, an XPUB that is already bound or connected."""
 
     is_closed = False
     has_subscribers = False
@@ -187,7 +194,7 @@ class NativePublisher(HandshakePublisher):
     def counts(self) -> PublisherCount:
         """Return the statistics that a renewal reports.
 
-        Called once per second; therefore also closes connections that don't respond.
+        Because it is called once per second, this method also closes connections that don't respond.
         """
         with self._changed:
             self._subscriptions.close_silent()
@@ -196,14 +203,17 @@ class NativePublisher(HandshakePublisher):
             )
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind to these addresses of this computer only; return the endpoints. See `Bindings.move`."""
+        """Bind these addresses of this computer and unbind all others; return the endpoints.
+
+        See `Bindings.move`.
+        """
         with self._lock:
             endpoints = () if self._socket.closed else self._bindings.move(hosts)
             self._read_subscriptions_locked()  # binding may have consumed the edge of ZMQ_FD
             return endpoints
 
     def unbind_local(self) -> None:
-        """Accept only TCP connections from now on."""
+        """Stop accepting connections other than TCP."""
         with self._lock:
             if not self._socket.closed and self._bindings.is_local:
                 self._bindings.unbind_local()
@@ -211,7 +221,7 @@ class NativePublisher(HandshakePublisher):
 
     @property
     def refusals(self) -> RejectionLog:
-        """Rejected subscriptions."""
+        """Log of rejected subscriptions."""
         return self._subscriptions.refusals
 
     @property
@@ -249,7 +259,7 @@ class NativePublisher(HandshakePublisher):
             self._send_now(data, extension_fields)
 
     def quick_publish(self, asked: PublishHooks) -> Callable[..., None]:
-        """Return the fast publish function. See `nep.backends.base.PublishesQuickly`."""
+        """Return the fast publish function. See `nep.backends.base.SupportsQuickPublish`."""
         return self._batch.publish_function(asked, self, self._lock)
 
     def send_now(self, data: bytes) -> None:
@@ -331,7 +341,7 @@ class NativePublisher(HandshakePublisher):
             self._poll_subscriptions_locked(stamp_ns)
 
     def borrow_memory(self, size_bytes: int) -> memoryview | None:
-        """Return writable shared memory for a payload, or None if no subscriber shares memory."""
+        """Return writable shared memory for a payload; None if no subscriber shares memory."""
         shared = self._subscriptions.shared
         with self._lock:
             return None if shared is None or self.is_closed else shared.borrow_memory(size_bytes)
@@ -548,18 +558,21 @@ class NativePublisher(HandshakePublisher):
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, flush and close the socket. Called once, by the publisher."""
+        """Unregister, flush for up to `timeout_s` seconds and close the socket. Must be called only once."""
         self._on_close(self, timeout_s)
 
     def send_bye(self) -> None:
-        """Send the bye: subscribers read the remaining messages and disconnect."""
+        """Send the bye, after which subscribers read the remaining messages and disconnect."""
         with self._changed:
             self.is_closed = True
             self.flush_locked()
             self._send_bye_locked()
 
     def finish(self, deadline: float) -> None:
-        """Wait until all subscribers have disconnected; log undelivered messages at `deadline`."""
+        """Wait until all subscribers have disconnected; log undelivered messages at `deadline`.
+
+        `deadline` is a time of `time.monotonic`.
+        """
         with self._changed:
             while self._seen and (left := deadline - time.monotonic()) > 0.0:
                 if not wait_until(self._changed, lambda: not self._seen, min(left, _BYE_RETRY_S)):

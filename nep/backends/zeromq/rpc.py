@@ -1,4 +1,4 @@
-"""RpcClient: requests to a master over one DEALER socket. Thread-safe."""
+"""Client for requests to a master over one DEALER socket. Thread-safe."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from nep.system.addresses import endpoint_of, is_loopback
 _logger = logging.getLogger("nep")
 
 _READ_MAX = 50
-"""Maximum number of replies read at once, before other sockets are served."""
+"""Maximum number of replies read before other sockets are served."""
 _RESEND_S = 0.5
-"""Interval in seconds for sending an unanswered request again; the master may have been shutting down."""
+"""Interval in seconds for sending an unanswered request again, for example to a restarted master."""
 _MAX_CALLS = 256
 
 ReplyCallback = Callable[[Reply], None]
@@ -40,20 +40,28 @@ class PendingRequest:
     reply: Reply | None = None
     is_sent: bool = False
     view: bytes | None = None
-    """Undecoded graph reply; the waiting thread decodes it."""
+    """Encoded graph reply, which the waiting thread decodes."""
 
 
 class ReceivedMessage(NamedTuple):
-    """Message from the master, with the callback of the request that it replies to, or None."""
+    """Message from the master.
+
+    Attributes:
+        content: Reply or notification.
+        then: Callback of the request that the message replies to, or None.
+    """
 
     content: Reply | Push
     callback: ReplyCallback | None
 
 
 class RpcClient:
-    """Client for requests to the master at `address`.
+    """Client for requests to a master.
 
-    `after_use` is called when the socket may have input that its descriptor no longer signals.
+    Args:
+        socket: DEALER socket.
+        address: Address of the master.
+        after_use: Called when the socket may have input that its descriptor no longer signals.
     """
 
     def __init__(self, socket: Socket, address: str, after_use: Callable[[], None]) -> None:
@@ -108,25 +116,25 @@ class RpcClient:
             self.is_connected = False
 
     def request(self, request: Request, timeout_s: float | None) -> Reply:
-        """Send a request and return the reply.
+        """Send a request and wait for the reply.
 
         Args:
             request: Request to the master.
-            timeout_s: Seconds to wait; None waits forever.
+            timeout_s: Seconds to wait for the reply; None waits forever.
 
         Raises:
-            MasterUnreachable: No reply within `timeout_s`.
+            MasterUnreachable: No reply arrived within `timeout_s`.
             RequestRefusedError: The master rejected the request.
-            ClosedError: The client was closed meanwhile.
+            ClosedError: The client was closed in the meantime.
         """
         return self.wait(self.send_request(request), timeout_s)
 
     def send_request(self, request: Request) -> PendingRequest:
-        """Send a request and return it for `wait`."""
+        """Send a request without waiting; return the object to pass to `wait`."""
         return self._send(request, is_waited=True, then=None)
 
     def wait(self, call: PendingRequest, timeout_s: float | None) -> Reply:
-        """Wait for the reply to a request. Raises as `ask` does."""
+        """Wait for the reply to a request sent with `send_request`. Raises the same errors as `request`."""
         started = time.monotonic()
         with self._changed:
             while not wait_until(
@@ -162,14 +170,19 @@ class RpcClient:
         return reply
 
     def notify(self, request: Request, then: ReplyCallback | None = None) -> None:
-        """Send a request without waiting. The request is dropped if no master is connected.
+        """Send a request without waiting; the request is dropped if no master is connected.
 
-        `then` is called with the reply in the I/O thread.
+        Args:
+            request: Request to the master.
+            then: Called with the reply in the I/O thread; None to ignore the reply.
         """
         self._send(request, is_waited=False, then=then)
 
     def read(self) -> list[ReceivedMessage]:
-        """Return up to `_READ_MAX` received messages, and send pending requests. Only for the I/O thread."""
+        """Return up to `_READ_MAX` received messages and send pending requests.
+
+        Call only in the I/O thread.
+        """
         answers: list[ReceivedMessage] = []
         events = 0
         with self._changed:
@@ -186,7 +199,7 @@ class RpcClient:
         return answers
 
     def stop(self) -> None:
-        """Fail all waiting threads with `ClosedError`, and send nothing from now on."""
+        """Fail all waiting requests with `ClosedError` and stop sending."""
         with self._changed:
             self._is_closed = True
             self._changed.notify_all()

@@ -31,29 +31,39 @@ LOOPBACK = "127.0.0.1"
 SHORT_WAIT_S = 0.005
 """Maximum time in seconds that a reader waits in a socket while holding its lock.
 
-Shorter waits are no faster: a timer that ends before the kernel's next tick costs more than the wait.
+Shorter waits are no faster, because a timer that ends before the kernel's next tick costs more than the
+rest of the wait.
 """
 _WAIT_SLICE_S = 0.1
 _IN_USE_ERRORS = frozenset({errno.EADDRINUSE, zmq.EADDRINUSE, errno.EACCES, errno.EMFILE, errno.ENFILE})
-"""Errors of bind which mean that the address exists but can't be used now."""
+"""Error numbers of bind which mean that the address is valid but can't be used now."""
 _SEND_HIGH_WATER_MARK = 50_000
 _IMAGE_HIGH_WATER_MARK = 32
 _FDS_PER_PORT = 2
 SILENCE_TIMEOUT_MS = 15_000
-"""Time in milliseconds without an acknowledgement after which a connection to another computer is closed."""
+"""Time in milliseconds without acknowledgement after which a connection to another computer is closed."""
 CONNECT_TIMEOUT_MS = 3000
-"""Timeout in milliseconds for connecting to other computers. The system's own retries get ever slower."""
+"""Timeout in milliseconds for a connection attempt to another computer.
+
+Needed because the system's own retries take place at growing intervals.
+"""
 ORIGINAL_PORTS = frozenset({7000, 7777, 7780, 12345, 50000, *range(9000, 10000)})
-"""Ports on which programs of the original NEP expect something else."""
+"""Ports that have a fixed meaning for programs of the original NEP."""
 
 _TCP_INFO = struct.Struct("=2xBB52xI")
-"""Fields of Linux's `tcp_info`: retransmissions, window probes, and ms since the last acknowledgement."""
+"""Layout of Linux's `tcp_info`: retransmissions, window probes and time since the last acknowledgement.
+
+The time is in milliseconds.
+"""
 _MIN_RETRIES = 3
 _SRCFD = int(zmq.SRCFD)
 
 
 class RejectionLog:
-    """Count of rejected inputs, with the newest reason. Not thread-safe: guarded by its owner's lock."""
+    """Counter of rejected inputs that stores the newest reason.
+
+    Not thread-safe: guarded by the owner's lock.
+    """
 
     def __init__(self) -> None:
         self.count = 0
@@ -68,14 +78,14 @@ class RejectionLog:
         return is_logged(self.count)
 
     def recent_message(self) -> str:
-        """Return the newest reason and the count, or "" if nothing was rejected in the last seconds."""
+        """Return the newest reason with the count; "" if nothing was rejected in the last seconds."""
         if not self.count or time.monotonic() - self._last_at > _REPORT_DURATION_S:
             return ""
         return _("{reason} ({count} so far)").format(reason=self._reason, count=self.count)
 
 
 def set_send_high_water_mark(owner: Socket) -> None:
-    """Set the high-water mark for sending. Call before bind, because open connections keep theirs.
+    """Set the high-water mark for sending. Call before bind, because it applies only to new connections.
 
     `byte_window` limits the bytes.
     """
@@ -83,7 +93,10 @@ def set_send_high_water_mark(owner: Socket) -> None:
 
 
 def receive_high_water_mark(codec: str) -> int:
-    """Return the high-water mark for receiving. It can be small: the I/O thread empties the socket."""
+    """Return the high-water mark for receiving messages of a codec.
+
+    The value can be small, because the I/O thread empties the socket.
+    """
     return _IMAGE_HIGH_WATER_MARK if codec == "image" else 1000
 
 
@@ -106,7 +119,7 @@ def bind_free_port(owner: Socket, host: str) -> str:
 
 
 def bind(owner: Socket, address: str) -> str:
-    """Bind to an address; return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
+    """Bind to an address and return the endpoint. Raises `AddressInUseError`, `TooManyFilesError`."""
     check_free_descriptors(_FDS_PER_PORT, f"a port of '{host_of(address)}'")
     try:
         owner.bind(endpoint_of(address))
@@ -116,7 +129,10 @@ def bind(owner: Socket, address: str) -> str:
 
 
 def connect(owner: Socket, address: str) -> str:
-    """Connect to an address and return the endpoint; the peer may bind it later. Raises `NepError`."""
+    """Connect to an address and return the endpoint. Raises `NepError` for an invalid address.
+
+    The peer may bind the address later.
+    """
     endpoint = endpoint_of(address)
     if not is_endpoint(endpoint):
         raise NepError(
@@ -130,7 +146,7 @@ def connect(owner: Socket, address: str) -> str:
 
 
 def local_address_towards(address: str) -> str | None:
-    """Return this computer's address for reaching a master at `address`, or None without a route."""
+    """Return the address of this computer from which `address` is reached; None without a route."""
     if is_loopback(address):
         return LOOPBACK
     try:
@@ -142,19 +158,26 @@ def local_address_towards(address: str) -> str | None:
 
 
 def is_remote(endpoint: str) -> bool:
-    """Return True if the endpoint is on another computer, or can be reached from one."""
+    """Return True if an endpoint is on another computer, or is reachable from other computers."""
     return endpoint.startswith("tcp://") and not is_loopback(endpoint.removeprefix("tcp://"))
 
 
 def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> None:
     """Set socket options that detect within a dozen seconds that a peer's computer has vanished.
 
-    Call before connecting or binding to `endpoint`; its port may be "*". TCP keep-alive probes idle
-    connections. The kernel also answers the probes for a program stopped in a debugger, which a ZeroMQ
-    heartbeat would disconnect. Unacknowledged data would be resent for a quarter of an hour, so that time is
-    limited, too (TCP_MAXRT). A stopped program could exceed the limit as well; publishers therefore check it
-    themselves where the system supports that (`is_watched`, see `FarConnection`). Only needed for other
-    computers, because on the same computer the kernel reports the end of every connection.
+    Call before connecting or binding. Only needed for other computers, because on the same computer the
+    kernel reports the end of every connection.
+
+    TCP keep-alive probes idle connections. The kernel also answers the probes for a program stopped in a
+    debugger, which a ZeroMQ heartbeat would disconnect. Unacknowledged data would be resent for a quarter
+    of an hour, so the time for resending is limited, too (TCP_MAXRT). A stopped program could exceed this
+    limit as well; publishers therefore check their connections themselves where the system supports it (see
+    `RemoteConnection`).
+
+    Args:
+        owner: Socket.
+        endpoint: Endpoint to connect to or to bind; the port may be "*".
+        is_watched: True if the owner itself closes connections that don't respond.
     """
     far = is_remote(endpoint)
     owner.setsockopt(zmq.TCP_KEEPALIVE, 1 if far else -1)
@@ -167,7 +190,7 @@ def keep_alive(owner: Socket, endpoint: str, *, is_watched: bool = False) -> Non
 
 
 def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout_s: float) -> bool:
-    """Wait until `is_met()` returns True, with `changed` held; return False on timeout.
+    """Wait until `is_met()` returns True; return False on timeout. Call with `changed` held.
 
     Waits in slices, because on Windows Ctrl+C doesn't interrupt a wait.
     """
@@ -181,7 +204,7 @@ def wait_until(changed: threading.Condition, is_met: Callable[[], bool], timeout
 
 
 def to_sendable(data: bytes | memoryview) -> Part:
-    """Return `data`, or a copy if it is mutable, so that it can be sent without a further copy."""
+    """Return `data`, or a copy if `data` is mutable, so that libzmq can send it without another copy."""
     if isinstance(data, bytes):
         return data
     if not (data.readonly and data.c_contiguous):
@@ -194,11 +217,11 @@ def to_sendable(data: bytes | memoryview) -> Part:
 
 @dataclass(frozen=True)
 class RemoteConnection:
-    """Connection over which a subscriber on another computer has sent its hello.
+    """Connection that delivered the hello of a subscriber on another computer.
 
-    Identified by its descriptor, which may be reused, and its peer address. When a computer changes its
-    address or network, it reconnects, but its old connection isn't closed. Messages would be queued for both
-    connections until the system gives up.
+    Identified by its file descriptor, which the system may reuse, and the peer's address. When a computer
+    changes its address or network, the subscriber reconnects, but the old connection isn't closed. Without
+    this class, messages would be queued for both connections until the system gives up.
     """
 
     fd: int
@@ -209,7 +232,10 @@ class RemoteConnection:
 
     @classmethod
     def from_frame(cls, received: zmq.Frame) -> RemoteConnection | None:
-        """Return the connection that delivered `received`; None if it is local or unknown."""
+        """Return the connection that delivered `received`.
+
+        Returns None if the peer is on this computer or can't be determined.
+        """
         try:
             host = str(received.get("Peer-Address"))
             if os.name != "posix" or not host or host.startswith("127."):
@@ -221,10 +247,9 @@ class RemoteConnection:
         return None if peer is None else cls(fd, peer)
 
     def is_silent(self) -> bool:
-        """Return True if the peer hasn't acknowledged anything for long in spite of several retries.
+        """Return True if the peer acknowledged nothing for `SILENCE_TIMEOUT_MS` in spite of several retries.
 
-        The kernel acknowledges probes for a program stopped in a debugger, because its receive window is
-        full.
+        A program stopped in a debugger isn't silent, because its kernel still acknowledges window probes.
         """
         if not self.can_detect_silence:
             return False
@@ -239,7 +264,7 @@ class RemoteConnection:
         return bool(max(resent, asked) >= _MIN_RETRIES and last_answer_ms >= SILENCE_TIMEOUT_MS)
 
     def close(self) -> None:
-        """Close the connection if it still exists; libzmq then releases its queue."""
+        """Close the connection if it is still open; libzmq then releases its queue."""
         try:
             with _duplicate_socket(self.fd) as connection:
                 if connection.getpeername() == self.peer:

@@ -1,7 +1,7 @@
-"""SubSocket: a SUB socket and its publishers. Parses messages and notices, and counts losses.
+"""SUB socket and its publishers, which parses messages and notices, and counts losses.
 
-Guarded by its subscriber's lock. Nearly every message directly follows the previous message of its publisher
-and takes a fast path; `CarefulParser` handles all others.
+Guarded by its subscriber's lock. Nearly every message directly follows the previous message of its
+publisher and takes a fast path; `CarefulParser` handles all others.
 """
 
 from __future__ import annotations
@@ -65,14 +65,18 @@ from nep.protocol.wire import (
 from nep.system.addresses import is_endpoint
 
 MessageBuffer = list[Message] | deque[Message]
-"""Container to which messages are appended."""
+"""Container to which received messages are appended."""
 
 _NO_COPY_BYTES = 8_192
-"""Size in bytes from which libzmq receives into separate memory, of which a view can be kept."""
+"""Minimum size in bytes of messages that libzmq receives into separate memory, which views can reference."""
 SHARED_FORM = SHARED << 16
 _Part = bytes | memoryview
 _DecodedRun = tuple[MessageKind, int, int, tuple[int, ...], Sequence[bytes]]
-"""Messages whose payloads were decoded: kind, publisher id, first seq, time stamps and encoded payloads."""
+"""Messages with decoded payloads.
+
+The items are the kind, the publisher's id, the first sequence number, the time stamps and the encoded
+payloads.
+"""
 
 _logger = logging.getLogger("nep")
 _DONTWAIT = int(zmq.DONTWAIT)  # plain ints: looking up pyzmq's enum members costs as much as the call
@@ -83,14 +87,14 @@ _TOO_SHORT = lazy("a message must have 3 or 4 parts, but this one is incomplete"
 
 
 class CarefulParser:
-    """Parser for messages and notices that don't take the fast path. No sockets.
+    """Parser for messages and notices outside the fast path. Performs no I/O.
 
     Args:
         spec: Settings of the subscriber.
         hello: Hello filter of the subscriber.
         sources: Publishers; updated by the parser.
-        leave: Ends the connection to a publisher.
-        tell: Sends a publisher an acknowledgement of all messages up to a sequence number.
+        leave: Ends the connection to the publisher with this id.
+        tell: Sends an acknowledgement; called with the publisher id and the newest sequence number.
         shared: Readers of shared memory, or None.
     """
 
@@ -113,7 +117,15 @@ class CarefulParser:
         self._shared = shared
 
     def parse(self, first: bytes, rest: Sequence[_Part]) -> Message | None:
-        """Return the message in these parts; None for notices and duplicates. Raises `WireError`."""
+        """Return the message in these parts; None for notices and duplicates.
+
+        Args:
+            first: First part: a topic, a hello, or a whole message of one part.
+            rest: Remaining parts.
+
+        Raises:
+            WireError: The message is malformed.
+        """
         is_alone = first == self._hello
         is_one_part = not rest and first.startswith(self._topic)
         if is_one_part:
@@ -126,7 +138,7 @@ class CarefulParser:
         return self._parse_message(*split_rest(rest, is_one_part=is_one_part), is_alone=is_alone)
 
     def parse_batch(self, first: bytes) -> list[Message]:
-        """Return the messages of a batch. Raises `WireError`."""
+        """Return the messages of a batch, given as one part. Raises `WireError`."""
         topic, head, body = split_single_part(first)
         if topic != self._topic:
             raise _topic_error()
@@ -219,7 +231,8 @@ def _topic_error() -> WireError:
 class SubSocket:
     """SUB socket on the native wire.
 
-    Sets its filters before anything is connected or bound, because the hello must follow the topic.
+    The constructor sets the filters before the socket connects or binds, because the filter for the topic
+    must precede the hello.
     """
 
     def __init__(self, socket: Socket, spec: SubscriberSpec) -> None:
@@ -238,7 +251,7 @@ class SubSocket:
         )
         self._topic_length = len(self._topic)
         self.payloads: deque[Any] = deque()
-        """Decoded payloads. See `nep.backends.base.GivesPayloads`."""
+        """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
         self.wants_payloads = False
         self._run: _DecodedRun | None = None
         self._body = self._topic_length + HEADER_BYTES
@@ -263,11 +276,11 @@ class SubSocket:
 
     @property
     def has_input(self) -> bool:
-        """True if a message can be read. Also handles connections and disconnections."""
+        """True if a message can be read. Reading this property also processes connects and disconnects."""
         return bool(int(self._socket.getsockopt(_EVENTS)) & _POLLIN)
 
     def connect(self, remote: RemotePublisher) -> None:
-        """Connect to a publisher. Silent publishers that it replaces are removed later. Idempotent."""
+        """Connect to a publisher. Silent publishers that `remote` replaces are removed later. Idempotent."""
         endpoint = remote.publisher.endpoints[0] if remote.publisher.endpoints else ""
         self._disconnect_replaced(remote, endpoint)
         source = self.sources.add_listed(remote)
@@ -311,13 +324,13 @@ class SubSocket:
             source.endpoint = endpoint
 
     def reconnect_remote(self) -> None:
-        """Reconnect to publishers on other computers. Their unread messages are discarded."""
+        """Reconnect to publishers on other computers, which discards their unread messages."""
         for source in self.sources.by_id.values():
             if is_remote(source.endpoint):
                 self._connect(source, source.endpoint)
 
     def reconnect(self, publisher: int) -> None:
-        """Disconnect from a connected publisher and connect again."""
+        """Reconnect to a publisher that is already connected."""
         source = self.sources.get(publisher)
         self._connect(source, source.endpoint)
 
@@ -334,7 +347,7 @@ class SubSocket:
 
     @property
     def problem(self) -> str:
-        """Reason why a listed publisher can't be received; "" if there is none."""
+        """Reason why messages of a listed publisher can't be received; "" if there is none."""
         listed = (each for each in self.sources.by_id.values() if each.problem and not each.is_silent)
         return next((each.problem for each in listed), "")
 
@@ -379,15 +392,15 @@ class SubSocket:
     ) -> int:
         """Read messages until the socket is empty or a limit is reached; return their number.
 
-        Batches are read completely; notices are handled in between. The fast path for messages of one part is
-        inlined here.
+        Batches are always read completely. Notices are processed but not counted. The fast path for
+        messages of one part is inlined here.
 
         Args:
             into: Container to which messages are appended.
             max_messages: Maximum number of messages.
             max_bytes: Maximum number of bytes.
-            may_wait: True to wait for the first message.
-            first: First part, if it was already read.
+            may_wait: True to wait up to `SHORT_WAIT_S` for the first message.
+            first: First part of the next message, if it was already read.
         """
         recv, topic, find, append = self._recv, self._topic, self.sources.by_id.get, into.append
         cut, body = self._topic_length, self._body
@@ -544,10 +557,14 @@ class SubSocket:
         return len(messages), 0
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, or None if the socket is empty; with `may_wait`, wait for one.
+        """Return the next message, or None if the socket is empty.
 
-        Other messages of the same batch are appended to `rest`. The fast path of `read_into` is repeated
-        here, because calling it would take a third longer in programs that read single messages.
+        The fast path of `read_into` is repeated here, because calling it would take a third longer in
+        programs that read single messages.
+
+        Args:
+            rest: Container to which further messages of the same batch are appended.
+            may_wait: True to wait up to `SHORT_WAIT_S` for a message.
         """
         if not may_wait and not int(self._socket.getsockopt(_EVENTS)) & _POLLIN:
             return None  # the common case: raising `zmq.Again` is ten times slower
@@ -628,7 +645,7 @@ class SubSocket:
             return None, None
 
     def count_dropped(self, count: int) -> None:
-        """Count received messages that were dropped from a full queue."""
+        """Add received messages that were dropped from a full queue to the losses."""
         self.sources.count_dropped(count)
 
     def close(self) -> None:

@@ -1,16 +1,16 @@
-"""A subscriber's socket with its lock, inbox and readers.
+"""Subscriber over a socket, with a lock, an inbox and readers.
 
-`SocketSubscriber` reads from any `Readable`, a socket that returns messages. `NativeSubscriber` is for the
-native wire and connects to publishers when they register.
+`SocketSubscriber` reads from any `Readable`, a socket that returns messages. `NativeSubscriber` is for
+the native wire and connects to publishers when they register.
 
-A reader leases the socket for a moment, in which the I/O thread doesn't read: a `listen` loop gets its
-messages directly from the socket in its own thread. Without a reader the I/O thread moves messages into the
-inbox, whose size in bytes is limited.
+A reader leases the socket for a moment, in which the I/O thread doesn't read: a `listen` loop receives
+messages directly from the socket in its own thread. Without a reader, the I/O thread moves messages
+into the inbox, whose size in bytes is limited.
 
-A reader that receives in quick succession waits in the socket itself, which shortens the round trip of small
-messages by a fifth to a third compared to polling the descriptor. It holds the lock for up to `SHORT_WAIT_S`,
-and doesn't wait there while another thread wants the socket. After that time it polls the descriptor without
-the lock.
+A reader that receives in quick succession waits in the socket itself, which shortens the round trip of
+small messages by a fifth to a third compared to polling the file descriptor. The reader holds the lock
+for up to `SHORT_WAIT_S`, and doesn't wait in the socket while another thread requests the lock. After
+that time the reader polls the file descriptor without the lock.
 """
 
 from __future__ import annotations
@@ -46,20 +46,23 @@ LEASE_S = 0.02
 _WAITER_CHECK_S = 0.1
 """Interval in seconds at which the I/O thread checks whether a reader still waits."""
 _MAX_IO_DELAY_S = _WAITER_CHECK_S + LEASE_S
-"""Maximum time in seconds until the I/O thread's next check; a read wakes it only if that is later."""
+"""Maximum time in seconds until the next check by the I/O thread.
+
+A read wakes the I/O thread only if the next check is later.
+"""
 _BATCH_INTERVAL_S = 0.005
-"""Minimum interval in seconds between two calls of a sink or two transfers to the inbox."""
+"""Minimum interval in seconds between two calls of a sink, or two transfers to the inbox."""
 _BATCH_MESSAGES = 10_000
 _BATCH_BYTES = 64 * 2**20
 _HANDSHAKE_BATCH = 50
 
 
 class Readable(Protocol):
-    """Socket that returns messages. Guarded by the subscriber's lock."""
+    """Interface of a socket that returns messages. Guarded by the subscriber's lock."""
 
     fd: int
     refusals: RejectionLog
-    """Rejected messages."""
+    """Log of rejected messages."""
 
     @property
     def received(self) -> int:
@@ -75,7 +78,7 @@ class Readable(Protocol):
 
     @property
     def has_input(self) -> bool:
-        """True if a message can be read. Also handles connections and disconnections."""
+        """True if a message can be read. Reading this property also processes connects and disconnects."""
 
     def read_into(
         self, into: MessageBuffer, max_messages: int, max_bytes: int, *, may_wait: bool = False
@@ -90,20 +93,22 @@ class Readable(Protocol):
         """
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
-        """Return the next message, or None; with `may_wait`, wait up to `SHORT_WAIT_S`.
+        """Return the next message, or None if there is none.
 
-        Other messages of the same batch are appended to `rest`.
+        Args:
+            rest: Container to which further messages of the same batch are appended.
+            may_wait: True to wait up to `SHORT_WAIT_S` for a message.
         """
 
     def count_dropped(self, count: int) -> None:
-        """Count received messages that were dropped from a full queue."""
+        """Add received messages that were dropped from a full queue to the losses."""
 
     def close(self) -> None:
         """Close the socket."""
 
 
 class UnbatchedReader:
-    """Implementation of `Readable.read_into` for sockets without batches."""
+    """Base class that implements `Readable.read_into` for sockets without batches."""
 
     def read(self, rest: MessageBuffer, *, may_wait: bool = False) -> Message | None:
         """Return the next message. See `Readable.read`."""
@@ -125,7 +130,7 @@ class UnbatchedReader:
 
 
 class NativeReadable(Readable, Protocol):
-    """Socket connected to the publishers that the master lists."""
+    """Interface of a socket that connects to the publishers that the master lists."""
 
     sources: PublisherTracker
     """Publishers of the topic."""
@@ -137,17 +142,24 @@ class NativeReadable(Readable, Protocol):
         """Disconnect from a publisher and remove it."""
 
     def reconnect_remote(self) -> None:
-        """Reconnect to publishers on other computers. Their unread messages are discarded."""
+        """Reconnect to publishers on other computers, which discards their unread messages."""
 
     def reconnect(self, publisher: int) -> None:
-        """Disconnect from a connected publisher and connect again."""
+        """Reconnect to a publisher that is already connected."""
 
 
 R = TypeVar("R", bound=Readable)
 
 
 class SocketSubscriber(Generic[R]):
-    """Subscriber that reads from `readable`. `on_close` unregisters it; called once, without the lock."""
+    """Subscriber that reads from a socket.
+
+    Args:
+        readable: Socket.
+        io: Thread that serves the subscriber.
+        spec: Settings of the subscriber.
+        on_close: Unregisters the subscriber with this id. Called once, without the lock.
+    """
 
     def __init__(
         self, readable: R, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
@@ -165,7 +177,7 @@ class SocketSubscriber(Generic[R]):
         """Messages read ahead, which precede those of the inbox. Pop from the left, without the lock."""
         self._source: SubSocket | None = readable if isinstance(readable, SubSocket) else None
         self.payloads: deque[Any] = deque() if self._source is None else self._source.payloads
-        """Decoded payloads. See `nep.backends.base.GivesPayloads`."""
+        """Decoded payloads. See `nep.backends.base.SupportsPayloads`."""
         self.wants_payloads = False
         self._ahead = ReadAhead(spec.max_messages)
         self._may_exceed_bound = spec.max_messages >= 10 * MAX_READ_AHEAD
@@ -187,14 +199,17 @@ class SocketSubscriber(Generic[R]):
     # ---- reading
 
     def poll(self) -> Message | None:
-        """Return the next message, or None. Reads in the calling thread."""
+        """Return the next message, or None if there is none. Reads the socket in the calling thread."""
         self._lock_requests.append(None)
         with self._lock:
             self._lock_requests.pop()
             return None if self.is_closed else self._next_locked()
 
     def receive(self, timeout_s: float) -> Message | None:
-        """Return the next message; wait up to `timeout_s` seconds. Reads in the calling thread."""
+        """Wait up to `timeout_s` seconds for the next message; return None on timeout.
+
+        Reads the socket in the calling thread.
+        """
         with self._lock:
             if self.is_closed:
                 return None
@@ -262,7 +277,7 @@ class SocketSubscriber(Generic[R]):
     # ---- waiting
 
     def enter_wait(self, waker: Wakeable) -> bool:
-        """Prepare to poll the descriptor; return False if a message is available or it is closed."""
+        """Prepare to poll `fd`; return False if a message is available or the subscriber is closed."""
         self._lock_requests.append(None)  # as `_requested_lock` does, but faster
         try:
             with self._lock:
@@ -289,7 +304,13 @@ class SocketSubscriber(Generic[R]):
                 self._changed.notify_all()
 
     def read_until(self, is_met: Callable[[], bool], timeout_s: float, waker: Waker) -> bool:
-        """Read into the inbox until `is_met()`, in the calling thread; return False on timeout."""
+        """Read messages into the inbox until a condition is met; return False on timeout or after `close`.
+
+        Args:
+            is_met: Returns True when the condition is met. Called with the lock held.
+            timeout_s: Maximum time in seconds.
+            waker: Waker that ends a wait early, so that the condition is checked again.
+        """
         deadline = time.monotonic() + timeout_s
         with self._lock:
             self._waiters.append(waker)
@@ -312,7 +333,10 @@ class SocketSubscriber(Generic[R]):
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Move available messages to the inbox or the sink, unless a reader leases the socket."""
+        """Move available messages to the inbox or the sink, unless a reader has leased the socket.
+
+        See `Pollable.serve`.
+        """
         sink = self.spec.sink
         if now < self._leased_until and not self.is_closed:
             # without the lock, which a waiting reader holds; a stale value is harmless
@@ -380,7 +404,7 @@ class SocketSubscriber(Generic[R]):
             self._lock_requests.pop()
 
     def restore(self) -> None:
-        """Convert the remaining payloads back to messages. See `GivesPayloads.restore`."""
+        """Convert the remaining payloads back to messages. See `SupportsPayloads.restore`."""
         if self._source is not None:
             with self._requested_lock():
                 self._source.restore(self.ready)
@@ -465,14 +489,14 @@ class SocketSubscriber(Generic[R]):
 
 
 class NativeSubscriber(SocketSubscriber[NativeReadable]):
-    """Subscriber on the native wire. The master session calls the methods that concern publishers."""
+    """Subscriber on the native wire. The master session reports added and removed publishers."""
 
     def __init__(
         self, readable: NativeReadable, io: IoThread, spec: SubscriberSpec, on_close: Callable[[int], None]
     ) -> None:
         super().__init__(readable, io, spec, on_close)
         self._closed_early: set[int] | None = set()
-        """Ids of publishers that closed before `begin`; None after `begin`."""
+        """Ids of publishers that closed before `connect_listed`; None after `connect_listed`."""
 
     @property
     def has_publishers(self) -> bool:
@@ -481,9 +505,14 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
             return bool(self._readable.sources.by_id)
 
     def wait_for(self, publishers: Iterable[int], timeout_s: float, waker: Waker) -> bool:
-        """Wait for the echo of these publishers; return False on timeout.
+        """Wait up to `timeout_s` seconds for the echo of these publishers; return False on timeout.
 
         Publishers that send a bye in the meantime, or to which connecting fails, are skipped.
+
+        Args:
+            publishers: Ids of the publishers.
+            timeout_s: Maximum time in seconds.
+            waker: Waker that ends a wait early, so that the condition is checked again.
         """
         wanted = frozenset(publishers)
         sources = self._readable.sources
@@ -496,7 +525,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         )
 
     def wait_for_any(self, timeout_s: float, waker: Waker) -> bool:
-        """Wait for the echo of any publisher; return False on timeout."""
+        """Wait up to `timeout_s` seconds for the echo of any publisher; return False on timeout."""
         sources = self._readable.sources
         return self.read_until(
             lambda: any(source.has_echoed for _each, source in sources.items()), timeout_s, waker
@@ -508,9 +537,10 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
         return tuple(source.endpoint for _each, source in self._readable.sources.items() if source.endpoint)
 
     def connect_listed(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Connect to the publishers listed at registration, except those that have closed since.
+        """Connect to the publishers listed at registration, except those that have closed in the meantime.
 
-        The notification of a close is read in another thread than the reply and may be handled first.
+        The notification of a close and the reply to the registration are read in different threads, so the
+        notification may be handled first.
         """
         with self._requested_lock():
             closed, self._closed_early = self._closed_early or set(), None
@@ -544,7 +574,7 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._recheck_input_locked()
 
     def reconcile(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Replace the list of publishers: connect to new ones, and mark missing ones as silent."""
+        """Replace the list of publishers: connect to new ones, and mark unlisted ones as silent."""
         known = tuple(remotes)
         self.connect(known)
         listed = {remote.publisher.id for remote in known}
@@ -554,7 +584,10 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                     source.is_silent = True
 
     def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:
-        """Handle the removal of a publisher. Its connection stays until its bye, or until it is replaced."""
+        """Handle the removal of a publisher. See `SessionSubscriber.publisher_removed`.
+
+        The connection stays open until the publisher's bye, or until the publisher is replaced.
+        """
         with self._requested_lock():
             if is_closed and self._closed_early is not None:
                 self._closed_early.add(publisher)
@@ -564,14 +597,16 @@ class NativeSubscriber(SocketSubscriber[NativeReadable]):
                 self._readable.sources.mark_silent(publisher, final)
 
     def set_clock_differences(self, clocks: Mapping[str, ClockDifference]) -> None:
-        """Set the clock differences of other computers, by node id."""
+        """Set the clock differences of other computers, given by node id."""
         with self._requested_lock():
             self._readable.sources.set_clock_differences(clocks)
 
     def handle_renewal(self, now: float, last_seqs: Iterable[tuple[int, int]]) -> None:
         """Handle a renewal: remove publishers that closed without a bye, and update the losses.
 
-        `last_seqs` contains the newest sequence numbers known to the master, as (publisher id, number).
+        Args:
+            now: Current time (`time.monotonic`).
+            last_seqs: (publisher id, newest sequence number known to the master) of each publisher.
         """
         with self._requested_lock():
             if self.is_closed:

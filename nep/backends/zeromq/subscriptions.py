@@ -1,4 +1,4 @@
-"""Subscriptions: the subscribers connected to a publisher."""
+"""Subscribers that are connected to a publisher."""
 
 from __future__ import annotations
 
@@ -12,14 +12,18 @@ from nep.protocol.wire import Hello, parse_acceptance, parse_acknowledgement, pa
 
 _logger = logging.getLogger("nep")
 MAX_SUBSCRIBERS = 10_000
-"""Maximum number of subscribers with a hello. Further ones are treated as subscribers without one."""
+"""Maximum number of subscribers with a hello. Further subscribers are treated as if without a hello."""
 
 
 class Subscriptions:
-    """Subscribers of a publisher, from the subscriptions that its socket receives. No sockets.
+    """Subscribers of a publisher, determined from its socket's subscription events. Performs no I/O.
 
-    Tracks subscribers that have sent a hello to this publisher of `topic`, and the plain filters of others.
+    Tracks subscribers that have sent a hello to this publisher, and the plain filters of all others.
     Guarded by the publisher's lock.
+
+    Args:
+        topic: Name of the topic.
+        publisher: Id of the publisher.
     """
 
     def __init__(self, topic: str, publisher: int) -> None:
@@ -71,10 +75,11 @@ class Subscriptions:
         Args:
             event: Event from the XPUB socket.
             count: Number of messages published so far.
-            connection_of: Returns the connection of the event, or None if it is on this computer.
+            connection_of: Returns the connection that delivered the event; None if the peer is on this
+                computer.
 
         Returns:
-            First part of messages to a subscriber that must be greeted, or None.
+            Topic frame for the echo if the event is the hello of a new subscriber, else None.
         """
         is_wanted, subscription = event[:1] == b"\1", event[1:]
         hello = parse_hello(subscription)
@@ -133,7 +138,7 @@ class Subscriptions:
                 before.close()
 
     def close_silent(self) -> None:
-        """Close connections to computers that have vanished; their subscribers are then removed."""
+        """Close connections to computers that have vanished; libzmq then removes their subscribers."""
         for connection in self._far.values():
             if connection.is_silent():
                 connection.close()

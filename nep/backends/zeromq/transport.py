@@ -1,4 +1,4 @@
-"""Transport of the back end `zeromq`: the native wire, and direct connections on the original NEP's wire."""
+"""Transport of the back end `zeromq`, for the native wire and the wire of the original NEP."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ from nep.system.forks import close_in_child, watch
 from nep.system.wakeup import Waker
 
 DIRECT_WAIT_S = 0.3
-"""Time in seconds to wait for a peer of a direct connection, which may not exist."""
+"""Maximum time in seconds to wait for the peer of a direct connection, which may not exist."""
 _LEAVE_TIMEOUT_S = 0.3
 _FDS_PER_THREAD = 4
 _MAX_IDLE_SESSIONS = 8
-"""Maximum number of sessions that are kept without registrations."""
+"""Maximum number of open sessions without registrations."""
 _Subscriber = SocketSubscriber[Readable] | NativeSubscriber | OriginalSubscriber | PatternSubscriber
 
 
 class OwnedPublisher(PublisherTransport, Pollable, Protocol):
-    """Publisher, as its transport uses it."""
+    """Interface of a publisher to its transport."""
 
     spec: PublisherSpec
 
@@ -65,24 +65,24 @@ class OwnedPublisher(PublisherTransport, Pollable, Protocol):
         """Send the bye and stop accepting messages."""
 
     def finish(self, deadline: float) -> None:
-        """Wait until all messages are delivered, at most until `deadline`."""
+        """Wait until all messages are delivered, or until `deadline` (`time.monotonic`)."""
 
     def release(self) -> None:
         """Release the socket. The I/O thread must have stopped serving it."""
 
 
 class RegisteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
-    """Publisher registered at a master."""
+    """Interface of a publisher that is registered at a master."""
 
     def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
-        """Add registered subscribers that will connect."""
+        """Add registered subscribers whose hellos are expected."""
 
     def wait_for(self, expected: Iterable[ExpectedSubscriber], timeout_s: float) -> tuple[int, ...]:
-        """Wait for the hellos of these subscribers; return the ids of those that are still missing."""
+        """Wait up to `timeout_s` seconds for the hellos of these subscribers; return the missing ids."""
 
 
 class ThreadWait:
-    """Waker and poller of one thread. A wake before the wait ends the wait immediately."""
+    """Waker and poller of one waiting thread. If woken before a wait, the wait returns immediately."""
 
     def __init__(self) -> None:
         self.waker = Waker()
@@ -92,7 +92,7 @@ class ThreadWait:
         self._poll: Callable[[int], Sequence[tuple[int, int]]]
 
     def wait(self, fds: list[int], timeout_s: float) -> None:
-        """Wait until one of `fds` is readable or the waker is woken."""
+        """Wait up to `timeout_s` seconds until one of `fds` is readable or the waker is woken."""
         if fds != self._fds:
             self._poll, self._fds = _poll_function((*fds, self.waker.fd)), fds
         for fd, _events in self._poll(int(timeout_s * 1000) + 1):
@@ -113,10 +113,10 @@ def _poll_function(fds: tuple[int, ...]) -> Callable[[int], Sequence[tuple[int, 
 
 
 class ZeromqTransport:
-    """Sockets and master sessions of one node, in the context and I/O thread of the process.
+    """Sockets and master sessions of one node, in the ZeroMQ context and I/O thread of the process.
 
-    Sinks run in a separate thread per node, so that they can't block other nodes, and may send requests to
-    the master and create publishers and subscribers.
+    Sinks run in a separate thread per node. They therefore can't block other nodes, and may send requests
+    to the master and create publishers and subscribers.
     """
 
     def __init__(self, node: NodeRecord) -> None:
@@ -141,7 +141,7 @@ class ZeromqTransport:
     # ---- publishers
 
     def create_publisher(self, spec: PublisherSpec) -> PublisherTransport:
-        """Create a publisher. See `Transport.publisher`."""
+        """Create a publisher. See `Transport.create_publisher`."""
         with self._hold_context():
             if isinstance(spec.configuration, Direct):
                 return self._create_direct_publisher(spec, spec.configuration)
@@ -230,7 +230,7 @@ class ZeromqTransport:
     # ---- subscribers
 
     def create_subscriber(self, spec: SubscriberSpec) -> SubscriberTransport:
-        """Create a subscriber. See `Transport.subscriber`."""
+        """Create a subscriber. See `Transport.create_subscriber`."""
         with self._hold_context():
             if isinstance(spec.configuration, Direct):
                 return self._create_direct_subscriber(spec, spec.configuration)
@@ -355,17 +355,17 @@ class ZeromqTransport:
     # ---- services
 
     def create_server(self, spec: ServerSpec) -> ServerTransport:
-        """Create a server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.create_server`."""
         with self._hold_context():
             return self._services.create_server(spec)
 
     def create_client(self, spec: ClientSpec) -> ClientTransport:
-        """Create a client. See `ServiceTransport.client`."""
+        """Create a client. See `ServiceTransport.create_client`."""
         with self._hold_context():
             return self._services.create_client(spec)
 
     def create_surveyor(self, spec: ClientSpec) -> SurveyTransport:
-        """Create a surveyor. See `ServiceTransport.survey`."""
+        """Create a surveyor. See `ServiceTransport.create_surveyor`."""
         with self._hold_context():
             return self._services.create_surveyor(spec)
 
@@ -377,7 +377,7 @@ class ZeromqTransport:
         timeout_s: float,
         calls: Sequence[CallQueue] = (),
     ) -> None:
-        """Wait for a message in `subscribers`, a call in `calls`, or `wake`."""
+        """Wait up to `timeout_s` seconds for a message in `subscribers`, a call in `calls`, or `wake`."""
         waits = self._thread_wait()
         entered: list[_Subscriber] = []
         entered_calls: list[CallQueue] = []
@@ -453,7 +453,7 @@ class ZeromqTransport:
             return self._session(configuration.master).query_graph(timeout_s)
 
     def begin_close(self) -> None:
-        """Notify all peers that the node is closing; doesn't wait. See `Transport.begin_close`."""
+        """Notify all peers that the node is closing, without waiting. See `Transport.begin_close`."""
         with self._lock:
             if self._is_closed:
                 return
@@ -535,7 +535,7 @@ class ZeromqTransport:
 
 @contextmanager
 def close_on_error(close: Callable[[], object]) -> Iterator[None]:
-    """Call `close` if the body raises: a socket left open would block the end of the program."""
+    """Call `close` if the body raises, because an open socket would block the end of the program."""
     try:
         yield
     except BaseException:

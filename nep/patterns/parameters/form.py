@@ -34,7 +34,7 @@ class ParameterForm:
         """Type name of the plain values, as in `NodeParameter.kind`."""
 
     def to_plain(self, value: object) -> object:
-        """Return the plain value of an instance, or a validated copy of a plain value.
+        """Convert an instance to its plain value, or validate and copy a plain value.
 
         Raises `ValueError` with the field path if the value doesn't match the class.
         """

@@ -28,13 +28,18 @@ class StateTopic(Protocol):
 
 
 class ParameterHost(Protocol):
-    """Interface to the node that owns the parameters."""
+    """Interface of the node that owns the parameters."""
 
     name: str
     id: str
 
     def open_parameters(self, place: str, answer: Callable[[object], object]) -> StateTopic:
-        """Serve `answer` as the service `place` if the back end has services, and open the topic `place`."""
+        """Open the latched topic `place`, and the service `place` if the back end supports services.
+
+        Args:
+            place: Name of the topic and the service.
+            answer: Callback of the service.
+        """
 
 
 def parameters_topic(node_id: str) -> str:
@@ -45,8 +50,8 @@ def parameters_topic(node_id: str) -> str:
 class Parameters:
     """Parameters of a node by name. Thread-safe. See `Node.parameters`.
 
-    From the first `declare` on, other nodes can read the parameters. They can set them if the back end
-    supports services.
+    After the first `declare`, other nodes can read the parameters. If the back end supports services,
+    other nodes can also set them.
 
         node.parameters.declare("speed", 0.3, min=0.0, max=1.0, description="m/s")
         node.parameters["speed"] = 0.5
@@ -160,11 +165,11 @@ class Parameters:
         self._set(values, is_own=True)
 
     def on_change(self, callback: OnChange) -> None:
-        """Register a callback that is invoked with the new values by name before parameters change.
+        """Register a callback that is called before parameters change, with the new values by name.
 
-        The callback rejects the whole change by returning the reason as a string, or by raising an exception.
-        It runs in the thread that calls `set`, or in a thread of the node if another node requested the
-        change.
+        The callback rejects the whole change by returning the reason as a string, or by raising an
+        exception. It runs in the thread that calls `set`, or in a thread of the node if another node
+        requested the change.
         """
         with self._lock:
             self._watchers = (*self._watchers, callback)
@@ -217,6 +222,6 @@ class Parameters:
         return self._state()
 
     def forked(self) -> None:
-        """Detach from the host in a forked child process. Takes no lock."""
+        """Detach from the host in a forked child process. Acquires no lock."""
         self._lock = threading.RLock()
         self._topic = None

@@ -1,4 +1,4 @@
-"""`NodeParameter`: a value with a name, a type and limits. Performs no input or output."""
+"""`NodeParameter`: a value with a name, a type and limits. Performs no I/O."""
 
 from __future__ import annotations
 

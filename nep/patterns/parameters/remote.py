@@ -17,10 +17,12 @@ if TYPE_CHECKING:
 
 
 class RemoteParameters:
-    """Client of another node's parameters. Usable as a context manager. Opened by `Node.parameters_of`.
+    """Client of another node's parameters. Usable as a context manager.
 
-    with node.parameters_of("camera") as parameters:
-        parameters.set("exposure", 20)
+        with node.parameters_of("camera") as parameters:
+            parameters.set("exposure", 20)
+
+    Opened by `Node.parameters_of`.
     """
 
     def __init__(self, client: Client) -> None:

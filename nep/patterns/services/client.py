@@ -33,9 +33,9 @@ TimeLimit = float | Literal["default"] | None
 """Time limit of a call in seconds; None for no limit, "default" for the client's time limit."""
 
 WAIT_SLICE_S = 0.1
-"""Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
+"""Maximum duration of a single wait in seconds, because on Windows Ctrl+C doesn't interrupt a wait."""
 _SERVICE_QUERY_TIMEOUT_S = 0.5
-"""Time limit for querying the existing services after a service was not found."""
+"""Time limit in seconds for querying the names of existing services after a service was not found."""
 _JOIN_TIMEOUT_S = 2.0
 
 
@@ -127,9 +127,12 @@ class Client:
     def call_async(self, request: object, timeout_s: TimeLimit = "default") -> Future[object]:
         """Call the service and return a future of the reply.
 
-        The future can be cancelled. Its callbacks run in a thread of the client. Raises `EncodeError` or
-        `ClosedError` if the request can't be sent; other errors are set on the future. Arguments and errors
-        are those of `call`.
+        The future can be cancelled. Its callbacks run in a thread of the client. `EncodeError` and
+        `ClosedError` are raised by this method; the other errors of `call` are set on the future.
+
+        Args:
+            request: Value of the request.
+            timeout_s: Time limit in seconds, as for `call`.
         """
         with self._lock:
             if self._future_thread is None:
@@ -145,7 +148,15 @@ class Client:
         return future
 
     async def acall(self, request: object, timeout_s: TimeLimit = "default") -> object:
-        """Call the service from a coroutine. Arguments and errors are those of `call`."""
+        """Call the service from a coroutine and return its reply.
+
+        Args:
+            request: Value of the request.
+            timeout_s: Time limit in seconds, as for `call`.
+
+        Raises:
+            NepError: As `call` does.
+        """
         loop = asyncio.get_running_loop()
         future: asyncio.Future[Outcome] = loop.create_future()
 
@@ -169,7 +180,7 @@ class Client:
     def send_info(self, request: object) -> None:
         """Send a request; `listen_info` returns the reply.
 
-        Raises `NepError` if the last reply was not read.
+        Raises `NepError` if the reply to the previous request has not been read.
         """
         if self._sent is not None:
             raise NepError(_("the previous reply has not been read; call 'listen_info' first"))
@@ -246,7 +257,7 @@ class Client:
         self._on_close(self)
 
     def join(self) -> None:
-        """Wait until the calls of `call_async` have ended, and stop their thread."""
+        """Wait until all calls of `call_async` have completed, and stop their thread."""
         with self._lock:
             ends, self._future_thread = self._future_thread, None
         if ends is not None:

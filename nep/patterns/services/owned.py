@@ -34,8 +34,8 @@ class ServiceRegistry:
     Args:
         transport: Transport of the node.
         backend: Back end of the node.
-        wait_s: Time limit for the master in seconds.
-        new_id: Returns a new id, and the number from which the id was derived.
+        wait_s: Time limit for the master in seconds; None for no limit.
+        new_id: Returns a new id and the number from which the id was derived.
         wake: Wakes the spinning thread.
         closed_error: Returns the exception to raise after the node was closed.
     """
@@ -204,7 +204,11 @@ class ServiceRegistry:
         return [queue for each in self._servers if (queue := each.spun) is not None and not each.is_closed]
 
     def run(self, node_ends: threading.Event) -> bool:
-        """Serve one call per server. Return True if there was any; stop early when `node_ends` is set."""
+        """Serve one call per server in the spinning thread; return True if a call was served.
+
+        Args:
+            node_ends: Event that stops the method before the next server.
+        """
         has_run = False
         for server in self._servers:
             if node_ends.is_set():
@@ -216,9 +220,9 @@ class ServiceRegistry:
     # ---- closing
 
     def finish_calls(self, timeout_s: float) -> None:
-        """Wait for calls that run in the servers' threads.
+        """Wait at most `timeout_s` seconds for calls that are executed by the servers' own threads.
 
-        Call after the transport stopped accepting calls.
+        Call this after the transport has stopped accepting calls.
         """
         deadline = time.monotonic() + timeout_s
         with self._lock:
@@ -227,7 +231,13 @@ class ServiceRegistry:
             server.join(max(0.0, deadline - time.monotonic()))
 
     def stop_threads(self, timeout_s: float) -> None:
-        """Stop all threads of servers and clients. Call after the transport closed its sockets."""
+        """Stop the threads of all servers and clients.
+
+        Call this after the transport has closed its sockets.
+
+        Args:
+            timeout_s: Time limit in seconds for the callbacks that run in the servers' threads.
+        """
         deadline = time.monotonic() + timeout_s
         with self._lock:
             servers, self._servers = self._servers, ()
@@ -250,7 +260,7 @@ class ServiceRegistry:
 
 
 def check_call_codec(codec: Codec) -> Codec:
-    """Return the codec if calls can use it; raise `NepError` otherwise."""
+    """Return `codec` if services support it; raise `NepError` otherwise."""
     if codec.name == "image":
         raise NepError(_("a call can't contain an image; publish it on a topic"))
     if codec_by_number(codec.number) is not codec:  # a back end's codec without a number

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 _logger = logging.getLogger("nep.patterns.services")
 
 WAIT_SLICE_S = 0.1
-"""Maximum duration of a single wait: on Windows Ctrl+C does not interrupt a wait."""
+"""Maximum duration of a single wait in seconds, because on Windows Ctrl+C doesn't interrupt a wait."""
 _CLOSE_TIMEOUT_S = 2.0
 
 Callback = Callable[[object], object]
@@ -79,12 +79,12 @@ class Server:
 
     @property
     def calls(self) -> int:
-        """Number of calls that were replied to, including replies with an error."""
+        """Number of answered calls, including calls answered with an error."""
         return self._transport.tally.calls
 
     @property
     def errors(self) -> int:
-        """Number of calls whose reply was an error."""
+        """Number of calls answered with an error."""
         return self._transport.tally.errors
 
     @property
@@ -109,11 +109,11 @@ class Server:
 
     @property
     def spun(self) -> CallQueue | None:
-        """Queue of calls for the spinning thread; None if there is no callback or the server has threads."""
+        """Queue of the calls that the spinning thread serves; None without a callback or with own threads."""
         return self._transport.calls if self._callback is not None and not self._threads else None
 
     def run_one(self) -> bool:
-        """Serve the oldest waiting call; return True if there was one. Called by the spinning thread."""
+        """Serve the oldest queued call; return False if the queue is empty. Called by the spinning thread."""
         call = self._transport.calls.pop()
         if call is not None:
             self._execute(call)
@@ -264,7 +264,7 @@ class Server:
     def join(self, timeout_s: float) -> None:
         """Wait at most `timeout_s` seconds for the server's own threads to end.
 
-        Call after its queue was closed.
+        Call this after the server's queue was closed.
         """
         deadline = time.monotonic() + timeout_s
         for thread in self._threads:

@@ -15,7 +15,7 @@ from nep.system.arguments import check_optional_time_limit
 
 
 class ServiceNode(ABC):
-    """Methods of a node for services and surveys."""
+    """Base class of `Node` that contains the methods for services and surveys."""
 
     _services: ServiceRegistry
 

@@ -211,8 +211,8 @@ class Surveyor:
 class Respondent(Server):
     """Respondent of a survey, with a callback or with `listen_json` and `send_json`. Thread-safe.
 
-    Callbacks are run as by `Server`. An exception is logged here, and counted at the surveyor in
-    `Surveyor.failures`.
+    The callback runs in the same threads as the callback of a `Server`. An exception is logged in this
+    program, and counted at the surveyor in `Surveyor.failures`.
 
         node.new_respondent("battery", lambda question: {"percent": 87})
         node.spin()

@@ -24,9 +24,13 @@ _MAX_SHOWN_LENGTH = 60
 
 
 class PayloadType:
-    """Declared class of requests or replies; None allows any value.
+    """Declared class of requests or replies.
 
-    Raises `ValueError` for a class whose fields can't be encoded.
+    Args:
+        declared: Dataclass or TypedDict; None allows any value.
+
+    Raises:
+        ValueError: The fields of the class can't be encoded.
     """
 
     def __init__(self, declared: type | None) -> None:
@@ -42,9 +46,14 @@ class PayloadType:
         return base if self._declared is None else typed.typed_codec(self._declared, base)
 
     def read(self, plain: object, size_bytes: int) -> object:
-        """Convert a decoded payload to an instance.
+        """Convert a decoded payload to an instance of the class.
 
-        Raises `DecodeError` with the field path of a mismatch.
+        Args:
+            plain: Decoded payload.
+            size_bytes: Size of the encoded payload, for the error message.
+
+        Raises:
+            DecodeError: The payload doesn't match the class; the message contains the field path.
         """
         if self._declared is None:
             return plain
@@ -69,7 +78,14 @@ UNTYPED = CallTypes(PayloadType(None), PayloadType(None))
 
 
 def call_types(**given: object) -> CallTypes:
-    """Validate two classes, passed as keywords in the order request, reply. Raises `ValueError`."""
+    """Validate the declared types of requests and replies.
+
+    Args:
+        given: Two classes or None by argument name: first the type of requests, then that of replies.
+
+    Raises:
+        ValueError: A value is not a class, or the fields of a class can't be encoded.
+    """
     declared: list[PayloadType] = []
     for name, each in given.items():
         if each is not None and not isinstance(each, type):

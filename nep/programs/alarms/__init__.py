@@ -1,8 +1,9 @@
-"""Alarms such as "when /robot/camera is silent for 2 s, show a banner".
+"""Alarms: rules that run actions when a condition on messages, nodes or rates becomes true.
 
-`rule` defines rules, `rule_file` reads and writes them, `sentences` formats them. `evaluator` evaluates rules
-against messages, the graph and time; `alarms` runs the actions and keeps the `history`; `commands` calls
-services and publishes. `nep watch` and Studio use these.
+An example of a rule is "when /robot/camera is silent for 2 s, show a banner". `rule` defines rules,
+`rule_file` reads and writes them, and `sentences` formats them. `evaluator` evaluates rules against messages,
+the graph and time; `alarms` runs the actions and records the `history`; `commands` calls services and
+publishes. The package is used by `nep watch` and Studio.
 """
 
 from nep.programs.alarms.alarms import Alarms

@@ -1,4 +1,4 @@
-"""`Alarms`: alarm rules, their actions and history. Used by `nep watch` and Studio."""
+"""`Alarms`: alarm rules with their actions and history. Used by `nep watch` and Studio."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ MAX_TRIES = 20
 _MAX_ACTION_RESULTS = 1_000
 
 DoneCallback = Callable[[bool, str], None]
-"""Completion callback of an action: (success, result as text). Called once, from any thread."""
+"""Completion callback of an action, called once, in any thread, with the success and the result as text."""
 ActionStarter = Callable[[AlarmEvent, AlarmAction, DoneCallback], None]
-"""Function that starts an action of one kind without blocking, and calls `Done` when it has ended."""
+"""Function that starts an action without blocking and calls `DoneCallback` when the action has completed."""
 
 
 @dataclass(slots=True)
@@ -52,9 +52,9 @@ class Alarms:
 
         Args:
             rules: Rules to evaluate.
-            history: Earlier records (default: none).
-            carriers: Functions that start actions, by kind of action. Actions of other kinds are recorded as
-                failed.
+            history: History to continue; None for an empty one.
+            carriers: Functions that start actions, by kind of action. Actions of other kinds are recorded
+                as failed.
             clock: Monotonic clock in seconds.
             clock_s: Clock in seconds since 1970.
         """
@@ -95,7 +95,12 @@ class Alarms:
         self.set_rules([each for each in self.rules if each.id != rule_id])
 
     def snooze(self, rule_id: str, until_s: float) -> None:
-        """Run no actions of a rule until `until_s` (seconds since 1970; 0 ends the snooze)."""
+        """Snooze a rule: run none of its actions until a given time.
+
+        Args:
+            rule_id: Id of the rule.
+            until_s: End of the snooze (s since 1970); 0 ends the snooze now.
+        """
         rule = self.rule(rule_id)
         if rule is not None:
             self.set_rule(replace(rule, snoozed_until_s=until_s))
@@ -111,7 +116,11 @@ class Alarms:
         return self._running_count > 0
 
     def take_action_results(self) -> list[tuple[AlarmRule, str, float]]:
-        """Return and clear the completed actions: (rule, result as text, time in seconds since 1970)."""
+        """Return the actions completed since the last call, including failed ones.
+
+        Returns:
+            Tuples of the rule, the result as text, and the time of completion (s since 1970).
+        """
         deeds = list(self._deeds)
         self._deeds.clear()
         return deeds

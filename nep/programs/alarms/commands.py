@@ -1,4 +1,7 @@
-"""Service calls and messages of alarms, with cached clients and publishers."""
+"""Execution of alarm actions that call services or publish messages.
+
+Clients and publishers are cached.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,11 @@ def _allow_all(_node: Node, _topic: str, _msg_type: str) -> str:
 
 
 class AlarmCommands:
-    """Runner of the actions "call" and "send" with a node. Thread-safe."""
+    """Executor of the alarm actions "call" and "send". Thread-safe.
+
+    Args:
+        refusal: Returns the reason why a node may not publish (node, topic, message type); "" if it may.
+    """
 
     def __init__(self, refusal: Callable[[Node, str, str], str] = _allow_all) -> None:
         self._refusal = refusal
@@ -34,7 +41,11 @@ class AlarmCommands:
         self._node: Node | None = None
 
     def start_action(self, node: Node, action: AlarmAction, done: DoneCallback) -> None:
-        """Start an action. Waits for the handshake of a new publisher, but not for replies. Never raises."""
+        """Start an action with a node; `done` receives the result.
+
+        The call waits for the handshake of a new publisher, but not for the reply of a service. Errors are
+        passed to `done`, not raised.
+        """
         try:
             with self._lock:
                 self._use_node(node)
@@ -57,7 +68,7 @@ class AlarmCommands:
         done(has_subscribers, template.format(topic=action.name))
 
     def close(self) -> None:
-        """Drop cached clients and publishers; their node closes them."""
+        """Discard the cached clients and publishers, which are closed with their node."""
         with self._lock:
             self._clients.clear()
             self._publishers.clear()

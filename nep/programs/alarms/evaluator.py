@@ -1,7 +1,7 @@
 """Evaluation of alarm rules against messages, the graph and the clock.
 
-Messages arrive in the node's thread, the graph and time in another: a lock is held during comparisons, never
-while a message is decoded.
+Messages are processed in a thread of the node, the graph and the clock in another thread. A lock is held
+while values are compared, but not while a message is decoded.
 """
 
 from __future__ import annotations
@@ -22,10 +22,13 @@ from nep.protocol.graph_view import GraphView
 from nep.protocol.topic_pattern import matches
 
 LARGE_MESSAGE_BYTES = 256 * 1024
-"""Size above which a message is decoded only if it is the newest of its batch."""
+"""Size in bytes above which a message is decoded only if it is the newest of its batch."""
 MAX_EVENTS = 1_000
 MASTER_GRACE_S = 3.0
-"""Time after a master's restart in which nodes register again; no node counts as disconnected before."""
+"""Time in seconds after a restart of the master in which no node counts as disconnected.
+
+Nodes register again within this time.
+"""
 RATE_WINDOW_S, MAX_RATE_WINDOW_S = 2.0, 60.0
 _SAMPLE_PERIOD_S = 0.25
 _MAX_SAMPLES = 256
@@ -41,10 +44,10 @@ class AlarmEvent:
         kind: "on", "off", or "still" if the alarm is still on when its snooze ends.
         rule: Rule of the alarm.
         at_s: Time of the transition (s since 1970).
-        seen: Value that caused it.
-        lasted_s: How long the alarm was on.
+        seen: Value that caused the transition.
+        duration_s: Duration of the alarm in seconds; 0 if the alarm was turned on.
         count: Number of times the condition became true while the alarm was on.
-        is_snoozed: True if no action runs.
+        is_snoozed: True if no action runs because the rule is snoozed.
     """
 
     kind: Literal["on", "off", "still"]
@@ -61,13 +64,13 @@ class AlarmState:
     """Current state of an alarm.
 
     Attributes:
-        phase: "off" (disabled), "faulty" (invalid rule), "waits" (its topic or node was never seen), "well"
+        phase: "off" (disabled), "faulty" (invalid rule), "waits" (the topic or node was never seen), "well"
             (condition false), "pending" (condition true, but not yet long enough) or "on".
         seen: Newest value.
-        on_for_s: How long the alarm has been on.
+        on_for_s: Time in seconds since the alarm turned on; 0 if it is off.
         count: Number of times the condition became true since the alarm turned on.
         trouble: "missing" if the newest message lacks the field, "no_number" if the field isn't a number,
-            "unreadable" if the message can't be decoded.
+            "unreadable" if the message can't be decoded, else "".
     """
 
     phase: AlarmPhase
@@ -135,11 +138,11 @@ class AlarmEvaluator:
 
     @property
     def topics(self) -> frozenset[str]:
-        """Topics that the rules need to be subscribed."""
+        """Topics to which the rules need a subscription."""
         return topics_of([track.rule for track in self._tracks.values()])
 
     def set_rules(self, rules: Sequence[AlarmRule]) -> None:
-        """Replace the rules. Rules with an unchanged condition keep their state."""
+        """Replace the rules. The state of rules whose condition is unchanged is preserved."""
         now = self._clock()
         with self._lock:
             before, self._tracks = self._tracks, {}
@@ -182,7 +185,7 @@ class AlarmEvaluator:
     # ---- inputs
 
     def evaluate(self, topic: str, messages: Sequence[Message]) -> None:
-        """Process messages of a topic, oldest first. Topics without a rule are ignored."""
+        """Evaluate the messages of a topic, oldest first. Topics without a rule are ignored."""
         subscription = self._subscribed.get(topic)
         if subscription is None or not messages:
             return
@@ -205,7 +208,11 @@ class AlarmEvaluator:
             self.came.set()
 
     def update_graph(self, view: GraphView | None) -> None:
-        """Process a new graph. Pass None while no master replies, so that no node counts as disconnected."""
+        """Evaluate a new snapshot of the graph.
+
+        Args:
+            view: Graph; None while the master doesn't reply, so that no node counts as disconnected.
+        """
         now = self._clock()
         with self._lock:
             before, self._view = self._view, view

@@ -1,4 +1,4 @@
-"""Bounded history of alarms: when an alarm was on, for how long, and which actions ran."""
+"""Bounded history of alarms: the periods in which alarms were on, and the actions that ran."""
 
 from __future__ import annotations
 
@@ -13,11 +13,16 @@ MAX_RECORDS = 500
 _MAX_ACTION_RESULTS = 20
 _MAX_CHARACTERS = 300
 _MAX_TIME_S = 3e10
-"""Maximum time stamp (the year 2920). Later times are invalid: some systems can't convert them to a date."""
+"""Maximum time in a record (s since 1970; the year 2920), because some systems can't convert later times."""
 
 
 class ActionResult(NamedTuple):
-    """Completed action: its kind, and its result as text."""
+    """Completed action of an alarm.
+
+    Attributes:
+        kind: Kind of the action.
+        words: Result as text.
+    """
 
     kind: str
     text: str
@@ -31,10 +36,10 @@ class AlarmRecord:
         rule_id: Id of the rule.
         words: Cause as text, such as "range of /distance is 0.36, below 0.4".
         at_s: Start (s since 1970).
-        lasted_s: Duration; None while the alarm is on, or if its end was not observed.
+        lasted_s: Duration in seconds; None while the alarm is on, or if the end was not observed.
         is_on: True while the alarm is on.
         count: Number of times the condition became true in this period.
-        was_snoozed: True if no action ran because of a snooze.
+        was_snoozed: True if no action ran because the rule was snoozed.
         deeds: Completed actions.
     """
 
@@ -48,13 +53,16 @@ class AlarmRecord:
     action_results: list[ActionResult] = field(default_factory=list)
 
     def add(self, deed: ActionResult) -> None:
-        """Add a completed action; it replaces an earlier one of the same kind."""
+        """Add a completed action, replacing an earlier one of the same kind."""
         kept = [each for each in self.action_results if each.kind != deed.kind]
         self.action_results = [*kept, deed][-_MAX_ACTION_RESULTS:]
 
 
 class AlarmHistory:
-    """Newest `MAX_RECORDS` records of alarms. Iteration starts with the newest. Not thread-safe."""
+    """Bounded list of the newest records of alarms, at most `MAX_RECORDS`. Not thread-safe.
+
+    Iteration starts with the newest record.
+    """
 
     def __init__(self, records: Iterable[AlarmRecord] = ()) -> None:
         self.records: deque[AlarmRecord] = deque(records, maxlen=MAX_RECORDS)
@@ -67,12 +75,12 @@ class AlarmHistory:
         return len(self.records)
 
     def add(self, record: AlarmRecord) -> None:
-        """Append a record; evict the oldest beyond the limit."""
+        """Append a record, and evict the oldest one if there are more than `MAX_RECORDS`."""
         self.records.append(record)
         self.revision += 1
 
     def current(self, rule_id: str) -> AlarmRecord | None:
-        """Return the record of the period in which an alarm currently is on, or None."""
+        """Return the record of an alarm that is on, or None if the alarm is off."""
         return next((each for each in self if each.rule_id == rule_id and each.is_on), None)
 
     def last(self, rule_id: str) -> AlarmRecord | None:
@@ -84,7 +92,7 @@ class AlarmHistory:
         return sum(each.rule_id == rule_id and each.at_s >= at_s for each in self.records)
 
     def clear(self) -> None:
-        """Remove all records except those of alarms that are on."""
+        """Remove the records of all alarms that are off."""
         self.records = deque((each for each in self.records if each.is_on), maxlen=MAX_RECORDS)
         self.revision += 1
 
@@ -104,9 +112,9 @@ def record_to_plain(record: AlarmRecord) -> dict[str, object]:
 
 
 def record_from_plain(plain: object) -> AlarmRecord | None:
-    """Convert a decoded JSON value to a record, or return None if it is invalid.
+    """Convert a decoded JSON value to a record, or return None if the value is invalid.
 
-    The record is never on, because the end of its period was not observed.
+    `AlarmRecord.is_on` is False, because the end of the period was not observed.
     """
     if not isinstance(plain, Mapping):
         return None

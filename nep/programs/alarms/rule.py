@@ -16,7 +16,7 @@ from nep.protocol.topic_pattern import is_pattern
 from nep.protocol.wire import check_node_name, check_topic
 
 Scalar = float | int | str | bool | None
-"""Type of values that a field can be compared with."""
+"""Type of the values with which a field can be compared."""
 
 TOPIC_KINDS = ("silent", "rate_below", "rate_above", "loses", "appears")
 VALUE_KINDS = ("below", "above", "equals", "is_not", "changes")
@@ -48,9 +48,10 @@ class AlarmCondition:
         name: Topic (with "appears" also a pattern) or node; "" if not chosen yet.
         path: Field path of the compared value, as in `nep topic echo`.
         limit: Value to compare with: a number for `NUMBER_KINDS` (Hz for rates, percent for "loses").
-        for_s: How long the condition must hold without interruption; for "silent" the duration of the
-            silence, for "loses" the length of the window.
-        margin: Hysteresis: how far a number must return beyond the limit before the alarm turns off.
+        for_s: Time in seconds that the condition must hold without interruption; for "silent" the duration
+            of the silence, for "loses" the length of the window.
+        margin: Hysteresis: distance from the limit, on the other side, that a number must reach before the
+            alarm turns off.
     """
 
     kind: str
@@ -67,7 +68,7 @@ class AlarmCondition:
 
     @property
     def is_about_value(self) -> bool:
-        """True if the condition compares a field, so that messages must be decoded."""
+        """True if the condition compares the value of a field, for which messages must be decoded."""
         return self.kind in VALUE_KINDS
 
     @property
@@ -88,10 +89,10 @@ class AlarmAction:
 
     Attributes:
         kind: One of `ACTION_KINDS`.
-        name: Behaviour to run, service to call, or topic to publish on.
-        payload: Request or payload.
-        msg_type: Type of the topic.
-        seconds: Length of the saved recording.
+        name: Behaviour to run, service to call, or topic to publish on; "" for other kinds.
+        payload: Request of the call, or payload of the message.
+        msg_type: Message type of the topic.
+        seconds: Length of the saved recording in seconds, for the kind "keep".
     """
 
     kind: str
@@ -109,9 +110,9 @@ class AlarmRule:
         id: Unique id.
         condition: Condition that turns the alarm on.
         actions: Actions that run when the alarm turns on.
-        is_on: False if a person disabled the rule.
-        calm_s: How long the condition must be false before the alarm turns off; repetitions before that are
-            counted, not reported.
+        is_enabled: False if the user disabled the rule.
+        calm_s: Time in seconds that the condition must be false before the alarm turns off. A condition
+            that becomes true again earlier is counted, but causes no event.
         snoozed_until_s: End of the snooze (s since 1970). Until then no actions run, but the history
             continues.
     """
@@ -129,7 +130,12 @@ class AlarmRule:
 
 
 class RuleProblem(NamedTuple):
-    """Problem of a rule: its key in the alarm file, and a sentence without full stop."""
+    """Problem of a rule.
+
+    Attributes:
+        key: Invalid key in the alarm file.
+        message: Description without full stop.
+    """
 
     key: str
     message: str
@@ -154,7 +160,7 @@ class _RuleChecker:
 
 
 def to_float(number: float) -> float:
-    """Convert a number to a float; an integer that is too large becomes infinity."""
+    """Convert a number to a float. An integer that is too large becomes infinite."""
     try:
         return float(number)
     except OverflowError:
@@ -243,7 +249,7 @@ def _is_scalar(value: object) -> bool:
 
 
 def topics_of(rules: Sequence[AlarmRule]) -> frozenset[str]:
-    """Return the topics to which the rules need a subscription."""
+    """Return the names of the topics to which the rules need a subscription."""
     return frozenset(
         rule.condition.name for rule in rules if rule.condition.needs_topic and rule.condition.name
     )

@@ -1,4 +1,4 @@
-"""Alarm file: conversion between JSON and alarm rules with their history. Errors name the line.
+"""Reader and writer of alarm files: JSON with alarm rules and their history. Errors name the line.
 
 ::
 
@@ -87,7 +87,13 @@ _DEFAULT_FOR_S: Mapping[str, float] = {"silent": 2.0, "loses": 30.0}
 
 @dataclass(frozen=True, slots=True)
 class AlarmFile:
-    """Content of an alarm file: rules, history, and a message for each invalid rule that was skipped."""
+    """Content of an alarm file.
+
+    Attributes:
+        rules: Valid rules.
+        history: Records of earlier alarms.
+        problems: One sentence for each invalid rule that was skipped.
+    """
 
     rules: tuple[AlarmRule, ...] = ()
     history: AlarmHistory | None = None
@@ -95,7 +101,7 @@ class AlarmFile:
 
 
 def read_alarms(path: Path) -> AlarmFile:
-    """Read an alarm file. Raises `NepError` with the first problem."""
+    """Read an alarm file. Raises `NepError` if the file can't be read or an alarm is invalid."""
     try:
         with path.open("rb") as file:
             data = file.read(_MAX_BYTES + 1)
@@ -140,7 +146,7 @@ def parse_alarms(data: bytes, path: str, *, lenient: bool = False) -> AlarmFile:
 
 
 def encode_alarms(rules: Sequence[AlarmRule], history: AlarmHistory | None = None) -> bytes:
-    """Encode rules and history as the bytes of an alarm file."""
+    """Encode rules and history as the content of an alarm file."""
     records = [record_to_plain(record) for record in history.records] if history is not None else []
     value: dict[str, object] = {"format": FORMAT_VERSION, "alarms": [_rule_to_plain(rule) for rule in rules]}
     if records:
@@ -189,11 +195,11 @@ def _action_to_plain(action: AlarmAction) -> object:
 
 
 class NewerAlarmsError(NepError):
-    """Error for an alarm file written by a newer version, in which the file may be valid."""
+    """Error for an alarm file of a newer format, which a newer version of nep can read."""
 
 
 class _InvalidAlarm(Exception):  # noqa: N818 - never leaves this module
-    """Error for an invalid alarm. The message needs no further context."""
+    """Error for an invalid alarm; its message names the file and the line."""
 
 
 class _Reader:

@@ -69,7 +69,7 @@ _ACTIONS: Mapping[str, str] = {
 
 
 def duration_text(seconds: float) -> str:
-    """Format a duration: 0.5 s, 60 s, 10 min, 3 h."""
+    """Format a duration in seconds, minutes or hours, such as "60 s" or "10 min"."""
     for unit, size in ((_("{count} h"), 3600.0), (_("{count} min"), 60.0)):
         if seconds > size and math.isclose(seconds % size, 0.0, abs_tol=1e-9):
             return unit.format(count=number(seconds / size))
@@ -77,7 +77,10 @@ def duration_text(seconds: float) -> str:
 
 
 def value_text(value: object) -> str:
-    """Format the value of a field. Long texts are shortened; lists and maps are shown as their kind."""
+    """Format the value of a field.
+
+    Long text is shortened. A list or map is represented by "a list" or "an object".
+    """
     if isinstance(value, bool) or value is None:
         return {True: _("true"), False: _("false"), None: _("null")}[value]
     if isinstance(value, int):
@@ -90,7 +93,7 @@ def value_text(value: object) -> str:
 
 
 def limit_text(condition: AlarmCondition, value: Scalar) -> str:
-    """Format a limit or a value with the unit that the condition implies."""
+    """Format a limit or a measured value with the unit of the condition, such as "10 messages per second"."""
     if condition.kind in {"rate_below", "rate_above"} and isinstance(value, int | float):
         return _("{count} messages per second").format(count=number(value, ".4g"))
     if condition.kind == "loses" and isinstance(value, int | float):
@@ -99,7 +102,7 @@ def limit_text(condition: AlarmCondition, value: Scalar) -> str:
 
 
 def subject_text(condition: AlarmCondition) -> str:
-    """Format the subject of a condition: a topic, a node, or "range of /distance"."""
+    """Format the subject of a condition, such as "/distance", "lidar_driver" or "range of /distance"."""
     if not condition.name:
         return _("a node") if condition.is_about_node else _("a topic")
     name = quotable(condition.name)
@@ -109,7 +112,7 @@ def subject_text(condition: AlarmCondition) -> str:
 
 
 def condition_text(condition: AlarmCondition) -> str:
-    """Format a condition: "/robot/camera is silent for 2 s"."""
+    """Format a condition, such as "/robot/camera is silent for 2 s"."""
     words = _CONDITIONS[condition.kind]
     if condition.for_s > 0:
         words = _LASTING_CONDITIONS.get(condition.kind, words)
@@ -121,7 +124,7 @@ def condition_text(condition: AlarmCondition) -> str:
 
 
 def action_text(action: AlarmAction) -> str:
-    """Format an action: "show a banner", "call restart_lidar"."""
+    """Format an action, such as "show a banner" or "call restart_lidar"."""
     return _(_ACTIONS[action.kind]).format(
         name=quotable(action.name), time=duration_text(action.seconds or DEFAULT_RECORDING_S)
     )
@@ -136,7 +139,7 @@ def rule_text(rule: AlarmRule) -> str:
 
 
 def event_text(condition: AlarmCondition, seen: Scalar) -> str:
-    """Format an event for the history: "/distance: range is 0.36, below 0.4"; no full stop."""
+    """Format an event for the history, such as "range of /distance is 0.36, below 0.4", without full stop."""
     return _(_EVENTS[condition.kind]).format(
         subject=subject_text(condition),
         limit=limit_text(condition, condition.limit),
@@ -147,7 +150,7 @@ def event_text(condition: AlarmCondition, seen: Scalar) -> str:
 
 
 def current_value_text(condition: AlarmCondition, seen: Scalar) -> str:
-    """Format the current value: "0.82 now", "silent for 4 s"; "" if there is none."""
+    """Format the current value, such as "0.82 now" or "silent for 4 s"; return "" if there is none."""
     if condition.kind == "silent":
         if not isinstance(seen, int | float) or seen < 1:
             return ""

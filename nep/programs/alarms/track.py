@@ -1,7 +1,7 @@
-"""State machine of one alarm: off, pending, on. Has no clock; the time is passed in.
+"""State machine of one alarm with the states off, pending and on; the caller passes the time.
 
-An alarm stays on until its condition was false for `calm_s`; repetitions before that are counted, not
-reported.
+An alarm stays on until its condition was false for `calm_s`. A condition that becomes true again earlier is
+counted, but causes no transition.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from nep.messages.fields import MISSING, Path, parse_path, value_at
 from nep.programs.alarms.rule import EVENT_KINDS, MAX_CHARACTERS, AlarmRule, Scalar, to_float
 
 MIN_EVENT_DURATION_S = 5.0
-"""Minimum time that an alarm caused by a momentary event stays on, in seconds."""
+"""Minimum time in seconds that an alarm stays on after a momentary event."""
 
 ValueProblem = Literal["", "missing", "no_number"]
 
@@ -26,8 +26,8 @@ class Transition(NamedTuple):
     Attributes:
         is_on: True if the alarm turned on, False if it turned off.
         seen: Value that caused the transition.
-        lasted_s: How long the alarm was on; 0 if it turned on.
-        times: Number of times the condition became true while the alarm was on.
+        duration_s: Time in seconds that the alarm was on; 0 if it turned on.
+        occurrences: Number of times the condition became true while the alarm was on.
     """
 
     is_on: bool
@@ -38,16 +38,17 @@ class Transition(NamedTuple):
 
 @dataclass(slots=True)
 class _Value:
-    """Field path of a rule, and the value last read there."""
+    """Field path of a rule, and the last value of that field."""
 
     path: Path = ()
     last: object = MISSING
 
 
 class AlarmTrack:
-    """State of one alarm.
+    """State machine of one alarm.
 
-    Call `observe` with new input and `advance` as time passes; both may return a `Turn`.
+    Call `observe` with new input and `advance` as time passes. Methods return the `Transition` that
+    occurred, or None.
     """
 
     def __init__(self, rule: AlarmRule) -> None:
@@ -81,7 +82,12 @@ class AlarmTrack:
         return self._true_since is not None and not self.is_on
 
     def read(self, payload: object, now: float) -> Transition | None:
-        """Process a payload of the alarm's topic; `now` is the monotonic time in seconds."""
+        """Process a payload of the alarm's topic; return the transition, or None.
+
+        Args:
+            payload: Decoded payload.
+            now: Monotonic time in seconds.
+        """
         value = value_at(payload, self._value.path)
         if self._is_clearly_false(value):
             self.seen, self.trouble, self.was_seen = value, "", True  # type: ignore[assignment]  # a number
@@ -115,12 +121,12 @@ class AlarmTrack:
         return value >= self._bound if self._is_below else value <= self._bound
 
     def compare(self, number: float, now: float, *, is_below: bool, seen: Scalar = None) -> Transition | None:
-        """Compare a number with the limit, with hysteresis.
+        """Compare a number with the limit, with hysteresis; return the transition, or None.
 
         Args:
             number: Number to compare.
             now: Monotonic time in seconds.
-            is_below: True if the condition is that the number is below the limit, False for above.
+            is_below: True if the alarm is on while the number is below the limit, False for above.
             seen: Original value, if `number` was converted from it.
         """
         limit, margin = self.rule.condition.number, self.rule.condition.margin
@@ -131,13 +137,19 @@ class AlarmTrack:
         return self.observe(is_so, number if seen is None else seen, now)
 
     def trigger(self, now: float) -> Transition | None:
-        """Process a momentary event: turn the alarm on, and let it turn off after `EVENT_SHOWN_S`."""
+        """Process a momentary event: it turns the alarm on for `MIN_EVENT_DURATION_S`."""
         turn = self.observe(True, self.seen, now)
         self.observe(False, self.seen, now)
         return turn
 
     def observe(self, is_so: bool, seen: Scalar, now: float) -> Transition | None:
-        """Process the current truth of the condition (`is_so`) and the value that was seen."""
+        """Process the current truth of the condition; return the transition, or None.
+
+        Args:
+            is_so: True if the condition is met.
+            seen: Value that was compared.
+            now: Monotonic time in seconds.
+        """
         turn = self.advance(now)
         self.was_seen = True
         self.seen = seen
@@ -154,7 +166,11 @@ class AlarmTrack:
         return turn or self.advance(now)
 
     def advance(self, now: float) -> Transition | None:
-        """Update the state for the time that has passed since the last call."""
+        """Process the passing of time; return the transition, or None.
+
+        Args:
+            now: Monotonic time in seconds.
+        """
         since, false_since = self._true_since, self._false_since
         if self.on_since is None:
             if since is None or now - since < self._for_s:
@@ -168,7 +184,7 @@ class AlarmTrack:
         return turn
 
     def turn_off(self, now: float) -> Transition | None:
-        """Turn the alarm off because its rule is no longer evaluated."""
+        """Turn the alarm off because its rule is no longer evaluated; return None if the alarm was off."""
         if self.on_since is None:
             return None
         end = now if self._false_since is None else self._false_since
@@ -178,9 +194,10 @@ class AlarmTrack:
 
 
 def scalar_of(value: object) -> Scalar:
-    """Convert a value for an event: a list or map becomes its size, a long text is cut.
+    """Convert a value to a scalar for an event.
 
-    Integers beyond 64 bits become floats, because few JSON readers accept them.
+    A list or map is represented by its length in brackets, and long text is truncated. Integers beyond 64
+    bits become floats, because few JSON readers accept them.
     """
     if isinstance(value, str):
         return value[:MAX_CHARACTERS]

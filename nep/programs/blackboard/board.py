@@ -42,7 +42,7 @@ MAX_KEYS = 100_000
 MAX_BYTES = 256 * 2**20
 _MAX_CHANGES = 10_000
 _WAIT_SLICE_S = 0.1
-"""Maximum duration of a single wait, to notice a closed node, and for Ctrl+C on Windows."""
+"""Maximum duration of a single wait in seconds, so that a closed node and Ctrl+C on Windows are noticed."""
 _IMMEDIATE_DELAY_S = 1e-6
 _MIN_TIMER_S = 0.001
 _MAX_SUGGESTIONS = 1_000
@@ -59,8 +59,8 @@ class BlackboardEntry:
         age_s: Age in seconds.
         age_by: "stamp" if the age starts at the publisher's time stamp; "arrival" if it starts at the
             arrival, because there is no stamp or the clocks don't agree.
-        source: Topic of the value; "" if the value was set with `Blackboard.put`.
-        robot: Robot that perceived the value, if the message names one.
+        source: Topic from which the value was received; "" if it was set with `Blackboard.put`.
+        robot: Robot that perceived the value; "" if the message names none.
         stamp_ns: Publisher's time stamp (ns since 1970), if any.
         left_s: Seconds until the value expires; infinite if it doesn't expire.
     """
@@ -120,9 +120,9 @@ class Blackboard:
 
     Args:
         node: Node that subscribes to the watched topics; None for a blackboard without topics.
-        max_keys: Maximum number of keys. Beyond, the least recently updated values are dropped and counted in
-            `dropped`.
-        max_bytes: Approximate memory limit, enforced in the same way.
+        max_keys: Maximum number of keys. When it is exceeded, the least recently updated values are dropped
+            and counted in `dropped`.
+        max_bytes: Approximate memory limit in bytes, enforced in the same way.
         clock: Monotonic clock in seconds.
         wall_clock_ns: Clock in nanoseconds since 1970.
 
@@ -180,10 +180,10 @@ class Blackboard:
         Args:
             topic: Topic or pattern.
             msg_type: Message type.
-            configuration: As for `Node.new_sub`.
-            key: Key to store messages under. A name in braces is replaced with that field of the message, as
-                in ``human.{id}``. With None, perceptions of RIZE are stored at the root (``touched.head``)
-                and other messages under the topic's name.
+            configuration: Further options, as for `Node.new_sub`.
+            key: Key to store messages under. A name in braces is replaced with that field of the message,
+                as in ``human.{id}``. With None, perceptions of RIZE are stored at the root
+                (``touched.head``) and other messages under the topic's name.
             fields: Fields to store, or a mapping from fields to other names (default: all fields).
             each: Field that contains a list of items to store one by one.
             lives_s: Seconds after which a value expires unless it is updated; None for no expiry.
@@ -192,7 +192,8 @@ class Blackboard:
             The watch, which counts messages. Close it to stop storing.
 
         Raises:
-            BadKeyError: The key is invalid. Other errors are those of `Node.new_sub`.
+            BadKeyError: The key is invalid.
+            NepError: The blackboard has no node, or the subscription failed (see `Node.new_sub`).
         """
         node = self._node
         if node is None:
@@ -221,7 +222,9 @@ class Blackboard:
             self._ignored |= {publisher}
 
     def put(self, key: str | tuple[str, ...], value: object, *, lives_s: float | None = None) -> None:
-        """Store a value. Each field of a map is stored under its own key; other keys below `key` stay.
+        """Store a value. Each field of a map is stored under its own key.
+
+        Keys below `key` that are not in the map are not changed.
 
         Args:
             key: Key, or a tuple of its names.
@@ -230,7 +233,7 @@ class Blackboard:
 
         Raises:
             BadKeyError: The key is invalid.
-            BadValueError: The value is too deep or too large.
+            BadValueError: The value is nested too deeply or too large.
         """
         names, lives = parse_key(key), _lifetime(lives_s)
         with self._updated:
@@ -241,7 +244,7 @@ class Blackboard:
         self._store(entries)
 
     def remove(self, key: str | tuple[str, ...]) -> int:
-        """Remove a key and all keys below; return the number of removed keys."""
+        """Remove a key and all keys below it; return the number of removed keys."""
         names = parse_key(key)
         with self._updated:
             self._expire_locked()
@@ -308,7 +311,7 @@ class Blackboard:
 
         Args:
             key: Key, or a tuple of its names.
-            default: Returned if there is no value, or if all values are older than `max_age_s`.
+            default: Value to return if the key has no value, or only values older than `max_age_s`.
             max_age_s: Maximum age in seconds; None for no limit.
         """
         found = self._value_of(parse_key(key), check_optional_time_limit("max_age_s", max_age_s))
@@ -338,14 +341,17 @@ class Blackboard:
             return len(self._entries)
 
     def age_s(self, key: str | tuple[str, ...]) -> float:
-        """Return the age of a key's value, or of the newest value below; infinite if there is none."""
+        """Return the age of a key's value, or of the newest value below the key, in seconds.
+
+        The age is infinite if there is no value.
+        """
         names = parse_key(key)
         with self._updated:
             now = self._expire_locked()
             return min((each.age_s(now) for each in self._entries.entries_below(names)), default=math.inf)
 
     def entry(self, key: str | tuple[str, ...]) -> BlackboardEntry | None:
-        """Return the entry of the key itself, ignoring keys below, or None."""
+        """Return the entry of a key, or None. Keys below it are ignored."""
         names = parse_key(key)
         with self._updated:
             now = self._expire_locked()
@@ -364,7 +370,7 @@ class Blackboard:
         return sorted(key_text(each.key) for each in found)
 
     def snapshot(self, pattern: str = "**") -> dict[str, BlackboardEntry]:
-        """Return all entries that match a pattern, by key, as of one moment."""
+        """Return all entries that match a pattern, by key, all taken at the same moment."""
         names = parse_key(pattern)
         with self._updated:
             now = self._expire_locked()
@@ -385,7 +391,7 @@ class Blackboard:
 
     @property
     def bytes(self) -> int:
-        """Approximate memory used by the values."""
+        """Approximate memory used by the values, in bytes."""
         return self._entries.bytes
 
     @property
@@ -395,7 +401,7 @@ class Blackboard:
 
     @property
     def outdated(self) -> int:
-        """Number of values rejected because a newer one was stored or because they had already expired."""
+        """Number of values rejected because a newer value was stored or because the value had expired."""
         return self._entries.outdated
 
     # ---- waiting and callbacks
@@ -406,12 +412,12 @@ class Blackboard:
         condition: Callable[[object], object] | None = None,
         timeout_s: float | None = None,
     ) -> object:
-        """Wait until a key has a value that fulfils `condition`, and return the value.
+        """Wait until a key has a value that fulfils a condition, and return the value.
 
         Args:
             key: Key, or a tuple of its names.
-            condition: Function of the value, called in this thread after updates; None accepts any value.
-                Values that are replaced quickly may be skipped.
+            condition: Predicate of the value, called in the waiting thread after updates; None accepts any
+                value. Values that are replaced quickly may be skipped.
             timeout_s: Time limit in seconds; None for no limit.
 
         Raises:
@@ -551,7 +557,10 @@ class Blackboard:
             watch.close()
 
     def forked(self) -> None:
-        """Reset locks and close watches in a forked child process; values stay. See `nep.system.forks`."""
+        """Close the blackboard in a forked child process (see `nep.system.forks`).
+
+        Values can still be read.
+        """
         self._is_closed = self._is_forked = True
         if self._lock.locked():  # held by a thread of the parent: the tree may be half-updated
             self._entries = self._entries.rebuilt_copy()

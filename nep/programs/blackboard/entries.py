@@ -1,4 +1,4 @@
-"""Bounded store of blackboard entries by key, with expiry. No input or output. Not thread-safe.
+"""Bounded store of blackboard entries by key, with expiry. Performs no I/O. Not thread-safe.
 
 Entries form a tree of names, so that finding the keys above and below another key takes constant time.
 """
@@ -18,7 +18,7 @@ from nep.programs.blackboard.keys import Key, key_matches, key_text, literal_lev
 from nep.programs.blackboard.values import is_same, size_of
 
 AgeBy = Literal["stamp", "arrival"]
-"""Start of an age: the publisher's time stamp or the arrival."""
+"""Moment from which an age is counted: the publisher's time stamp or the arrival."""
 Cause = Literal["new", "changed", "replaced", "removed", "expired", "dropped"]
 _ENTRY_BYTES = 600
 _NAME_BYTES = 100
@@ -31,13 +31,13 @@ class StoredEntry:
 
     Attributes:
         key: Key of the value.
-        value: The value.
-        since: Start of the value's age (blackboard's clock).
-        age_by: Start of the age, as in `BlackboardEntry.age_by`.
-        expires: Time at which the value expires (blackboard's clock).
+        value: Copy of the value.
+        age_start: Time at which the value's age starts (blackboard's clock).
+        age_by: Source of `age_start`, as in `BlackboardEntry.age_by`.
+        expires_at: Time at which the value expires (blackboard's clock); infinite for no expiry.
         stamp_ns: Publisher's time stamp (ns since 1970), if any.
         publisher: Id of the publisher, if any.
-        source: Topic of the value, or "".
+        source: Topic from which the value was received, or "".
         robot: Robot that perceived the value, or "".
     """
 
@@ -51,14 +51,17 @@ class StoredEntry:
     source: str = ""
     robot: str = ""
     bytes: int = field(init=False)
-    """Approximate memory use of the entry."""
+    """Approximate memory use of the entry in bytes."""
 
     def __post_init__(self) -> None:
         names = _NAME_BYTES * len(self.key) + sum(map(len, self.key))
         object.__setattr__(self, "bytes", _ENTRY_BYTES + names + size_of(self.value))
 
     def age_s(self, now: float) -> float:
-        """Return the age at `now`; 0 if the start is in the future because a clock was set back."""
+        """Return the age in seconds at `now`.
+
+        The age is 0 if it starts in the future because a clock was set back.
+        """
         return max(0.0, now - self.age_start)
 
 
@@ -70,13 +73,16 @@ class EntryChange(NamedTuple):
 
 
 class _Tree(dict[str, "StoredEntry | _Tree"]):
-    """Subtree with the entries and subtrees of the names below a name."""
+    """Tree of entries: maps each name to an entry or to the subtree below it."""
 
 
 class Entries:
     """Newest entry of each key.
 
-    Beyond the limits, the least recently updated entries are dropped and counted.
+    Args:
+        max_keys: Maximum number of keys. When it is exceeded, the least recently updated entries are
+            dropped and counted.
+        max_bytes: Maximum memory use in bytes, enforced in the same way.
     """
 
     def __init__(self, max_keys: int, max_bytes: int) -> None:
@@ -95,11 +101,11 @@ class Entries:
 
     @property
     def next_expiry(self) -> float:
-        """Time at which `expire` must be called next; infinite if no entry expires."""
+        """Time at which the next entry expires and `expire` must be called; infinite if no entry expires."""
         return self._expiry_heap[0][0] if self._expiry_heap else math.inf
 
     def rebuilt_copy(self) -> Entries:
-        """Return a new store built from the entries, for a fork that interrupted an update of the tree."""
+        """Return a copy with a new tree, because a fork may have interrupted an update of the tree."""
         copy = Entries(self._max_keys, self._max_bytes)
         for entry in list(self._by_age.values()):
             copy.store(entry, -math.inf)
@@ -109,11 +115,11 @@ class Entries:
     # ---- reading
 
     def get(self, key: Key) -> StoredEntry | None:
-        """Return the entry of the key itself, or None."""
+        """Return the entry of a key, or None. Keys below it are ignored."""
         return self._by_age.get(key)
 
     def entries_below(self, key: Key) -> Iterator[StoredEntry]:
-        """Yield the entry of a key, or the entries of all keys below."""
+        """Yield the entry of a key, or the entries of all keys below it."""
         found = self._find(key)
         if isinstance(found, StoredEntry):
             yield found
@@ -139,8 +145,9 @@ class Entries:
     # ---- changing
 
     def store(self, entry: StoredEntry, now: float) -> list[EntryChange]:
-        """Store an entry unless another publisher's newer entry exists; return the changes.
+        """Store an entry and return the changes.
 
+        An entry that has expired, or is older than another publisher's entry for the key, is not stored.
         Entries of keys above and below are replaced. Raises `BadValueError` if the entry exceeds the memory
         limit.
         """
@@ -168,11 +175,11 @@ class Entries:
         return changes
 
     def has_below(self, key: Key) -> bool:
-        """Return True if there are entries below a key."""
+        """Return True if there are entries below a key, not counting the key itself."""
         return isinstance(self._find(key), _Tree)
 
     def remove(self, key: Key) -> list[EntryChange]:
-        """Remove the entries of a key and of all keys below; return the changes."""
+        """Remove the entries of a key and of all keys below it; return the changes."""
         return [EntryChange(self._pop(each.key), "removed") for each in list(self.entries_below(key))]
 
     def expire(self, now: float) -> list[EntryChange]:

@@ -16,7 +16,7 @@ Key = tuple[str, ...]
 MAX_LEVELS = 32
 _MAX_CHARACTERS = 1_000
 _MAX_KEY_TEXT_LENGTH = 2 * _MAX_CHARACTERS + MAX_LEVELS
-"""Length of the longest written key: every character escaped, plus dots."""
+"""Maximum length of a key as text, with every character escaped and the dots included."""
 _SPECIAL = re.compile(r"([.\\])")
 _NAME = re.compile(r"((?:[^.\\]|\\.|\\$)*)(?:\.|$)", re.DOTALL)
 _ESCAPE = re.compile(r"\\(.)", re.DOTALL)
@@ -24,7 +24,10 @@ _WILDCARDS = frozenset({"*", "**"})
 
 
 def parse_key(key: str | Sequence[str]) -> Key:
-    """Split a key into its names; a tuple is returned unchanged. Raises `BadKeyError`."""
+    """Split a key at its dots and return the names. Raises `BadKeyError`.
+
+    A tuple of names is validated and returned unchanged.
+    """
     if isinstance(key, str):
         if len(key) > _MAX_KEY_TEXT_LENGTH:  # splitting it would take long
             raise _too_long_error(key)
@@ -63,7 +66,7 @@ def _split_names(text: str) -> Key:
 
 
 def key_text(names: Key) -> str:
-    """Join names into a written key; the inverse of `parse_key`."""
+    """Join names into a key as text; the inverse of `parse_key`."""
     return ".".join(_SPECIAL.sub(r"\\\1", name) if "." in name or "\\" in name else name for name in names)
 
 
@@ -73,7 +76,10 @@ def key_of_topic(topic: str) -> Key:
 
 
 def key_matches(pattern: Key, key: Key) -> bool:
-    """Return True if a key matches a pattern: `*` is one non-empty name, `**` any number of names."""
+    """Return True if a key matches a pattern.
+
+    In the pattern, `*` matches one non-empty name and `**` any number of names.
+    """
     return levels_match(pattern, key)
 
 

@@ -19,12 +19,12 @@ _QUOTES = "'\""
 
 
 class Perception(NamedTuple):
-    """Perception of a robot.
+    """Message about something that a robot perceived.
 
     Attributes:
         primitive: Kind of perception, such as "touched".
         values: Perceived values by name.
-        robot: Robot that perceived them; "" if unknown.
+        robot: Name of the robot; "" if unknown.
     """
 
     primitive: str

@@ -1,14 +1,14 @@
 """Blackboard server for programs in any language, used by `nep blackboard`.
 
-The topic `/NAME/changes` carries maps with "blackboard", "key", "value", "cause" and details of the value.
-Services:
+Changes are published on the topic `/NAME/changes` as maps with "blackboard", "key", "value", "cause" and
+details of the value. The services are:
 
 - `NAME/get` takes "key" and replies "found", "value" and "age_s"; or takes "pattern" and replies "entries"
   and the number of omitted entries, "more". "max_age_s" excludes older values.
-- `NAME/set` takes "key" and "value", or a map "values"; and "lives_s".
+- `NAME/set` takes "key" and "value", or a map "values"; "lives_s" is optional.
 - `NAME/keys` takes "pattern" and replies "keys" and "more".
 
-Invalid requests raise `ServiceError` at the caller. NaN is sent as `null`, because JSON lacks NaN.
+For an invalid request, the caller gets a `ServiceError`. NaN is sent as `null`, because JSON lacks NaN.
 """
 
 from __future__ import annotations
@@ -33,20 +33,30 @@ if TYPE_CHECKING:
 
 DEFAULT_NAME = "blackboard"
 MAX_ENTRIES = 10_000
-"""Maximum number of entries in a reply; the number of omitted entries is part of the reply."""
+"""Maximum number of entries in a reply. The reply contains the number of omitted entries."""
 _MAX_REPLY_BYTES = 32 * 2**20
 
 
 def service_name(name: str, what: str) -> str:
-    """Return the name of a blackboard's service; `what` is "get", "set" or "keys"."""
+    """Return the name of a service of a blackboard.
+
+    Args:
+        name: Name of the blackboard.
+        what: "get", "set" or "keys".
+    """
     return f"{name}/{what}"
 
 
 class BlackboardServer:
     """Server that publishes the changes of a blackboard and replies to requests.
 
-    Runs in the thread that spins `node`. Usable as a context manager. The constructor raises the exceptions
-    of `Node.new_pub` and `Node.new_server`.
+    Runs in the thread that spins the node. Usable as a context manager. The constructor raises the
+    exceptions of `Node.new_pub` and `Node.new_server`.
+
+    Args:
+        node: Node of the server.
+        board: Blackboard to serve.
+        name: Name of the blackboard, which prefixes its topic and services.
     """
 
     def __init__(self, node: Node, board: Blackboard, name: str = DEFAULT_NAME) -> None:

@@ -1,4 +1,4 @@
-"""Blackboard values: copying, approximate sizes, comparison. Performs no input or output."""
+"""Copying, size estimates and comparison of blackboard values. Performs no input or output."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ _ITEM_BYTES = 8
 
 
 def deep_copy(value: object, depth: int = _MAX_DEPTH) -> object:
-    """Return a deep copy of lists and maps.
+    """Return a deep copy of a value's lists and maps.
 
-    Raises `ValueError` if the value is too deep or contains itself.
+    Args:
+        value: Value to copy.
+        depth: Maximum number of nested levels.
+
+    Raises:
+        ValueError: The value is nested too deeply or contains itself.
     """
     if isinstance(value, list | tuple):
         if _has_only_numbers(value):
@@ -74,10 +79,14 @@ def is_same(one: object, other: object) -> bool:
 
 
 def leaves(value: object, key: Key = ()) -> Iterator[tuple[Key, object]]:
-    """Yield the values of a nested map with their keys.
+    """Yield the (key, value) pairs of a nested map.
 
-    A value that is not a map, an empty map, a map with keys other than text and whole numbers, and a map that
-    is nested too deeply are yielded as one value.
+    A value that is not a map, an empty map, a map with keys other than text and whole numbers, and a map
+    that is nested too deeply are yielded as one value.
+
+    Args:
+        value: Map or other value.
+        key: Key of `value`, with which the yielded keys start.
     """
     if not isinstance(value, Mapping) or not value or len(key) >= MAX_LEVELS or not _has_names(value):
         yield key, value

@@ -27,7 +27,13 @@ _MISSING = object()
 
 
 class PerceivedValue(NamedTuple):
-    """Value found in a message, its key, and the robot that perceived it ("" if unknown)."""
+    """Value found in a message.
+
+    Attributes:
+        key: Key for the value.
+        value: The value.
+        robot: Name of the robot that perceived the value; "" if unknown.
+    """
 
     key: Key
     value: object
@@ -37,10 +43,7 @@ class PerceivedValue(NamedTuple):
 class MessageMapping:
     """Conversion of a topic's messages to keys and values. Performs no input or output.
 
-    Args:
-        key: As for `Blackboard.watch`.
-        fields: As for `Blackboard.watch`.
-        each: As for `Blackboard.watch`.
+    The arguments are those of `Blackboard.watch`.
     """
 
     def __init__(
@@ -58,9 +61,9 @@ class MessageMapping:
         self._fields = None if fields is None else [(parse_key(one), parse_key(two)) for one, two in pairs]
 
     def items(self, payload: object) -> Sequence[object]:
-        """Return the items of a payload to be stored one by one.
+        """Return the items of a payload that are stored separately; most payloads are a single item.
 
-        Raises `NepError` if the field `each` isn't a list.
+        Raises `NepError` if the payload has no list in the field `each`.
         """
         if self._each:
             found = _field_value(payload, self._each)
@@ -70,7 +73,15 @@ class MessageMapping:
         return payload if self._has_holes and isinstance(payload, list | tuple) else (payload,)
 
     def perceived_values(self, topic: str, item: object) -> Iterator[PerceivedValue]:
-        """Yield the values of an item with their keys. Raises `NepError` if a key can't be formed."""
+        """Yield the values of an item with their keys.
+
+        Args:
+            topic: Topic of the message.
+            item: Item returned by `items`.
+
+        Raises:
+            NepError: The item lacks a field that is part of the key.
+        """
         seen = None if self._fields is not None else parse_perception(item)
         if seen is not None:
             beginning = () if self._key is None else self._key_for(item)
@@ -119,13 +130,17 @@ def _name_from_field(item: object, field: str) -> str:
 def is_change_message(payload: object) -> bool:
     """Return True if a payload is a change published by a blackboard.
 
-    Storing such messages under a pattern would publish further changes in an endless loop.
+    A watch of a pattern ignores such messages, because storing them would publish further changes
+    endlessly.
     """
     return isinstance(payload, Mapping) and "blackboard" in payload and "cause" in payload
 
 
 class BlackboardWatch:
-    """Watch of a topic, with message counts. Thread-safe; usable as a context manager."""
+    """Subscription that stores messages on a blackboard, with message counts.
+
+    Thread-safe; usable as a context manager.
+    """
 
     def __init__(
         self,
@@ -150,7 +165,7 @@ class BlackboardWatch:
         self._lock = threading.Lock()
 
     def attach(self, subscriber: Subscriber) -> None:
-        """Set the subscriber that receives the messages."""
+        """Set the subscriber, which is closed with the watch."""
         with self._lock:
             self._subscriber = subscriber
             is_closed = self._is_closed
@@ -196,7 +211,7 @@ class BlackboardWatch:
             )
 
     def close(self) -> None:
-        """Stop storing messages; values already stored stay. Idempotent."""
+        """Stop storing messages. Stored values remain on the blackboard. Idempotent."""
         with self._lock:
             self._is_closed = True
             subscriber = self._subscriber

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 
 
 MAX_ROUTES = 500
-"""Maximum number of routes that patterns create, in both directions."""
+"""Number of routes in both directions beyond which patterns create no more routes."""
 IDLE_TIMEOUT_S = 60.0
-"""Time in seconds after which a pattern's route is removed if its topic has no publisher."""
+"""Time in seconds without a publisher after which a route that a pattern created is removed."""
 _INTERNAL_PREFIX = "/nep/"
 _WAIT_SLICE_S = 0.05
 _FLUSH_TIMEOUT_S, _JOIN_TIMEOUT_S = 2.0, 0.2
@@ -94,7 +94,7 @@ class Bridge:
 
     @property
     def routes(self) -> tuple[Route, ...]:
-        """Routes, one per topic and direction; those created by patterns come last."""
+        """Routes, one per topic and direction. Routes created by patterns come last."""
         return self._routes
 
     @property
@@ -105,7 +105,7 @@ class Bridge:
         )
 
     def wait_until_ready(self, timeout_s: float | None = None) -> bool:
-        """Wait until the bridge is ready or closed; return True if it is ready.
+        """Wait until the bridge is ready; return False if it was closed or the time limit has passed.
 
         Args:
             timeout_s: Time limit in seconds; None for no limit.
@@ -118,7 +118,7 @@ class Bridge:
         return True
 
     def refusals(self, timeout_s: float) -> tuple[str, ...]:
-        """Return the reasons why listed topics are blocked because they would move robots without permission.
+        """Return the reasons why listed topics are not forwarded, because they would move robots.
 
         Waits at most `timeout_s` seconds until both graphs and the descriptions of their robots are known.
         """
@@ -193,7 +193,10 @@ class Bridge:
         )
 
     def find(self, side: BridgeSide, view: GraphView) -> None:
-        """Create routes for published topics that match a pattern. Runs in the side's thread."""
+        """Create routes for published topics that match a pattern, and remove idle ones.
+
+        Runs in the side's thread.
+        """
         self._check_other_bridges()
         self._close_idle_routes(side, view, time.monotonic())
         named = {each.end(side.name).name for each in self.configuration.topics if not each.is_pattern}
@@ -234,7 +237,7 @@ class Bridge:
                 route.close()
 
     def publishes_status_on(self, side: BridgeSide, view: GraphView) -> bool:
-        """Return True if the status is published on this side.
+        """Return True if the bridge publishes its status on a side.
 
         If both back ends share one graph, the status is published on side a only, because two publishers of
         one topic would conflict.
@@ -286,7 +289,11 @@ class Bridge:
     # ---- closing
 
     def close(self, timeout_s: float = _FLUSH_TIMEOUT_S) -> None:
-        """Stop forwarding; messages already received are delivered first, within `timeout_s`. Idempotent."""
+        """Stop forwarding and close both nodes. Idempotent.
+
+        Args:
+            timeout_s: Maximum time in seconds to deliver the messages that were already received.
+        """
         deadline = time.monotonic() + timeout_s
         self._closed.set()
         for side in self.sides.values():
@@ -309,7 +316,7 @@ class Bridge:
 
 
 def check_installed(configuration: BridgeConfiguration) -> None:
-    """Raise `NepError` for a back end that is not installed or doesn't know a message type."""
+    """Raise `NepError` if a back end is not installed or doesn't know a message type."""
     for name in SIDES:
         side = configuration.side(name)
         with Node(configuration.node_name(name), side.backend.name, master=side.master):

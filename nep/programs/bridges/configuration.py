@@ -1,4 +1,4 @@
-"""Configuration of a bridge, and its short form on the command line.
+"""Configuration of a bridge, and parser of the short form `nep bridge A B`.
 
 `nep.programs.bridges.toml_file` parses the file format.
 """
@@ -37,7 +37,7 @@ class SideConfiguration:
     Attributes:
         backend: Back end of the node on this side.
         master: Address of the master.
-        network: Identifies the network for all bridges; see `nep.programs.bridges.trail`.
+        network: Id by which all bridges recognize the network; see `nep.programs.bridges.trail`.
     """
 
     backend: Backend
@@ -51,8 +51,8 @@ class TopicEnd:
 
     Attributes:
         name: Name of the topic, or pattern.
-        msg_type: Message type for publishing and subscribing on this side; "" to detect it.
-        qos: Name of a QoS profile of the back end, or "".
+        msg_type: Message type for publishing and subscribing on this side; "" to detect the type.
+        qos: Name of a QoS profile of the back end; "" for the default.
     """
 
     name: str
@@ -66,14 +66,14 @@ class TopicEnd:
         return found.group() if found is not None else ""
 
     def matched_part(self, topic: str) -> str:
-        """Return the part of `topic` that the wildcard stands for, or "" if the pattern doesn't match."""
+        """Return the part of a topic that the wildcard matches, or "" if the pattern doesn't match."""
         before, wildcard, after = self.name.partition(self.wildcard or "*")
         part = topic.removeprefix(before).removesuffix(after)
         is_whole = wildcard and part and topic == before + part + after
         return part if is_whole and (wildcard == "**" or "/" not in part) else ""
 
     def with_part(self, part: str) -> str:
-        """Return the topic with `part` in place of the wildcard."""
+        """Return the name with the wildcard replaced by `part`."""
         return self.name.replace(self.wildcard, part, 1) if self.wildcard else self.name
 
 
@@ -85,7 +85,7 @@ class BridgeTopic:
         a: Topic on side a.
         b: Topic on side b.
         direction: Direction in which messages are forwarded.
-        max_rate_hz: Maximum rate; 0 for no limit.
+        max_rate_hz: Maximum number of messages per second; 0 for no limit.
     """
 
     a: TopicEnd
@@ -95,7 +95,7 @@ class BridgeTopic:
 
     @property
     def is_pattern(self) -> bool:
-        """True if this is a pattern, which stands for any number of topics."""
+        """True if the name has a wildcard and so may match several topics."""
         return bool(self.a.wildcard)
 
     @property
@@ -113,6 +113,12 @@ class BridgeConfiguration:
     """Configuration of a bridge.
 
     The bridge's nodes are named `bridge-NAME-to-BACKEND`, after the back end of the other side.
+
+    Attributes:
+        name: Name of the bridge.
+        a: Configuration of side a.
+        b: Configuration of side b.
+        topics: Topics and patterns to forward.
     """
 
     name: str
@@ -125,13 +131,13 @@ class BridgeConfiguration:
         return self.a if name == "a" else self.b
 
     def node_name(self, side: SideName) -> str:
-        """Return the name of the node on a side; it names the back end from which its topics come."""
+        """Return the name of the node on a side, which contains the back end of the other side."""
         other = self.b if side == "a" else self.a
         return f"{NODE_PREFIX}{self.name}-to-{other.backend.name}"
 
 
 def checked_name(name: str) -> str:
-    """Return `name` if it is a valid bridge name, else raise `NepError`."""
+    """Validate the name of a bridge and return it. Raises `NepError`."""
     check_node_name(f"{NODE_PREFIX}{name}")
     if not name or len(name) > _MAX_NAME_LENGTH:
         raise NepError(
@@ -170,7 +176,10 @@ def _network_id(backend: Backend, master: str) -> str:
 
 
 def check_topic_names(a: str, b: str) -> None:
-    """Raise `NepError` unless these are valid names of a topic or pattern on both sides."""
+    """Validate the topics or patterns of both sides.
+
+    Raises `NepError` if a name is invalid, or if the two have different wildcards.
+    """
     wildcards = []
     for name in (check_topic(a), check_topic(b)):
         found = _WILDCARD.findall(name)
@@ -205,8 +214,13 @@ def configuration_from_arguments(
 ) -> BridgeConfiguration:
     """Create the configuration for `nep bridge A B`. Raises `NepError`.
 
-    `a` and `b` have the form BACKEND:TOPIC or BACKEND@MASTER:TOPIC. A side without a topic (`ros:`) has the
-    topic of the other side.
+    Args:
+        a: Side a as BACKEND:TOPIC or BACKEND@MASTER:TOPIC. Without a topic (`ros:`), the topic of the other
+            side is used.
+        b: Side b in the same form.
+        name: Name of the bridge.
+        direction: "a->b", "b->a" or "both".
+        max_rate_hz: Maximum number of messages per second; 0 for no limit.
     """
     (a_side, a_topic), (b_side, b_topic) = _parse_side_and_topic(a), _parse_side_and_topic(b)
     a_topic, b_topic = a_topic or b_topic, b_topic or a_topic
@@ -219,7 +233,7 @@ def configuration_from_arguments(
 
 
 def check_different_networks(a: SideConfiguration, b: SideConfiguration) -> None:
-    """Raise `NepError` if both sides are the same network, because every message would return."""
+    """Raise `NepError` if both sides are the same network, where every message would loop."""
     if a.network == b.network:
         raise NepError(
             _(

@@ -1,9 +1,9 @@
 """Detection of other bridges between the same two networks, by their status on `BRIDGES_TOPIC`.
 
-A bridge that is seen on both sides connects the same networks, whatever their names. If both bridges forward
-a topic in the same direction, each message arrives twice. If they forward a topic in opposite directions and
-neither network carries trails, messages would loop; then the bridge with the greater id stops forwarding that
-topic.
+A bridge whose status is received on both sides connects the same networks, whatever their names. If both
+bridges forward a topic in the same direction, each message arrives twice. If they forward a topic in opposite
+directions and neither network carries trails, messages would loop; then the bridge with the greater id stops
+forwarding that topic.
 """
 
 from __future__ import annotations
@@ -23,11 +23,17 @@ _MAX_ID_LENGTH = 100
 _MAX_ROUTES = 1000
 
 RouteKey = tuple[SideName, str, str]
-"""Route of a bridge: (side of the origin, topic there, topic on the other side)."""
+"""Route of a bridge: (side of the origin, topic on that side, topic on the other side)."""
 
 
 class OtherBridge(NamedTuple):
-    """Other bridge between the same networks. The sides in its routes are those of our bridge."""
+    """Other bridge between the same networks.
+
+    Attributes:
+        id: Id of the bridge.
+        name: Name of the bridge.
+        ways: Routes of the bridge, with the names that our bridge gives to the sides.
+    """
 
     id: str
     name: str
@@ -38,10 +44,10 @@ class _Status(NamedTuple):
     """Status of a bridge received on one of our sides.
 
     Attributes:
-        at: Time of arrival.
+        at: Time of arrival (monotonic, s).
         name: Name of the bridge.
-        on: Side, in terms of that bridge, on which the status was published.
-        ways: Routes of the bridge, with sides in its own terms.
+        on: The other bridge's name ("a" or "b") of the side on which the status was published.
+        ways: Routes of the bridge, with the names that it gives to the sides.
     """
 
     at: float
@@ -54,7 +60,7 @@ class OtherBridges:
     """Tracker of other bridges. Thread-safe.
 
     Args:
-        own: Id of our bridge, whose status is ignored.
+        own: Id of this bridge, whose own status is ignored.
     """
 
     def __init__(self, own: str) -> None:
@@ -63,7 +69,7 @@ class OtherBridges:
         self._statuses: dict[SideName, OrderedDict[str, _Status]] = {side: OrderedDict() for side in SIDES}
 
     def add_status(self, side: SideName, status: object, now: float) -> None:
-        """Process a status received on a side of our bridge; an invalid status is ignored."""
+        """Process a status received on a side of this bridge. An invalid status is ignored."""
         if not isinstance(status, Mapping):
             return
         id_, name, on = (status.get(key) for key in ("id", "bridge", "side"))
@@ -81,7 +87,7 @@ class OtherBridges:
                 statuses.popitem(last=False)
 
     def parallel_bridges(self, now: float) -> list[OtherBridge]:
-        """Return the bridges seen recently on both sides."""
+        """Return the bridges whose status was received recently on both sides."""
         with self._lock:
             on_a, on_b = ({**self._statuses[side]} for side in SIDES)
         found = []

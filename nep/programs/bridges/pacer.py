@@ -1,4 +1,4 @@
-"""Rate limit of a route, and a timer thread."""
+"""Rate limit and timer thread for the routes of a bridge."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ _MAX_CATCH_UP = 0.1
 
 
 class RateLimit:
-    """Rate limit with evenly spaced slots. Delays up to a tenth of the period are caught up.
+    """Rate limit with evenly spaced slots.
+
+    A message that is late by up to a tenth of the period does not delay the next slot.
 
     Args:
         rate_hz: Maximum number of messages per second.
@@ -24,7 +26,7 @@ class RateLimit:
         """Time of the next free slot."""
 
     def try_acquire(self, now: float) -> bool:
-        """Return True and take the next slot if its time has come."""
+        """Take the next slot and return True, or return False if it is too early."""
         if now < self.next_at:
             return False
         self.next_at = max(self.next_at, now - _MAX_CATCH_UP * self._period_s) + self._period_s
@@ -34,7 +36,7 @@ class RateLimit:
 class Pacer:
     """Timer thread that calls functions at given times (monotonic, s).
 
-    The thread starts with the first call.
+    The thread starts with the first `call_at`.
     """
 
     def __init__(self, name: str) -> None:
@@ -46,7 +48,12 @@ class Pacer:
         self._is_closed = False
 
     def call_at(self, due: float, call: Callable[[], None]) -> None:
-        """Call `call` once at time `due`. Does not block."""
+        """Schedule a call without blocking.
+
+        Args:
+            due: Time of the call (monotonic, s).
+            call: Function to call in the timer thread.
+        """
         with self._changed:
             if self._is_closed:
                 return
@@ -57,7 +64,11 @@ class Pacer:
             self._changed.notify()
 
     def close(self, timeout_s: float = 2.0) -> None:
-        """Stop the thread; pending calls are dropped."""
+        """Stop the thread and discard pending calls.
+
+        Args:
+            timeout_s: Maximum time in seconds to wait for the thread.
+        """
         with self._changed:
             self._is_closed = True
             self._changed.notify()

@@ -1,4 +1,4 @@
-"""`Route`: forwards the messages of one topic in one direction and counts the outcomes."""
+"""`Route`: forwarding of one topic in one direction, with counts of the outcomes."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ from nep.text import escaped, shortened
 MAX_BACKLOG_MESSAGES = 10_000
 """Maximum number of messages buffered for the other side, with at most 64 MB in total.
 
-Beyond, the oldest are dropped and counted.
+When a limit is exceeded, the oldest messages are dropped and counted.
 """
 _MAX_BACKLOG_BYTES = 64 * 2**20
 _MAX_LATCHED_PUBLISHERS = 256
-"""Maximum number of publishers per topic whose latched message is forwarded by a separate publisher."""
+"""Maximum number of a topic's publishers whose latched messages are forwarded by separate publishers."""
 _PUBLISHER_EXPIRY_S = 10.0
-"""Absence from the graph in seconds after which a publisher counts as closed.
+"""Time in seconds without an entry in the graph after which a publisher counts as closed.
 
-A restarted master knows all publishers again in less time.
+All publishers register again at a restarted master in less time.
 """
 _MAX_PROBLEM_LENGTH = 300
 
@@ -48,9 +48,9 @@ class RouteEnd:
         network: Id of the side's network.
         backend: Back end of the side.
         topic: Name of the topic on the side.
-        msg_type: Message type; "" to detect it.
-        qos: Name of a QoS profile, or "".
-        echoes: Loop guard of the topic for networks that don't identify publishers.
+        msg_type: Message type; "" to detect the type.
+        qos: Name of a QoS profile; "" for the default.
+        loop_guard: Loop guard of the topic for networks that don't identify publishers.
     """
 
     side: SideName
@@ -61,25 +61,28 @@ class RouteEnd:
     qos: str = ""
     loop_guard: LoopGuard = field(default_factory=LoopGuard)
     guard: MotionGuard | None = field(default=None, compare=False)
-    """Guard of the robots on this side; None publishes all messages."""
+    """Motion guard of the robots on this side; None if all messages may be published."""
 
 
 @dataclass(frozen=True)
 class RouteCounts:
-    """Outcomes of a route's messages: `received` is the sum of sent, thinned, failed, dropped and waiting.
+    """Outcomes of a route's messages.
+
+    `received` is the sum of `sent`, `thinned`, `failed`, `dropped` and `waiting`.
 
     Attributes:
-        received: Messages received from the origin.
-        sent: Messages published at the end.
-        bytes: Size of the sent messages.
-        lost: Messages that did not reach the bridge, not included in `received`; None if unknown.
-        thinned: Messages replaced with a newer one because of `max_rate_hz`.
-        failed: Messages that could not be decoded, converted or published; see `problem`.
-        dropped: Messages discarded because the other side was unavailable and the buffer was full.
-        waiting: Messages in the buffer.
-        returned: Messages ignored because a bridge has, or may have, forwarded them from the destination; not
-            included in `received`.
-        problem: Reason of the last failure.
+        received: Number of messages received from the origin.
+        sent: Number of messages published at the end.
+        bytes: Total size of the sent messages.
+        lost: Number of messages that did not reach the bridge, not included in `received`; None if unknown.
+        thinned: Number of messages replaced with a newer one because of `max_rate_hz`.
+        failed: Number of messages that could not be decoded, converted or published; see `problem`.
+        dropped: Number of messages discarded because the other side was unavailable and the buffer was
+            full.
+        waiting: Number of messages in the buffer.
+        returned: Number of messages ignored because a bridge has, or may have, forwarded them from the
+            destination; not included in `received`.
+        problem: Reason for the last failure; "" if there was none.
     """
 
     received: int = 0
@@ -95,7 +98,7 @@ class RouteCounts:
 
 
 class _BufferedSink:
-    """Sink of a subscriber that passes messages on, or buffers them until it is opened."""
+    """Sink of a subscriber that buffers messages until `open` is called, and then forwards them."""
 
     def __init__(self, take: Callable[[Sequence[Message]], None], *, is_open: bool) -> None:
         self.is_open = is_open
@@ -130,13 +133,13 @@ class Route:
     `open_publishers`.
 
     Args:
-        origin: Topic from which messages come.
+        origin: Topic from which messages are received.
         end: Topic on which messages are published.
         bridge: Id of the bridge.
         own: Ids of all publishers of the bridge.
-        wake: Requests a call of `open_publishers`.
-        pacer: Timer of rate-limited messages.
-        max_rate_hz: Maximum rate; 0 for no limit.
+        wake: Called when `open_publishers` needs to be called.
+        pacer: Timer for messages that the rate limit delays.
+        max_rate_hz: Maximum number of messages per second; 0 for no limit.
         clock: Monotonic clock in seconds.
     """
 
@@ -186,7 +189,7 @@ class Route:
         self._problem = ""
 
     def counts(self) -> RouteCounts:
-        """Return the outcomes of messages so far."""
+        """Return the counts of the messages so far, by outcome."""
         lost = self._lost_count()  # outside of our lock: the back end may take its own
         with self._lock:
             return RouteCounts(
@@ -228,12 +231,12 @@ class Route:
 
     @property
     def needs_type(self) -> bool:
-        """True if messages are waiting and the type to publish them with is not decided yet."""
+        """True if messages are waiting and the message type for publishing them is not decided yet."""
         return self._form is None and not self.end.msg_type and self.needs_publisher
 
     @property
     def refusal(self) -> str:
-        """Reason why publishing is currently denied (it would move a robot without permission), or ""."""
+        """Reason why the motion guard denies publishing; "" if publishing is allowed."""
         if self.end.guard is None:
             return ""
         msg_type = self.end.msg_type if self._form is None else self._form.msg_type
@@ -244,8 +247,15 @@ class Route:
     def subscribe(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
         """Subscribe to the topic, or subscribe again if the topic turns out to have another type.
 
-        If the back end has its own types, the subscription waits until the topic has a publisher. Raises
-        `NepError`.
+        If the back end needs the actual message type, the subscription waits for a publisher of the topic.
+
+        Args:
+            node: Node of the origin's side.
+            view: Graph of the origin's side.
+            own_nodes: Ids of the bridge's nodes.
+
+        Raises:
+            NepError: The subscription failed.
         """
         known = published_type(view, self.origin.topic, own_nodes)
         if self._subscriber is None:
@@ -287,7 +297,7 @@ class Route:
         )
 
     def unsubscribe(self) -> None:
-        """Unsubscribe, and forward a message held back by the rate limit at once."""
+        """Unsubscribe, and forward the message that the rate limit delays, if any."""
         with self._lock:
             subscriber, self._limit = self._subscriber, None
         if subscriber is not None:
@@ -383,7 +393,13 @@ class Route:
     def open_publishers(self, node: Node, view: GraphView, own_nodes: Collection[str]) -> None:
         """Create the publishers for which messages are waiting, and send these messages.
 
-        Raises `NepError`.
+        Args:
+            node: Node of the end's side.
+            view: Graph of the end's side.
+            own_nodes: Ids of the bridge's nodes.
+
+        Raises:
+            NepError: A publisher can't be created.
         """
         while True:
             with self._lock:
@@ -411,7 +427,12 @@ class Route:
         return self._form
 
     def close_stale_publishers(self, origin: GraphView, now: float) -> None:
-        """Close the publishers of latched messages whose original publisher has left the graph."""
+        """Close the publishers of latched messages whose original publisher has left the graph.
+
+        Args:
+            origin: Graph of the origin's side.
+            now: Monotonic time in seconds.
+        """
         there = origin.topics.get(self.origin.topic)
         ids = {each.id for each in there.publishers} if there is not None else set()
         ended = []

@@ -29,7 +29,7 @@ _REQUEST_TIMEOUT_S = 1.0
 
 
 class SideOwner(Protocol):
-    """Interface of a bridge to its sides."""
+    """Interface through which a side uses its bridge."""
 
     own_nodes: frozenset[str]
 
@@ -44,16 +44,22 @@ class SideOwner(Protocol):
         """Return the status to publish."""
 
     def publishes_status_on(self, side: BridgeSide, view: GraphView) -> bool:
-        """Return True if the status is published, and other bridges are detected, on a side."""
+        """Return True if the bridge publishes its status, and detects other bridges, on a side."""
 
     def on_status(self, side: SideName, message: Message) -> None:
-        """Process a status received on a side; it may be the bridge's own."""
+        """Process a status received on a side, possibly the bridge's own."""
 
 
 class BridgeSide:
-    """Side of a bridge. Creates subscribers and publishers of routes once its network is available.
+    """Side of a bridge, which creates subscribers and publishers of routes once its network is available.
 
-    The constructor raises `NepError` for a back end that is not installed.
+    The constructor raises `NepError` if the back end is not installed.
+
+    Args:
+        name: Name of the side.
+        configuration: Back end and master of the side.
+        node_name: Name of the node.
+        allow_moving: Names of robots that may be moved; None for no motion guard.
     """
 
     def __init__(
@@ -103,12 +109,12 @@ class BridgeSide:
         self._wake_event.set()
 
     def begin_close(self) -> None:
-        """Create no more subscribers and publishers."""
+        """Start to close: subscribers and publishers are no longer created."""
         self._is_closing = True
         self._wake_event.set()
 
     def join(self, timeout_s: float) -> None:
-        """Wait at most `timeout_s` seconds for the thread to end."""
+        """Wait until the thread ends, for at most `timeout_s` seconds."""
         if self._thread is not None:
             self._thread.join(max(0.0, timeout_s))
 

@@ -1,4 +1,4 @@
-"""Bridge file: parses TOML into a `BridgeConfiguration`. Errors name the line and the key."""
+"""Parser of bridge files in TOML. Errors name the line and the key."""
 
 from __future__ import annotations
 
@@ -137,10 +137,10 @@ def _toml_error_message(path: str, text: str, said: str) -> str:
 
 
 class _Reader:
-    """Converter of parsed TOML that finds the line of each key for error messages.
+    """Converter of a parsed bridge file that finds the line of each key for error messages.
 
-    In its methods, `where` is the name of a table ("" for the root) and `number` the index of a `[[topics]]`
-    table.
+    In its methods, `where` is the name of a table ("" for the root) and `number` the index of a
+    `[[topics]]` table.
     """
 
     def __init__(self, path: str, text: str) -> None:

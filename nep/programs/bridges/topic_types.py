@@ -1,4 +1,4 @@
-"""Message types for subscribing and publishing at both ends of a bridge."""
+"""Selection of the message types with which a bridge subscribes and publishes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _UNKNOWN_TYPES = frozenset({"", "*"})
 
 
 class TopicFormat:
-    """Message type and codec used on the other side."""
+    """Message type and encoder with which a route publishes."""
 
     def __init__(self, msg_type: str, codec: Codec, topic: str) -> None:
         self.msg_type = msg_type
@@ -28,9 +28,9 @@ class TopicFormat:
             self.encode = JsonEncoder(topic).encode
 
     def matches(self, message: Message) -> bool:
-        """Return True if a message already has this codec.
+        """Return True if a message can be published without being encoded again.
 
-        For a back end's own codec, the type must match, too.
+        The message must have the same codec and, for a codec of one back end only, the same message type.
         """
         if message.codec != self.codec.name:
             return False
@@ -38,7 +38,13 @@ class TopicFormat:
 
 
 def published_type(view: GraphView, topic: str, own_nodes: Collection[str]) -> str:
-    """Return the type with which nodes other than the bridge publish a topic, or "" if none does."""
+    """Return the message type with which nodes other than the bridge publish a topic; "" if there are none.
+
+    Args:
+        view: Graph of the network.
+        topic: Name of the topic.
+        own_nodes: Ids of the bridge's nodes.
+    """
     known = view.topics.get(topic)
     if known is None or all(each.node_id in own_nodes for each in known.publishers):
         return ""
@@ -46,16 +52,25 @@ def published_type(view: GraphView, topic: str, own_nodes: Collection[str]) -> s
 
 
 def default_type(backend: Backend) -> str:
-    """Return the type for subscribing to an unpublished topic; "" if the back end needs the actual type."""
+    """Return the message type for subscribing to a topic that has no publisher yet.
+
+    Returns "" if the back end needs the actual type.
+    """
     return _DEFAULT_TYPE if backend.codec_for is codec_for else ""
 
 
 def type_for(message: Message, backend: Backend, known: TopicInfo | None, own_nodes: Collection[str]) -> str:
-    """Return the type for publishing messages like `message` on a topic without configured type.
+    """Return the message type for publishing messages like `message` on a topic without configured type.
 
-    The topic's existing type is used if only this back end knows that type and the message may be a map, or
-    if the topic is published with the same codec, because a topic must not have two types. Otherwise the
-    message keeps its own type.
+    A topic must not have two types, so the topic's existing type is used if only this back end knows that
+    type and the message may be a map, or if the topic is published with the same codec. Otherwise the
+    message's own type is used.
+
+    Args:
+        message: Message to forward.
+        backend: Back end of the destination.
+        known: Topic in the destination's graph; None if it doesn't exist.
+        own_nodes: Ids of the bridge's nodes.
     """
     own = _message_type(message, backend)
     if known is None or known.msg_type in _UNKNOWN_TYPES:

@@ -1,4 +1,4 @@
-"""Loop prevention for bridges: each message carries the list of networks that it has passed.
+"""Loop prevention for bridges: each message carries the list of networks through which it has passed.
 
 A bridge stores this trail in the message's extension under the key "bridge": `{"networks": [...], "bridges":
 [...]}`, with the networks in order and the ids of all bridges. For back ends without extensions, `LoopGuard`
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 TRAIL_KEY = "bridge"
 MAX_HOPS = 16
-"""Maximum number of bridges that forward a message; longer chains are loops."""
+"""Maximum number of bridges that forward a message; a longer chain counts as a loop."""
 ECHO_WINDOW_S = 5.0
 """Time in seconds within which a sent message is recognized when it returns."""
 _MAX_ID_LENGTH = 400
@@ -23,17 +23,28 @@ _MAX_ECHOES = 4096
 
 
 class Trail(NamedTuple):
-    """Networks and bridges that a message has passed."""
+    """Networks and bridges through which a message has passed, in order."""
 
     networks: tuple[str, ...] = ()
     bridges: tuple[str, ...] = ()
 
     def may_forward(self, network: str, bridge: str) -> bool:
-        """Return True if a bridge may forward the message into a network."""
+        """Return True if a bridge may forward the message into a network without causing a loop.
+
+        Args:
+            network: Id of the network.
+            bridge: Id of the bridge.
+        """
         return network not in self.networks and bridge not in self.bridges and len(self.bridges) < MAX_HOPS
 
     def with_hop(self, origin: str, network: str, bridge: str) -> Trail:
-        """Return the trail of the message after a bridge has forwarded it from `origin` into `network`."""
+        """Return the trail of the message after a bridge has forwarded it.
+
+        Args:
+            origin: Id of the network from which the message came.
+            network: Id of the network into which it was forwarded.
+            bridge: Id of the bridge.
+        """
         been = self.networks if origin in self.networks else (*self.networks, origin)
         return Trail((*been, network), (*self.bridges, bridge))
 
@@ -59,11 +70,11 @@ def _parse_ids(found: object) -> tuple[str, ...]:
 
 
 class LoopGuard:
-    """Loop guard of a topic for a network that doesn't identify publishers. Thread-safe.
+    """Detector of returning messages, for a topic of a network that doesn't identify publishers. Thread-safe.
 
-    A returning message carries no sign of its origin, so it is recognized by its bytes, once for each time it
-    was sent, within `ECHO_S`. An equal message of another publisher is mistaken for an echo only if the echo
-    itself is missing.
+    A returning message carries no sign of its origin, so it is recognized by its bytes, once for each time
+    it was sent, within `ECHO_WINDOW_S`. An equal message of another publisher is mistaken for an echo only
+    if the echo itself is missing.
     """
 
     def __init__(self) -> None:
@@ -72,14 +83,19 @@ class LoopGuard:
         self._are_needed = True
 
     def disable(self) -> None:
-        """Stop recording messages, because the network identifies publishers."""
+        """Disable the guard, because the network identifies publishers."""
         if self._are_needed:
             self._are_needed = False
             with self._lock:
                 self._sent.clear()
 
     def record_sent(self, data: bytes | memoryview, now: float) -> None:
-        """Record a message that is being sent."""
+        """Record the bytes of a message that is being sent.
+
+        Args:
+            data: Encoded payload.
+            now: Monotonic time in seconds.
+        """
         if self._are_needed:
             key = _digest(data)
             with self._lock:
@@ -89,7 +105,12 @@ class LoopGuard:
                     self._sent.popitem(last=False)
 
     def is_echo(self, data: bytes | memoryview, now: float) -> bool:
-        """Return True if a received message is one that was sent, and remove its record."""
+        """Return True if a received message is the echo of a sent one; the record is then removed.
+
+        Args:
+            data: Encoded payload.
+            now: Monotonic time in seconds.
+        """
         key = _digest(data)
         with self._lock:
             count, at = self._sent.pop(key, (0, 0.0))

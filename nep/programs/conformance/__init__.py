@@ -1,7 +1,7 @@
 """Conformance tester for client libraries of the native wire. See docs/wire-check.md.
 
-`check` starts an adapter, a small program that carries out requests with the client library, and simulates
-the master and peers of that program.
+`check` starts an adapter, a small program that executes requests with the client library, and simulates the
+master and peers of that program.
 """
 
 from nep.programs.conformance import rules as _rules  # noqa: F401 - importing them registers them

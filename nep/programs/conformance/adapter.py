@@ -1,6 +1,7 @@
-"""Adapter under test: a program that carries out requests with a client library.
+"""Adapter under test: a program that executes requests with a client library.
 
-Requests go to its standard input; replies and events come from its standard output, one JSON object per line.
+Requests are written to its standard input; replies and events are read from its standard output, one JSON
+object per line.
 """
 
 from __future__ import annotations
@@ -23,24 +24,31 @@ _MAX_LINE_BYTES = 64 * 2**20
 
 
 class AdapterError(NepError):
-    """Error for an adapter that can't be started or violates the protocol of adapters."""
+    """Error for an adapter that can't be started or violates the adapter protocol."""
 
 
 class AdapterStreams(Protocol):
-    """Output and input stream of an adapter."""
+    """Standard output (`reads`) and standard input (`writes`) of an adapter."""
 
     output: IO[bytes]
     input: IO[bytes]
 
     def wait(self, timeout_s: float) -> int | None:
-        """Return the exit code, or None if the adapter still runs after `timeout_s` seconds."""
+        """Return the exit code, or None if the adapter is still running after `timeout_s` seconds."""
 
     def stop(self) -> None:
-        """Stop the adapter, by force if necessary."""
+        """Stop the adapter, and kill it if it does not exit."""
 
 
 class AdapterProcess:
-    """Adapter process, started by a command with the master's address in NEP_MASTER."""
+    """Adapter process. The address of the master is passed in the environment variable NEP_MASTER.
+
+    The constructor raises `AdapterError` if the process can't be started.
+
+    Args:
+        command: Command line of the adapter.
+        master: Address of the master.
+    """
 
     def __init__(self, command: Sequence[str], master: str) -> None:
         try:
@@ -64,7 +72,7 @@ class AdapterProcess:
         self.input: IO[bytes] = writes
 
     def wait(self, timeout_s: float) -> int | None:
-        """Return the exit code, or None if the adapter still runs after `timeout_s` seconds."""
+        """Return the exit code, or None if the adapter is still running after `timeout_s` seconds."""
         try:
             return self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
@@ -81,7 +89,13 @@ class AdapterProcess:
 
 
 class Adapter:
-    """Client of an adapter: sends requests and collects replies and events, which a thread reads."""
+    """Client that sends requests to an adapter and collects the replies and events.
+
+    A thread reads the adapter's output.
+
+    Args:
+        lines: Streams of the adapter.
+    """
 
     def __init__(self, lines: AdapterStreams) -> None:
         self.lines = lines
@@ -101,7 +115,18 @@ class Adapter:
         self._incoming.append(None)
 
     def send_request(self, do: str, **members: object) -> int:
-        """Send a request and return its number, to be passed to `reply`."""
+        """Send a request without waiting for the reply.
+
+        Args:
+            do: Name of the request.
+            members: Further fields of the request.
+
+        Returns:
+            Number of the request, to be passed to `reply`.
+
+        Raises:
+            AdapterError: The adapter's standard input is closed.
+        """
         self._count += 1
         line = json.dumps({"id": self._count, "do": do, **members}).encode() + b"\n"
         try:
@@ -112,7 +137,7 @@ class Adapter:
         return self._count
 
     def reply(self, number: int) -> Mapping[str, Any] | None:
-        """Return the reply to a request, or None if pending.
+        """Return the reply to a request, or None if it has not arrived yet.
 
         Raises `AdapterError` if the reply is an error.
         """
@@ -127,7 +152,7 @@ class Adapter:
         return reply
 
     def pump(self) -> None:
-        """Process the lines received so far."""
+        """Process the lines received so far. Raises `AdapterError` for a line that is not a JSON object."""
         while self._incoming:
             line = self._incoming.popleft()
             if line is None:

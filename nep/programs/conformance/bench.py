@@ -1,4 +1,4 @@
-"""Test bench: one adapter with a simulated master and peers. All sockets are polled in one thread."""
+"""Test bench: one adapter with a simulated master and peers, all served by one thread."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from nep.programs.conformance.verdict import broken_rule
 from nep.protocol.requests import AddPublisher, AddSubscriber, Leave, PublisherAdded
 
 AdapterStarter = Callable[[str], AdapterStreams]
-"""Function that starts an adapter with the given address of the master."""
+"""Function that starts an adapter, given the address of the master."""
 _POLL_MS = 2
 _REPLY_TIMEOUT_S = 15.0
 
 
 class Bench:
-    """Test bench for rules.
+    """Test bench that runs the checks of rules.
 
     Args:
-        start: Starts the adapter.
-        scale: Factor for the times of the wire; the adapter must use the same.
+        start: Starts the adapter, given the address of the master.
+        scale: Factor for all times of the wire; the adapter must use the same factor.
     """
 
     def __init__(self, start: AdapterStarter, scale: float = 1.0) -> None:
@@ -72,7 +72,12 @@ class Bench:
         self.adapter.pump()
 
     def wait_until(self, is_met: Callable[[], bool], timeout_s: float) -> bool:
-        """Pump until the condition is met; return False after `timeout_s` seconds, which are not scaled."""
+        """Pump until a condition is met; return False if the time limit has passed.
+
+        Args:
+            is_met: Condition, evaluated after each pump.
+            timeout_s: Time limit in seconds, which is not scaled.
+        """
         deadline = time.monotonic() + timeout_s
         while True:
             self.pump()
@@ -91,13 +96,19 @@ class Bench:
         poller.poll(_POLL_MS)
 
     def wait(self, seconds: float) -> None:
-        """Pump for `seconds` times `scale`."""
+        """Pump for `seconds`, multiplied by the scale."""
         self.wait_until(lambda: False, seconds * self.scale)
 
     def require(self, is_met: Callable[[], bool], what: str, timeout_s: float = 5.0) -> None:
-        """Pump until the condition is met.
+        """Pump until a condition is met.
 
-        Raises `BrokenRuleError` naming `what` after the scaled timeout.
+        Args:
+            is_met: Condition, evaluated after each pump.
+            what: Name of the expected event, for the error message.
+            timeout_s: Time limit in seconds, multiplied by the scale.
+
+        Raises:
+            BrokenRuleError: The time limit has passed.
         """
         if not self.wait_until(is_met, max(timeout_s * self.scale, 2.0 if self.scale < 1 else timeout_s)):
             raise broken_rule(_("no '{what}' within {seconds:g} s").format(what=what, seconds=timeout_s))
@@ -105,11 +116,27 @@ class Bench:
     # ---- the adapter
 
     def call(self, do: str, **members: object) -> Mapping[str, Any]:
-        """Send a request to the adapter and return its reply. Raises `AdapterError`."""
+        """Send a request to the adapter and return its reply.
+
+        Args:
+            do: Name of the request.
+            members: Further fields of the request.
+
+        Raises:
+            AdapterError: The adapter reported an error, exited or did not reply.
+        """
         return self.finish(self.adapter.send_request(do, **members), do)
 
     def finish(self, number: int, do: str) -> Mapping[str, Any]:
-        """Wait for the reply to request `number` and return it. Raises `AdapterError`."""
+        """Wait for the reply to a request that `Adapter.send_request` sent, and return the reply.
+
+        Args:
+            number: Number of the request.
+            do: Name of the request, for the error message.
+
+        Raises:
+            AdapterError: The adapter reported an error, exited or did not reply.
+        """
         found: list[Mapping[str, Any]] = []
 
         def has_finished() -> bool:
@@ -133,12 +160,24 @@ class Bench:
         return f"/check/{next(self._numbers)}"
 
     def new_pub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Open a publisher in the adapter and return its number."""
+        """Open a publisher in the adapter and return its number. Raises `AdapterError`.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            members: Further fields of the request.
+        """
         reply = self.call("publisher", topic=topic, type=msg_type, **members)
         return self._add_opened("close_publisher", "pub", reply)
 
     def new_sub(self, topic: str, msg_type: str = "json", **members: object) -> int:
-        """Open a subscriber in the adapter and return its number."""
+        """Open a subscriber in the adapter and return its number. Raises `AdapterError`.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            members: Further fields of the request.
+        """
         reply = self.call("subscriber", topic=topic, type=msg_type, **members)
         return self._add_opened("close_subscriber", "sub", reply)
 
@@ -162,27 +201,41 @@ class Bench:
         self.call(do, **members)
 
     def events(self, sub: int) -> list[Mapping[str, Any]]:
-        """Return the messages received by a subscriber of the adapter."""
+        """Return the "message" events of a subscriber of the adapter, oldest first."""
         return [each for each in self.adapter.events if each.get("sub") == sub]
 
     def counts(self, sub: int) -> tuple[int, int]:
-        """Return the received and lost counts of a subscriber of the adapter."""
+        """Return the numbers of received and lost messages of a subscriber of the adapter."""
         reply = self.call("counts", sub=sub)
         return int(reply.get("received", -1)), int(reply.get("lost", -1))
 
     # ---- requests to the master
 
     def requests(self, do: str) -> list[RecordedRequest]:
-        """Return all requests with this name that the master received."""
+        """Return all requests with a given name that the master has received."""
         return [each for each in self.master.received if each.do == do]
 
     def wait_for_request(self, do: str, field: str, id: object) -> RecordedRequest:
-        """Wait for the request with this name whose `field` equals `id`, and return it."""
+        """Wait for a request of the adapter to the master, and return it. Raises `BrokenRuleError`.
+
+        Args:
+            do: Name of the request.
+            field: Field of the request's content that is compared.
+            id: Expected value of the field.
+        """
         self.require(lambda: any(each.fields.get(field) == id for each in self.requests(do)), do)
         return next(each for each in self.requests(do) if each.fields.get(field) == id)
 
     def record(self, kind: str, topic: str) -> Mapping[str, Any]:
-        """Return the newest record of the adapter's publisher or subscriber of a topic."""
+        """Return the newest record with which the adapter registered a publisher or subscriber.
+
+        Args:
+            kind: "publisher" or "subscriber".
+            topic: Topic of the record.
+
+        Raises:
+            BrokenRuleError: The master received no such record.
+        """
         for each in reversed(self.requests(f"{kind}+")):
             record = each.fields.get(kind)
             if isinstance(record, dict) and record.get("topic") == topic:
@@ -199,7 +252,12 @@ class Bench:
         raise broken_rule(_("no '{what}' was received").format(what="node"))
 
     def wait_for_renewal(self, after: int, timeout_s: float = 5.0) -> RecordedRequest:
-        """Wait for a renewal, ignoring the first `after` requests, and return it."""
+        """Wait for a renewal of the adapter's lease, and return the request. Raises `BrokenRuleError`.
+
+        Args:
+            after: Number of received requests to skip.
+            timeout_s: Time limit in seconds, multiplied by the scale.
+        """
         self.require(
             lambda: any(each.do == "renew" for each in self.master.received[after:]), "renew", timeout_s
         )
@@ -208,13 +266,13 @@ class Bench:
     # ---- peers
 
     def new_socket(self, kind: int) -> zmq.Socket[bytes]:
-        """Create a socket; the rule must close it."""
+        """Create a ZeroMQ socket of a type such as `zmq.DEALER`; the caller must close it."""
         socket: zmq.Socket[bytes] = self._context.socket(kind)
         socket.linger = 0
         return socket
 
     def fail_handshake(self, kind: str, endpoint: str) -> None:
-        """Imitate another program's socket at an endpoint until the adapter has connected and disconnected.
+        """Listen at an endpoint as another program's socket until the adapter has connected and disconnected.
 
         Args:
             kind: Type of socket that the adapter must reject, such as ``PUB``.
@@ -226,7 +284,14 @@ class Bench:
     def publisher(
         self, topic: str, msg_type: str = "json", *, echoes: bool = True, is_listed: bool = True
     ) -> ScriptedPublisher:
-        """Create a publisher of the tester, and register it at the master if `is_listed`."""
+        """Create a publisher of the tester.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            echoes: Reply to hellos with echoes.
+            is_listed: Register the publisher at the master.
+        """
         created = ScriptedPublisher(self._context, topic, msg_type, echoes=echoes)
         self.publishers.append(created)
         if is_listed:
@@ -240,7 +305,14 @@ class Bench:
     def subscriber(
         self, topic: str, msg_type: str = "json", *, level: int | None = 3, endpoint: str | None = None
     ) -> ScriptedSubscriber:
-        """Create a subscriber of the tester, connected to `endpoint` or else registered at the master."""
+        """Create a subscriber of the tester.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            level: Hello level; None to send no hello.
+            endpoint: Endpoint to connect to; None to register at the master instead.
+        """
         created = ScriptedSubscriber(self._context, topic, msg_type, level)
         self.subscribers.append(created)
         if endpoint is None:
@@ -250,7 +322,11 @@ class Bench:
         return created
 
     def subscribed_publisher(self, topic: str, msg_type: str = "json") -> tuple[ScriptedPublisher, int]:
-        """Create a publisher of the tester and a subscriber of the adapter; wait until they are connected."""
+        """Create a publisher of the tester and a subscriber of the adapter, and wait for the hello.
+
+        Returns:
+            The publisher, and the number of the subscriber.
+        """
         publisher = self.publisher(topic, msg_type)
         sub = self.new_sub(topic, msg_type)
         self.require(lambda: bool(publisher.hellos), "hello")
@@ -267,7 +343,7 @@ class Bench:
     # ---- between rules and at the end
 
     def discard_opened(self) -> None:
-        """Leave closing the adapter's publishers and subscribers to the rule."""
+        """Don't close the adapter's current publishers and subscribers in `clear`; the rule closes them."""
         self._opened.clear()
 
     def clear(self) -> None:

@@ -1,4 +1,4 @@
-"""Check of an adapter against rules. The adapter is restarted after each broken rule."""
+"""Checks of an adapter against rules. The adapter is restarted after each broken rule."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ Status = Literal["passed", "failed", "skipped"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a rule.
+    """Result of checking one rule.
 
     Attributes:
         rule: Rule that was checked.
         status: "passed", "failed" or "skipped".
-        seen: Description of the failure or reason for skipping; "" if passed.
+        observed: Description of the failure, or reason for skipping; "" if passed.
     """
 
     rule: Rule
@@ -54,9 +54,9 @@ class Outcome:
 
 
 def select_rules(ids: Iterable[str]) -> list[Rule]:
-    """Return the rules with these ids, or all rules if there are none.
+    """Return the rules with the given ids, in the order in which they are checked.
 
-    Raises `KeyError` for an unknown id.
+    Returns all rules if `ids` is empty. Raises `KeyError` for an unknown id.
     """
     wanted = list(ids)
     for each in wanted:
@@ -70,9 +70,9 @@ def check(start: AdapterStarter, rules: Iterable[Rule], scale: float = 1.0) -> I
     """Check an adapter against rules, and yield each outcome.
 
     Args:
-        start: Starts an adapter with the given address of the master.
+        start: Starts an adapter, given the address of the master.
         rules: Rules in the order in which they are checked.
-        scale: Factor for the times of the wire; the adapter must scale them equally.
+        scale: Factor for all times of the wire; the adapter must use the same factor.
 
     Raises:
         AdapterError: The adapter can't be started, or does not support `features` and `node`.

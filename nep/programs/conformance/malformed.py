@@ -19,7 +19,7 @@ def _header(codec: int = 1, flags: int = 0, size: int = 0) -> bytes:
 
 
 def malformed_parts(topic: str) -> Iterator[tuple[str, list[bytes]]]:
-    """Yield the error code and the parts of each message; the first part starts with the topic."""
+    """Yield malformed messages as (error code, parts). The first part starts with the topic."""
     first, head, extension = topic_part(topic), _header(), msgpack.packb({"a": 1})
     yield "part-count", [first]
     yield "part-count", [first, head]

@@ -1,4 +1,4 @@
-"""ZeroMQ socket of another program at an address where the client expects a different kind of socket."""
+"""Listener that imitates a ZeroMQ socket of a kind that the client doesn't expect at an address."""
 
 from __future__ import annotations
 
@@ -12,10 +12,15 @@ _GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x00NULL".ljust(23, b"\0") + bytes(32
 
 
 class OtherSocket:
-    """Listener that completes the ZMTP 3.0 handshake as a socket of the given type, such as ``PUB``.
+    """Listener that completes the ZMTP 3.0 handshake as a socket of the given type.
 
-    The client's library disconnects by itself, because the types don't match. A real socket would cause a
-    race: libzmq connects again if the other side disconnected, but never if it disconnected itself.
+    The client's library disconnects by itself, because the types don't match. A real ZeroMQ socket would
+    cause a race: libzmq reconnects if the other side has disconnected, but not if it has disconnected
+    itself.
+
+    Args:
+        endpoint: Endpoint to listen at.
+        kind: Type of the socket, such as ``PUB``.
     """
 
     def __init__(self, endpoint: str, kind: str) -> None:

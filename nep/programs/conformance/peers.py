@@ -1,4 +1,4 @@
-"""Publishers and subscribers of the tester: sockets that record and send raw parts."""
+"""Publishers and subscribers of the tester, which send and record raw message parts."""
 
 from __future__ import annotations
 
@@ -30,13 +30,19 @@ from nep.protocol.wire import (
 
 
 def new_node(name: str) -> NodeRecord:
-    """Create the record of a new node of the tester."""
+    """Return the record of a new node of the tester."""
     return NodeRecord(secrets.token_hex(8), name, "tester", None, "tester")
 
 
 @dataclass(frozen=True)
 class Filter:
-    """Subscription filter that an XPUB socket received, added or removed."""
+    """Change of a subscription filter, received by an XPUB socket.
+
+    Attributes:
+        at: Time of arrival (monotonic, s).
+        is_added: True if the filter was added, False if it was removed.
+        prefix: Bytes of the filter.
+    """
 
     at: float
     is_added: bool
@@ -45,7 +51,14 @@ class Filter:
 
 @dataclass(frozen=True)
 class Notice:
-    """Echo, bye, or (with a payload) message that was sent under a hello."""
+    """Echo, bye or message that a publisher sent with a hello as its first part.
+
+    Attributes:
+        at: Time of arrival (monotonic, s).
+        hello: First part.
+        header: Header of the notice.
+        payload: Payload of a message; None for an echo or a bye.
+    """
 
     at: float
     hello: bytes
@@ -54,7 +67,14 @@ class Notice:
 
 
 class ScriptedPublisher:
-    """XPUB socket that records all filters and sends arbitrary parts; answers hellos if `echoes`."""
+    """Publisher that records all subscription filters and sends arbitrary parts.
+
+    Args:
+        context: ZeroMQ context.
+        topic: Name of the topic.
+        msg_type: Message type.
+        echoes: Reply to hellos with echoes.
+    """
 
     def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, *, echoes: bool) -> None:
         self.topic, self.echoes = topic, echoes
@@ -101,7 +121,7 @@ class ScriptedPublisher:
         self.socket = self._new_socket()
 
     def pump(self) -> None:
-        """Process received filters; answer hellos if `echoes`."""
+        """Process received filters, and reply to hellos if echoes are enabled."""
         while not self.socket.closed and self.socket.poll(0):
             event = self.socket.recv()
             now = time.monotonic()
@@ -118,12 +138,18 @@ class ScriptedPublisher:
                 self.hellos.pop(noted.prefix, None)
 
     def send_echo(self, hello: bytes) -> None:
-        """Answer a hello with the sequence number of the last message."""
+        """Reply to a hello with an echo that carries the sequence number of the last message."""
         self.send_notice(hello)
         self.echoed_at = time.monotonic()
 
     def send_notice(self, hello: bytes, flags: int = 0, seq: int | None = None) -> None:
-        """Send a notice under a hello."""
+        """Send a header without payload to the subscriber with this hello.
+
+        Args:
+            hello: First part.
+            flags: Flags of the header.
+            seq: Sequence number; None for the number of the last message.
+        """
         self.socket.send_multipart([hello, self._header(flags, b"", seq)])
 
     def send_byes(self) -> None:
@@ -136,7 +162,8 @@ class ScriptedPublisher:
 
         Args:
             payload: Encoded payload.
-            form: "parts" for several parts, "one" for one part, "alone" for a message under each hello.
+            form: "parts" for three parts, "one" for one part, "alone" for a separate message to each
+                subscriber, with its hello as first part.
             seq: Sequence number; None for the next one.
             flags: Flags of the header.
         """
@@ -151,7 +178,7 @@ class ScriptedPublisher:
             self.socket.send_multipart([topic, header, payload])
 
     def send_batch(self, payloads: Sequence[bytes]) -> None:
-        """Send the next messages as a batch."""
+        """Send the next messages as one batch."""
         form = form_of(self.codec.number, 0) & ~BATCH_FORM_FLAG
         stamps = [time.time_ns()] * len(payloads)
         part = batch_part(topic_part(self.topic), form, self.seq + 1, self.id, stamps, payloads)
@@ -164,7 +191,14 @@ class ScriptedPublisher:
 
 
 class ScriptedSubscriber:
-    """SUB socket that records all received parts; `level` is its hello level, None for no hello."""
+    """Subscriber that records all received parts.
+
+    Args:
+        context: ZeroMQ context.
+        topic: Name of the topic.
+        msg_type: Message type.
+        level: Hello level; None to send no hello.
+    """
 
     def __init__(self, context: zmq.Context[Any], topic: str, msg_type: str, level: int | None) -> None:
         self.topic, self.level = topic, level
@@ -202,7 +236,10 @@ class ScriptedSubscriber:
 
     @property
     def notices(self) -> list[Notice]:
-        """Received echoes, byes and messages under the subscriber's hello, without malformed ones."""
+        """Received echoes, byes and messages whose first part is the subscriber's hello.
+
+        Malformed ones are omitted.
+        """
         found = []
         for at, parts in zip(self.times, self.received, strict=True):
             if parts[0] == self.hello and len(parts) >= 2 and len(parts[1]) == HEADER_BYTES:
@@ -225,12 +262,12 @@ class ScriptedSubscriber:
 
     @property
     def raw(self) -> list[list[bytes]]:
-        """Parts of all received messages that do not start with the hello."""
+        """Parts of all received messages whose first part is not the hello."""
         return [parts for parts in self.received if parts[0] != self.hello]
 
     @property
     def messages(self) -> list[Parts]:
-        """Received messages of the subscriber's topic, with batches split.
+        """Received messages of the subscriber's topic, with batches split into their messages.
 
         Raises `WireError` for malformed parts.
         """

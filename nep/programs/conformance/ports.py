@@ -1,4 +1,4 @@
-"""Ports of 127.0.0.1: binding to a port that was just released, and reserving a closed port."""
+"""Binding of ports on 127.0.0.1 that were just released, and reservation of a closed port."""
 
 from __future__ import annotations
 
@@ -16,12 +16,18 @@ _BIND_TIMEOUT_S = 5.0
 
 
 def bind_again(socket: zmq.Socket[Any], endpoint: str) -> None:
-    """Bind a socket, retrying while libzmq's thread is still closing the previous socket of the endpoint."""
+    """Bind a socket to an endpoint that was just released.
+
+    Retries for up to 5 s, because libzmq closes the previous socket in another thread.
+    """
     retry_bind(lambda: socket.bind(endpoint))
 
 
 def retry_bind(bind: Callable[[], object]) -> None:
-    """Call `bind`, retrying while libzmq's thread is still closing the previous socket of the endpoint."""
+    """Call `bind`, and retry for up to 5 s while the address is in use.
+
+    The address may still be in use because libzmq closes sockets in another thread.
+    """
     deadline = time.monotonic() + _BIND_TIMEOUT_S
     while True:
         try:
@@ -35,7 +41,7 @@ def retry_bind(bind: Callable[[], object]) -> None:
 
 @contextmanager
 def closed_port() -> Iterator[str]:
-    """Reserve a port at which connections are rejected; yields its endpoint."""
+    """Reserve a port at which connections are rejected, and yield its endpoint."""
     with sockets.socket() as held:
         held.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{held.getsockname()[1]}"

@@ -1,4 +1,7 @@
-"""Registry of the rules of the native wire: `rule` registers a check, `RULES` contains all rules."""
+"""Registry of the rules of the native wire.
+
+The decorator `rule` registers a check; `RULES` contains all rules.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +21,9 @@ class Rule:
         id: Unique id.
         requirement: English sentence; translate it with `_` for display.
         section: Anchor of a heading in docs/wire.md, or ``PAGE.md#anchor``.
-        judge: Raises `BrokenRuleError` if the adapter on the bench breaks the rule.
+        judge: Check; raises `BrokenRuleError` if the adapter on the bench breaks the rule.
         features: Features that an adapter must announce for the rule to apply.
-        is_last: True if the adapter has exited after the check.
+        is_last: True if the check makes the adapter exit, so that it must be restarted.
     """
 
     id: str
@@ -32,7 +35,7 @@ class Rule:
 
     @property
     def location(self) -> str:
-        """Page and section of the requirement in docs."""
+        """Page and anchor of the requirement, such as "wire.md#messages"."""
         section = self.section.replace(" ", "-")
         return section if ".md#" in section else f"wire.md#{section}"
 
@@ -44,7 +47,10 @@ RULES: dict[str, Rule] = {}
 def rule(
     id: str, requirement: str, section: str, *features: str, is_last: bool = False
 ) -> Callable[[RuleCheck], RuleCheck]:
-    """Register the decorated function as the check of a rule; see `Rule`."""
+    """Return a decorator that registers a function as the check of a rule.
+
+    The arguments are the attributes of `Rule`.
+    """
 
     def register(judge: RuleCheck) -> RuleCheck:
         RULES[id] = Rule(id, requirement, section, judge, features, is_last)

@@ -1,7 +1,7 @@
-"""Simulated master that records all requests and can change any reply.
+"""Simulated master that records all requests and can modify its replies.
 
-Its state is that of the real master (`nep.masters.graph.Graph`) without a clock: a lease doesn't expire until
-a rule calls `ScriptedMaster.drop`.
+Its state is a `nep.masters.graph.Graph`, like that of the real master, but without a clock: a lease doesn't
+expire until a rule calls `ScriptedMaster.drop`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from nep.protocol.requests import (
 )
 
 PEER = "peer"
-"""Route of the nodes that the tester registers."""
+"""Route of the tester's own nodes."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,12 @@ class RecordedRequest:
     """Received request.
 
     Attributes:
-        at: Time of arrival.
+        at: Time of arrival (monotonic, s).
         sender: Route of the sender.
         do: Name of the request.
-        call: Number of the call.
+        call: Number of the call; 0 if invalid.
         what: Content of the request.
-        problem: Description of a malformed request, in terms of the wire; "" if it is valid.
+        problem: Reason why the request is malformed; "" if it is valid.
     """
 
     at: float
@@ -55,15 +55,15 @@ class RecordedRequest:
 
 
 ReplyFilter = Callable[[RecordedRequest, dict[str, Any]], "dict[str, Any] | None"]
-"""Function that returns the reply to send instead of the given one, or None to send no reply."""
+"""Function that returns a modified reply to a request, or None to send no reply."""
 
 
 class ScriptedMaster:
-    """Master on a free port of 127.0.0.1. Call `pump` to process requests.
+    """Simulated master on a free port of 127.0.0.1. Call `pump` to process requests.
 
     Args:
         context: ZeroMQ context.
-        on_push: Called with each message that is pushed to a node of the tester.
+        on_push: Called with each message that is pushed to one of the tester's nodes.
     """
 
     def __init__(self, context: zmq.Context[Any], on_push: Callable[[Outgoing], None]) -> None:
@@ -83,11 +83,11 @@ class ScriptedMaster:
 
     @property
     def sockets(self) -> list[zmq.Socket[bytes]]:
-        """Open sockets to be polled."""
+        """Sockets to be polled; empty while the master is stopped."""
         return [] if self._socket is None else [self._socket]
 
     def start(self) -> None:
-        """Bind with a new epoch and an empty graph; a restart uses the same port."""
+        """Bind with a new epoch and an empty graph. A restarted master binds to the same port."""
         self.graph = Graph(secrets.randbits(62) | 1, 0.0, learn_s=0.0)
         self._socket = self._context.socket(zmq.ROUTER)
         self._socket.linger = 0
@@ -110,7 +110,7 @@ class ScriptedMaster:
             self._serve(sender.decode("utf-8", "surrogateescape"), parts)
 
     def submit(self, request: Request) -> None:
-        """Apply a request of the tester. Raises `WireError` if the graph rejects the request."""
+        """Execute a request of one of the tester's nodes. Raises `WireError` if it is rejected."""
         for each in self.graph.apply(request, 1, 0.0, PEER):
             if isinstance(each.body, Refused):
                 raise WireError(each.body.reason)
@@ -123,7 +123,13 @@ class ScriptedMaster:
             self._push(each)
 
     def repeat_pushes(self, node_id: str, record: PublisherRecord, node: NodeRecord) -> None:
-        """Push a publisher to the adapter's node two more times."""
+        """Push a publisher to the adapter's node two more times.
+
+        Args:
+            node_id: Id of the adapter's node.
+            record: Record of the publisher.
+            node: Node of the publisher.
+        """
         came = PublisherAdded(
             self.graph.epoch, self.graph.revision, RemotePublisher(record, node.id, node.name)
         )
@@ -131,7 +137,7 @@ class ScriptedMaster:
             self.push(node_id, self._encoder.encode(came))
 
     def push(self, node_id: str, body: bytes) -> None:
-        """Send a raw body to the adapter's node."""
+        """Send an encoded message to the adapter's node, even an invalid one."""
         member = self.graph.members.get(node_id)
         if member is not None and member.route != PEER:
             self._send(member.route, body)

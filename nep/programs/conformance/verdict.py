@@ -1,4 +1,4 @@
-"""Checks for rules, and the error raised if a client breaks a rule."""
+"""Helper functions for the checks of rules, and the error for a broken rule."""
 
 from __future__ import annotations
 
@@ -13,16 +13,22 @@ _MAX_VALUE_LENGTH = 200
 
 
 class BrokenRuleError(NepError):
-    """Error for a client that broke a rule; the message describes the observed behaviour."""
+    """Error for a client that breaks a rule; the message describes the observed behaviour."""
 
 
 def broken_rule(sentence: str) -> BrokenRuleError:
-    """Create the error with this message."""
+    """Return a `BrokenRuleError` with this message."""
     return BrokenRuleError(sentence)
 
 
 def expect(what: str, seen: object, wanted: object) -> None:
-    """Raise `BrokenRuleError` unless `seen` equals `wanted` in type and value; `what` names the field."""
+    """Raise `BrokenRuleError` unless two values are equal and of the same type.
+
+    Args:
+        what: Name of the value, for the error message.
+        seen: Actual value.
+        wanted: Expected value.
+    """
     if seen != wanted or type(seen) is not type(wanted):
         raise BrokenRuleError(
             _("{what} is {seen}, expected {wanted}").format(
@@ -33,7 +39,7 @@ def expect(what: str, seen: object, wanted: object) -> None:
 
 @contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Raise `BrokenRuleError` if the block takes longer than `seconds`."""
+    """Raise `BrokenRuleError` if the `with` block takes longer than `seconds`."""
     began = time.monotonic()
     yield
     took_s = time.monotonic() - began
@@ -42,6 +48,6 @@ def time_limit(seconds: float) -> Iterator[None]:
 
 
 def printable(value: object) -> str:
-    """Return the `ascii` of a value, shortened for a message."""
+    """Return the `ascii` representation of a value, shortened for an error message."""
     text = ascii(value)
     return text if len(text) <= _MAX_VALUE_LENGTH else f"{text[:_MAX_VALUE_LENGTH]}…"

@@ -1,8 +1,7 @@
 """Connection doctor: diagnoses why programs can't find each other and suggests fixes.
 
 `collect_facts` inspects processes, ports, the master's graph and this Python; `findings` derives findings
-from these facts alone. `diagnose` does both, optionally for a topic whose messages don't arrive
-(`topic_findings`).
+from these facts. `diagnose` does both, optionally for a topic whose messages don't arrive (`topic_findings`).
 """
 
 from nep.programs.doctor.collect import collect_facts, start_blocker

@@ -1,4 +1,4 @@
-"""Collection of the doctor's facts: processes, ports, files, the master's graph, this Python."""
+"""Collection of the facts that the doctor evaluates: processes, ports, files, the graph, this Python."""
 
 from __future__ import annotations
 
@@ -62,11 +62,11 @@ _GATEWAY_OFF_VALUES = {"0", "false", "no", "off"}
 def collect_facts(
     address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
 ) -> Facts:
-    """Collect all facts; takes up to two seconds if no master replies.
+    """Collect all facts. Takes up to two seconds if no master replies.
 
     Args:
         address: Address of the master (default: NEP_MASTER or the default address).
-        folders: Further folders that must be writable, each with its purpose.
+        folders: Further folders that must be writable, as (purpose, path).
         here: Folder in which programs are started (default: the current folder).
     """
     *_parts, (_known, facts) = collect_in_steps(address, folders=folders, here=here)
@@ -76,10 +76,13 @@ def collect_facts(
 def collect_in_steps(
     address: str | None = None, *, folders: Sequence[tuple[str, Path]] = (), here: Path | None = None
 ) -> Iterator[tuple[tuple[str, ...], Facts]]:
-    """Yield the facts after each step of `collect_facts`, quick steps first.
+    """Collect facts step by step, quick steps first.
 
-    Each item starts with the names of the checks in `nep.programs.doctor.diagnosis.PARTS` whose facts are
-    complete after this step.
+    The arguments are those of `collect_facts`.
+
+    Yields:
+        Names of the checks in `nep.programs.doctor.diagnosis.CHECKS` whose facts are complete, and all facts
+        so far.
     """
     chosen, package = master_address(address), Path(nep.errors.__file__).parent
     facts = Facts(time.time(), chosen, sys.platform, _versions(), str(package))

@@ -1,4 +1,4 @@
-"""Complete diagnosis, optionally for one topic."""
+"""`diagnose`: complete diagnosis, optionally for one topic."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from nep.programs.doctor.listen import collect_topic
 from nep.programs.doctor.topics import topic_findings
 
 ProgressCallback = Callable[[tuple[Finding, ...], int, int], object]
-"""Progress callback: (findings so far, worst first; number of completed checks; number of all checks)."""
+"""Progress callback.
+
+The arguments are the findings so far (worst first), the number of completed checks, and the number of
+all checks.
+"""
 
 
 def diagnose(
@@ -25,10 +29,10 @@ def diagnose(
     """Run all checks and return the findings, worst first. Takes some seconds.
 
     Args:
-        address: Address of the master.
-        topic: Topic whose messages don't arrive. Findings about the topic come first among those of the same
-            severity, and replace general findings with the same id.
-        folders: As for `collect_facts`.
+        address: Address of the master (default: NEP_MASTER or the default address).
+        topic: Topic whose messages don't arrive; "" for none. Its findings come first among the findings
+            of the same severity, and replace general findings with the same id.
+        folders: Further folders that must be writable, as (purpose, path).
         tell: Called after each step with the findings so far.
     """
     found: dict[str, tuple[Finding, ...]] = {}

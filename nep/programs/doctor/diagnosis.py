@@ -1,4 +1,4 @@
-"""Diagnosis: functions that derive findings from facts, without sockets, files or a clock."""
+"""Derivation of findings from facts. Performs no I/O and reads no clock."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _FILES_PER_TOPIC = 20
 _SEVERITY_ORDER: dict[Severity, int] = {"error": 0, "warning": 1, "info": 2, "ok": 3}
 _SEVERITY_SIGNS = {"error": "x", "warning": "!", "info": "-", "ok": "+"}
 MIN_VALID_TIME_S = 1_704_067_200.0
-"""Start of 2024. A clock with an earlier time was never set."""
+"""Start of 2024 (s since 1970). A clock with an earlier time counts as never set."""
 
 
 def findings(facts: Facts) -> tuple[Finding, ...]:
@@ -34,7 +34,7 @@ def sort_findings(found: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def exit_code(found: Sequence[Finding]) -> Literal[0, 1, 2]:
-    """Return the exit code for findings: 2 with an error, 1 with a warning, else 0."""
+    """Return the exit code of `nep doctor`: 2 if there is an error, 1 if there is a warning, else 0."""
     severities = {finding.severity for finding in found}
     return 2 if "error" in severities else 1 if "warning" in severities else 0
 
@@ -246,4 +246,4 @@ CHECKS: Mapping[str, Callable[[Facts], Iterator[Finding]]] = {
     "clock": _clock,
     "versions": _versions,
 }
-"""Checks by name. Findings of equal severity are shown in this order."""
+"""Checks by name, in the order in which findings of equal severity are shown."""

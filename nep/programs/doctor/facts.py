@@ -10,22 +10,23 @@ from nep.programs.doctor.installs import Install
 from nep.protocol.graph_view import Alert, GraphView
 
 ReachFailure = Literal["", "elsewhere", "refused", "timeout", "unknown"]
-"""Reason why an address can't be reached; "" if it can, or was not tried.
+"""Reason why an address can't be reached.
 
-"elsewhere": reachable only from its own computer. "refused": the port is closed. "timeout": no reply.
-"unknown": another error of the operating system.
+"": the address can be reached, or was not tried. "elsewhere": only programs on its own computer can
+reach the address. "refused": the port is closed. "timeout": no reply. "unknown": another error of the
+operating system.
 """
 
 
 @dataclass(frozen=True)
 class ProcessFact:
-    """Process of this computer.
+    """Process on this computer.
 
     Attributes:
-        pid: Process id.
-        name: Name of its program.
+        pid: Process id; None if unknown.
+        name: Name of the executable, with the script for an interpreter.
         is_master: True if the process runs a master.
-        since_s: Start time (s since 1970).
+        started_s: Start time (s since 1970).
     """
 
     pid: int | None
@@ -36,13 +37,13 @@ class ProcessFact:
 
 @dataclass(frozen=True)
 class PortFact:
-    """Port of this computer.
+    """TCP port of this computer.
 
     Attributes:
-        port: Number of the port.
-        purpose: What the port is used for.
+        port: Port number.
+        purpose: Description of the port's use.
         is_taken: True if a process is bound to the port.
-        holder: That process; None if the port is free or the system doesn't report the process.
+        holder: Process that is bound to the port; None if the port is free or the process is unknown.
     """
 
     port: int
@@ -53,7 +54,14 @@ class PortFact:
 
 @dataclass(frozen=True)
 class PackageFact:
-    """Installed package; `is_ours` is False for another project's package with the same name."""
+    """Installed package.
+
+    Attributes:
+        name: Name of the package.
+        version: Version of the package.
+        location: Folder of the package.
+        is_ours: False for another project's package with the same name.
+    """
 
     name: str
     version: str
@@ -63,13 +71,13 @@ class PackageFact:
 
 @dataclass(frozen=True)
 class FileFact:
-    """Limits of open files, and the number of files that the master has open.
+    """Limits on open files, and the number of files that the master has open. None means unknown or no limit.
 
     Attributes:
-        soft: Soft limit of this process; None for no limit.
-        hard: Hard limit of this process; None for no limit.
-        master_open: Number of files that the master has open.
-        master_limit: Limit of the master.
+        soft_limit: Soft limit of this process.
+        hard_limit: Hard limit of this process.
+        master_open_count: Number of files that the master has open.
+        master_limit: Maximum number of open files of the master.
     """
 
     soft_limit: int | None
@@ -80,13 +88,13 @@ class FileFact:
 
 @dataclass(frozen=True)
 class ProgramFact:
-    """Open files of a program with a node.
+    """Open files of a program that has a node.
 
     Attributes:
         pid: Process id.
         name: Name of the node.
-        opened: Number of open files.
-        limit: Limit of open files.
+        open_count: Number of open files.
+        limit: Maximum number of open files.
     """
 
     pid: int
@@ -101,7 +109,7 @@ class FolderFact:
 
     Attributes:
         path: Path of the folder.
-        purpose: What the folder is used for.
+        purpose: Description of the files that are saved in the folder.
         problem: Reason why the folder isn't writable; "" if it is.
     """
 
@@ -112,7 +120,12 @@ class FolderFact:
 
 @dataclass(frozen=True)
 class ClockFact:
-    """Computer whose clock is ahead by `ahead_s` seconds, according to the time stamps of its messages."""
+    """Computer whose clock is ahead of this computer's, according to the time stamps of its messages.
+
+    Attributes:
+        host: Name of the computer.
+        ahead_s: Difference of the clocks in seconds.
+    """
 
     host: str
     ahead_s: float
@@ -127,29 +140,29 @@ class Facts:
         address: Address of the master.
         platform: Value of `sys.platform`.
         versions: Versions of NEP Studio, Python and libraries.
-        nep_file: Folder from which the package `nep` is imported.
-        view: Graph of the master; None if no master replies.
-        answered_s: Time that the master took to reply.
-        master_port: Port of the master's address; None if the address is not of this computer.
+        nep_folder: Folder from which the package `nep` is imported.
+        view: Graph of the master; None if the master doesn't reply.
+        reply_time_s: Time in seconds that the master took to reply; None if it doesn't reply.
+        master_port: Port of the master's address; None for an address of another computer.
         ports: Fixed ports of the original NEP.
-        masters: All processes here that run a master, each with its port.
-        joins_originals: True if the gateway is enabled.
-        packages: Installed packages of this Python named nep or nep-studio.
-        strange_files: Files of the original NEP found in `nep_file`.
-        shadow: File that hides the package from programs started here.
-        files: Limits of open files.
+        masters: Processes on this computer that run a master, each with its port.
+        is_gateway_enabled: True if the gateway is enabled.
+        packages: Packages named nep or nep-studio in this Python environment.
+        original_files: Names of files of the original NEP in the folder `nep_folder`.
+        shadow: File that hides the package `nep` from programs started in this folder; "" if there is none.
+        files: Limits on open files.
         folders: Folders that must be writable.
         clocks: Computers whose clocks are ahead.
-        loopback: Reason why programs of this computer can't reach each other; "" if they can.
+        loopback_problem: Reason why programs on this computer can't reach each other; "" if they can.
         master_install: Installation of the running master; None if unknown.
-        programs: Programs of this computer that have nodes and whose open files are known.
-        is_known: False if the host name of the master's address can't be resolved.
-        answers_at: Loopback address at which a master replies, if `address` is of this computer but doesn't
-            reply; else "".
-        reach: Reason why the address of a remote master that doesn't reply can't be reached; "" if it can,
-            None if it was not tried.
-        path_package: Package `nep` of the original NEP that `python3` of the PATH imports, if that is another
-            Python.
+        programs: Programs on this computer that have nodes and whose open files are known.
+        is_host_known: False if the host name of the master's address can't be resolved.
+        replying_address: Loopback address at which a master replies, if `address` is of this computer but
+            doesn't reply; else "".
+        reach_failure: Reason why the address of a remote master that doesn't reply can't be reached; "" if
+            it can be reached, None if it was not tried.
+        path_package: Package `nep` of the original NEP that `python3` on the PATH imports; None if there is
+            none, or if `python3` is this Python.
         node_packages: Packages `nep-js` that Node.js finds from this folder; the first one is imported.
     """
 
@@ -185,14 +198,14 @@ class PublisherFact:
     """Publisher of the topic under diagnosis.
 
     Attributes:
-        node: Name of its node.
-        host: Name of its computer.
-        generation: "native" or the version of the original NEP.
+        node: Name of the publisher's node.
+        host: Name of the publisher's computer.
+        generation: "native", or the wire generation or version of the original NEP.
         sent: Number of messages sent; None if not counted (original NEP).
-        last_s: Time of the last message (s since 1970, this computer's clock); None before the first.
+        last_message_s: Time of the last message (s since 1970, this computer's clock); None before the first.
         endpoint: Address to which programs on this computer connect; "" if none is needed.
-        reach: Reason why the endpoint can't be reached.
-        remedies: Services of its node that can restart the node.
+        reach_failure: Reason why the endpoint can't be reached; "" if it can.
+        remedies: Services of the node that may restart its program.
     """
 
     node: str
@@ -213,16 +226,16 @@ class TopicFacts:
         topic: Name of the topic.
         now_s: Current time (s since 1970).
         address: Address of the master.
-        is_shared: True if the master accepts other computers.
+        is_shared: True if other computers can connect to the master.
         publishers: Publishers of the topic.
-        others: Rates of other published topics in Hz (None: unknown).
+        other_topics: Rates in Hz of all published topics, by topic; None if unknown.
         services: Names of all services.
         alerts: Alerts of the master about this topic.
-        listened_s: How long the doctor was subscribed to the topic.
+        listen_duration_s: Time in seconds for which the doctor was subscribed to the topic.
         received: Number of messages received in that time.
-        refused: Number of messages rejected because of an unknown wire version.
-        unreadable: Reason why the newest message can't be decoded; "" if it can.
-        bad_name: Reason why the topic's name is invalid; "" if it is valid.
+        rejected: Number of messages rejected because of an unknown wire version.
+        decode_problem: Reason why the newest message can't be decoded; "" if it can.
+        name_problem: Reason why the topic's name is invalid; "" if it is valid.
     """
 
     topic: str

@@ -1,4 +1,4 @@
-"""`Finding`: result of a check by the doctor."""
+"""`Finding`: result of one of the doctor's checks."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Finding:
         id: Subject and name of the finding, such as "master:none" or "ports:taken".
         severity: "error", "warning", "info" or "ok".
         sentence: Description of the result.
-        mend: Next step for the user; "" if there is none.
-        command: Command for the next step that can be run in a terminal, or "".
-        instead: Suggested name of a similar topic, or of a service to call, or "".
+        fix: Next step for the user; "" if there is none.
+        command: Terminal command for the next step, or "".
+        instead: Name of a similar topic to use, or of a service to call, or "".
     """
 
     id: str
@@ -32,7 +32,7 @@ class Finding:
 
     @property
     def as_error(self) -> str:
-        """Finding formatted as an error: lower case at the start, no full stop, semicolon before the hint."""
+        """Finding in the form of an error message: lower case, hint after a semicolon, no full stop."""
         first = self.sentence.rstrip(".")
         step = self.fix.rstrip(".")
         words = f"{first}; {step[:1].lower()}{step[1:]}" if step else first
@@ -40,7 +40,7 @@ class Finding:
 
 
 def duration_text(seconds: float) -> str:
-    """Format a duration in the largest suitable unit, from seconds to days."""
+    """Format a duration in the largest suitable unit, such as "45 s" or "3 days"."""
     if seconds < 90:
         return f"{max(0, round(seconds))} s"
     if seconds < 5400:
@@ -52,5 +52,5 @@ def duration_text(seconds: float) -> str:
 
 
 def with_process(words: str, pid: int | None) -> str:
-    """Append the process id to a description of a program, if known."""
+    """Append a process id to the name of a program; return the name alone if the id is None."""
     return words if pid is None else _("{program} (process {pid})").format(program=words, pid=pid)

@@ -1,6 +1,7 @@
 """Detection of the installation of NEP Studio from which a process was started.
 
-The wire doesn't carry the master's version; for a local master its Python environment does.
+The wire doesn't carry the master's version, so the version of a local master is read from its Python
+environment.
 """
 
 from __future__ import annotations
@@ -25,7 +26,13 @@ _SITE_PACKAGES = ("lib/python*/site-packages", "Lib/site-packages")
 
 @dataclass(frozen=True)
 class Install:
-    """Version of NEP Studio in a Python environment, with the time of installation (s since 1970)."""
+    """Installation of NEP Studio in a Python environment.
+
+    Attributes:
+        version: Version of NEP Studio.
+        since_s: Time of the installation (s since 1970).
+        place: Folder of the environment.
+    """
 
     version: str
     installed_s: float
@@ -44,15 +51,16 @@ def install_of(pid: int) -> Install | None:
 
 
 def environment_of(command: Sequence[str], executable: str, folder: str, active: str = "") -> Path | None:
-    """Return the Python environment of a program, or None for a frozen program.
+    """Return the folder of a program's Python environment, or None for a frozen program.
 
-    The interpreter of an environment is a link to another file, which the system reports as the executable.
+    The interpreter of a virtual environment is a link, whose target the operating system reports as the
+    executable. Therefore the command line has priority.
 
     Args:
         command: Command line of the program.
-        executable: Executable that the system reports.
+        executable: Executable that the operating system reports.
         folder: Folder in which the program was started.
-        active: Environment that was activated, or "".
+        active: Activated virtual environment (VIRTUAL_ENV), or "".
     """
     called = command[0] if command else ""
     if not Path(called).stem.lower().startswith("python"):
@@ -65,7 +73,7 @@ def environment_of(command: Sequence[str], executable: str, folder: str, active:
 
 
 def install_in(environment: Path) -> Install | None:
-    """Return the installation of NEP Studio in an environment; None if there is none, or more than one."""
+    """Return the installation of NEP Studio in an environment; None if there is not exactly one."""
     found = [info for place in _SITE_PACKAGES for info in environment.glob(f"{place}/nep_studio-*.dist-info")]
     if len(found) != 1:
         return None

@@ -1,4 +1,4 @@
-"""Collection of facts about one topic: its publishers, their reachability, and received messages."""
+"""Collection of facts about one topic by subscribing to it and connecting to its publishers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _GRAPH_TIMEOUT_S = 1.0
 _LISTEN_DURATION_S = 1.5
 _CONNECT_TIMEOUT_S = 0.7
 _MAX_ENDPOINTS_TRIED = 4
-"""Maximum number of publisher addresses tried; an address without reply takes `_CONNECT_TIMEOUT_S`."""
+"""Maximum number of publisher addresses tried, each of which may take `_CONNECT_TIMEOUT_S`."""
 _REMEDIES = ("restart", "reset", "start")
 """Name prefixes of services that may restart a program."""
 
@@ -42,7 +42,7 @@ def collect_topic(topic: str, address: str | None = None) -> TopicFacts | None:
 
 
 def probe_endpoint(endpoint: str) -> ReachFailure:
-    """Try to connect to an endpoint; return the reason of the failure, or "" if it can be reached."""
+    """Try to connect to an endpoint; return the reason why it can't be reached, or "" if it can."""
     place, colon, port = endpoint.removeprefix("tcp://").rpartition(":")
     if not endpoint.startswith("tcp://") or not colon:
         return ""

@@ -1,6 +1,6 @@
 """Detection of packages named `nep` and `nep-js`, of NEP Studio or of the original NEP.
 
-On the public registries these names belong to the original NEP. The search imports and runs no package.
+On the public registries these names belong to the original NEP. The packages found are not imported.
 """
 
 from __future__ import annotations
@@ -24,7 +24,12 @@ _FIRST_NATIVE_VERSION = (0, 6)
 
 
 def node_packages(here: Path, environ: Mapping[str, str] = os.environ) -> tuple[PackageFact, ...]:
-    """Return all packages `nep-js` on Node.js's search path of a folder; the first one is imported."""
+    """Return all packages `nep-js` on Node.js's search path; the first one is imported.
+
+    Args:
+        here: Folder of the JavaScript program.
+        environ: Environment variables.
+    """
     folder = here.absolute()
     modules = [each / "node_modules" for each in (folder, *folder.parents) if each.name != "node_modules"]
     more = [Path(each) for each in environ.get("NODE_PATH", "").split(os.pathsep) if each]
@@ -46,10 +51,14 @@ def _node_package(folder: Path) -> PackageFact | None:
 def path_python_package(
     path: str | None = None, own: Path = Path(sys.prefix), home: Path | None = None
 ) -> PackageFact | None:
-    """Return the package `nep` of the original NEP that `python3` of the PATH imports, or None.
+    """Return the original package `nep` that `python3` on the PATH imports, or None.
 
-    Also returns None if `python3` belongs to `own`, the environment of this program, which is checked
-    separately.
+    The environment of this program is not searched, because it is checked separately.
+
+    Args:
+        path: Search path (default: PATH).
+        own: Environment of this program.
+        home: Home folder with the user's packages (default: the user's).
     """
     python = shutil.which("python3", path=path) or shutil.which("python", path=path)
     if python is None:

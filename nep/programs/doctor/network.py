@@ -1,4 +1,4 @@
-"""Checks about masters, their ports, and the programs in the network."""
+"""Checks of masters, their ports, and the programs in the network."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NATIVE_GENERATIONS = {"native", "gateway"}
 
 
 def loopback(facts: Facts) -> Iterator[Finding]:
-    """Check that programs of this computer can reach each other."""
+    """Check that programs on this computer can reach each other."""
     if facts.loopback_problem:
         yield Finding(
             "loopback",
@@ -241,7 +241,7 @@ def _multiple_masters(facts: Facts) -> Iterator[Finding]:
 
 
 def originals(facts: Facts) -> Iterator[Finding]:
-    """Report programs of the original NEP, including those that the gateway can't serve."""
+    """Report programs of the original NEP, including versions that the gateway can't serve."""
     if facts.view is None:
         return
     nodes = [node for node in facts.view.nodes.values() if node.generation not in _NATIVE_GENERATIONS]
@@ -260,7 +260,7 @@ def originals(facts: Facts) -> Iterator[Finding]:
 
 
 def master_alerts(facts: Facts) -> Iterator[Finding]:
-    """Report the alerts of the master, except those about ports, which `ports` checks."""
+    """Report the alerts of the master. Alerts about ports are omitted, because `ports` checks them."""
     if facts.view is None:
         return
     for alert in facts.view.alerts:
@@ -270,7 +270,7 @@ def master_alerts(facts: Facts) -> Iterator[Finding]:
 
 
 def clocks(facts: Facts) -> Iterator[Finding]:
-    """Report computers whose clocks are ahead of this one's."""
+    """Report computers whose clocks are ahead of this computer's clock."""
     for clock in facts.clocks:
         yield Finding(
             f"clock:{clock.host}",
@@ -301,7 +301,13 @@ def _other_port(number: str) -> int:
 
 
 def unsupported_finding(finding_id: str, program: str, generation: str) -> Finding:
-    """Create the finding for a program with an incompatible version of the original NEP."""
+    """Return the finding for a program with an incompatible version of the original NEP.
+
+    Args:
+        finding_id: Id of the finding.
+        program: Name of the program's node.
+        generation: Version of the original NEP.
+    """
     return Finding(
         finding_id,
         "error",

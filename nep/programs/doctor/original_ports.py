@@ -1,4 +1,4 @@
-"""Checks about the fixed ports of the original NEP, summarized in few findings."""
+"""Checks of the fixed ports of the original NEP."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _AIRPLAY_PROCESSES = ("ControlCe", "AirPlay", "rapportd")
 
 
 def ports(facts: Facts) -> Iterator[Finding]:
-    """Report the programs that hold the ports to which programs of the original NEP connect."""
+    """Report the use of the ports to which programs of the original NEP connect."""
     if not facts.is_gateway_enabled:
         yield Finding(
             "ports",

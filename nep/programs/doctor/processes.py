@@ -1,4 +1,4 @@
-"""Processes that hold ports of this computer, and processes that run a master."""
+"""Information about processes that are bound to ports of this computer or run a master."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _LOOPBACK_ADDRESSES = frozenset({"127.0.0.1", "0.0.0.0", "::", "::ffff:127.0.0.1
 _CODE_OPTIONS = frozenset({"-c", "-e", "--eval", "-p", "--print"})
 """Options of Python and Node.js that are followed by source code instead of a file name."""
 _MAX_PORT_DISTANCE = 20
-"""Maximum distance of a master's port from the usual port, if the process listens at several ports."""
+"""Maximum difference between a master's port and the usual port, if the process listens at several ports."""
 
 
 def listening_ports() -> dict[int, int | None]:
-    """Return the listening TCP ports with their process ids; None if the system doesn't report one."""
+    """Return the process ids by listening TCP port; None where the system doesn't report the process."""
     try:
         connections: Iterable[object] = psutil.net_connections(kind="tcp")
     except psutil.AccessDenied:  # macOS: all connections for root only, own ones for everyone
@@ -35,9 +35,12 @@ def listening_ports() -> dict[int, int | None]:
 
 
 def port_holders(connections: Iterable[object]) -> dict[int, int | None]:
-    """Return the process id for each listening port; None if the system doesn't report the process.
+    """Return the process ids by listening port; None where the system doesn't report the process.
 
-    If several programs listen at one port with different addresses, the one reached at 127.0.0.1 is returned.
+    If several processes listen at one port with different addresses, the process at 127.0.0.1 is returned.
+
+    Args:
+        connections: Entries of `psutil.net_connections()`.
     """
     at_loopback: dict[int, int | None] = {}
     elsewhere: dict[int, int | None] = {}
@@ -62,7 +65,7 @@ def _own_connections() -> Iterable[object]:
 
 
 class _OwnedConnection:
-    """Connection with the id of its process, like the entries of the system-wide list."""
+    """Connection of one process with its `pid`, like the entries of `psutil.net_connections()`."""
 
     def __init__(self, connection: object, pid: int) -> None:
         self.status = getattr(connection, "status", "")
@@ -71,7 +74,7 @@ class _OwnedConnection:
 
 
 def is_free(port: int) -> bool:
-    """Return True if a port can be bound now; the port is bound for a moment."""
+    """Return True if a port of 127.0.0.1 can be bound, by binding it for a moment."""
     with socket.socket() as probe:
         if sys.platform != "win32":  # without it, connections in TIME_WAIT block the port for a while
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -83,7 +86,12 @@ def is_free(port: int) -> bool:
 
 
 def process_fact(pid: int | None, master_pid: int | None = None) -> ProcessFact | None:
-    """Return the facts about a process, or None if the process is unknown or has exited."""
+    """Return the facts about a process, or None if the process is unknown or has exited.
+
+    Args:
+        pid: Process id, or None.
+        master_pid: Id of the process that is known to run a master, or None.
+    """
     if pid is None:
         return None
     try:
@@ -99,7 +107,12 @@ def process_fact(pid: int | None, master_pid: int | None = None) -> ProcessFact 
 def master_processes(
     ports: Mapping[int, int | None], usual: int
 ) -> tuple[tuple[ProcessFact, int | None], ...]:
-    """Return the processes that run a master, each with its port; the usual port comes first."""
+    """Return the processes that run a master, each with its port (None if ambiguous).
+
+    Args:
+        ports: Process ids by listening port.
+        usual: Usual port of a master; the process at this port comes first.
+    """
     held: dict[int, list[int]] = {}
     for port, pid in ports.items():
         if pid is not None:
@@ -126,7 +139,7 @@ def is_master_command(command: Sequence[str]) -> bool:
 
 
 def open_files(pid: int) -> tuple[int | None, int | None]:
-    """Return the number of open files of a process and its limit; None where unknown."""
+    """Return the number of a process's open files, and its limit; None where unknown."""
     try:
         process = psutil.Process(pid)
         opened = process.num_fds() if hasattr(process, "num_fds") else None

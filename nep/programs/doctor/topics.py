@@ -1,4 +1,4 @@
-"""Diagnosis of one topic: functions that derive findings from facts, without sockets or a clock."""
+"""Derivation of the findings about one topic. Performs no I/O and reads no clock."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nep.programs.doctor.network import UNSUPPORTED_VERSIONS, unsupported_findin
 from nep.system.addresses import is_loopback
 
 MIN_SILENCE_S = 2.0
-"""Time without messages in seconds after which a publisher with a low rate counts as silent."""
+"""Time in seconds without messages after which a publisher counts as silent."""
 _MAX_NAMES = 5
 
 
@@ -38,10 +38,14 @@ def topic_findings(facts: TopicFacts) -> tuple[Finding, ...]:
 
 
 def closest_topic(topic: str, names: Iterable[str]) -> str | None:
-    """Return the published topic that `topic` most likely means, or None.
+    """Return the published topic that is most similar to `topic`, or None.
 
-    The criteria are, in this order: the same name apart from slashes and case, a unique name with the same
-    last level, similar spelling.
+    The criteria are, in this order: the same name apart from outer slashes and case, a unique name with the
+    same last level, similar spelling.
+
+    Args:
+        topic: Name to look for.
+        names: Names of the published topics.
     """
     names = [name for name in names if name != topic]
     wanted = _normalized(topic)

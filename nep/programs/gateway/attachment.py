@@ -1,4 +1,4 @@
-"""Gateway as an attachment of a master, and its access to the native network.
+"""Gateway as an attachment of a master, and its connection to the native network.
 
 `NativeNetwork` owns a native node, registers original programs in the graph and reports their alerts.
 """
@@ -39,20 +39,20 @@ else:
     psutil = lazy_module("psutil")
 
 _JOIN_TIMEOUT_S = 3.0
-"""Time limit for joining in seconds. A master that has just started delays new nodes by a second."""
+"""Time limit in seconds for joining a master, which delays new nodes by a second after its start."""
 
 _RETRY_S = 1.0
-"""Pause in seconds before a failed topic is retried; each attempt blocks the gateway's thread."""
+"""Time in seconds before a failed topic is retried. Each attempt blocks the gateway's thread."""
 _MAX_ALERTS = 200
 _SocketT = TypeVar("_SocketT", Publisher, Subscriber)
 
 
 class GatewayAttachment:
-    """Attachment that lets programs of the original NEP join its master (`Attachment`).
+    """Attachment of a master that lets programs of the original NEP join (`Attachment`).
 
     Args:
-        file: File that stores the ports of programs; by default in the system's folder for state files.
-        ports: Fixed ports of the gateway.
+        file: File that stores the ports of programs (default: `default_file`).
+        ports: Fixed ports of the gateway (default: `Ports()`).
     """
 
     def __init__(self, file: Path | None = None, ports: Ports | None = None) -> None:
@@ -61,7 +61,7 @@ class GatewayAttachment:
         self._gateway: Gateway | None = None
 
     def start(self, master: Master) -> None:
-        """Start the gateway. A port in use is reported as an alert, not raised."""
+        """Start the gateway. A port that is in use is reported as an alert, not raised."""
         raise_open_file_limit()
         address = master.address
 
@@ -83,7 +83,7 @@ class GatewayAttachment:
         self._gateway.start()
 
     def changed(self, view: GraphView) -> None:
-        """Do nothing: the gateway polls its own sockets."""
+        """Ignore a new graph, because the gateway polls its own sockets."""
 
     def close(self) -> None:
         """Stop the gateway and release its ports."""
@@ -93,12 +93,12 @@ class GatewayAttachment:
 
 
 class NativeNetwork:
-    """Native network of the gateway (see `GatewayNetwork`).
+    """Connection of the gateway to the native network (see `GatewayNetwork`).
 
     Args:
-        make_node: Creates the node. Called when the first topic is forwarded, so that a master without
-            original programs has no gateway node.
-        listing: Registers original programs in the graph.
+        make_node: Creates the node when the first topic is forwarded, so that a master without original
+            programs has no gateway node.
+        listing: Registrar of original programs in the graph.
         report: Publishes the current alerts.
     """
 
@@ -123,11 +123,17 @@ class NativeNetwork:
     # ---- messages
 
     def start(self, inbox: NativeInbox) -> None:
-        """Start posting native messages to `inbox`."""
+        """Set the inbox to which native messages are posted."""
         self._inbox = inbox
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
-        """Publish the data of an original program, creating the publisher if needed."""
+        """Publish data of an original program. The first call opens the publisher.
+
+        Args:
+            topic: Name of the topic.
+            codec: Native codec of the data.
+            data: Encoded payload.
+        """
         self._registrar.count((topic, codec), len(data))
         publisher = self._publishers.get((topic, codec))
         if publisher is None:
@@ -145,7 +151,7 @@ class NativeNetwork:
             publisher.close()
 
     def subscribe(self, topic: str, codec: str) -> bool:
-        """Subscribe to a topic; return False if that failed."""
+        """Subscribe to a topic; return False if the subscription failed."""
         subscriber = self._open(
             topic, lambda node: node.new_sub(topic, codec, sink=self._on_messages, wildcards=False)
         )
@@ -161,7 +167,10 @@ class NativeNetwork:
             subscriber.close()
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """Return the bytes that original programs can decode (for images JPEG or PNG), or None."""
+        """Return the data of a message in a form that original programs can decode, or None.
+
+        Images are encoded as JPEG or PNG.
+        """
         if message.codec != "image":
             return message.data
         try:
@@ -220,7 +229,7 @@ class NativeNetwork:
     # ---- graph and alerts
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """Register these original programs in the graph, and remove all others."""
+        """Register these original programs in the graph, and unregister all others."""
         self._registrar.show(programs)
 
     def tick(self) -> None:
@@ -241,14 +250,20 @@ class NativeNetwork:
             self.resolve("gateway:full")
 
     def report(self, id: str, sentence: str, hint: str = "") -> None:
-        """Report a problem as an alert; repeated reports have no effect."""
+        """Report a problem as an alert. Repeated reports of the same problem have no effect.
+
+        Args:
+            id: Id of the alert, for `resolve`.
+            sentence: Description of the problem.
+            hint: Next step for the user, or "".
+        """
         alert = Alert(escaped(id), escaped(sentence), escaped(hint))
         if self._alerts.get(id) != alert and (id in self._alerts or len(self._alerts) < _MAX_ALERTS):
             self._alerts[id] = alert
             self._report(tuple(self._alerts.values()))
 
     def resolve(self, id: str) -> None:
-        """Remove an alert."""
+        """Remove the alert with this id, if there is one."""
         if self._alerts.pop(id, None) is not None:
             self._report(tuple(self._alerts.values()))
 

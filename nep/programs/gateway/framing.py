@@ -1,8 +1,8 @@
 """Frame formats of the original NEP, and their conversion to native codecs. Performs no input or output.
 
 Depending on the version and the type of the topic, a frame is *prefixed* (`topic {"a":1}`) or *bare*
-(`{"a":1}`). The remaining bytes are those of a native codec, except for images, which are base64 of a JPEG.
-Conversion therefore only removes or adds the prefix; nothing is decoded.
+(`{"a":1}`). The remaining bytes are data of a native codec, except for images, which are a JPEG in base64.
+Conversion removes or adds the prefix; only images and JSON with NaN or infinity are encoded again.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from nep.i18n import _
 Framing = Literal["prefixed", "bare"]
 
 PORT_A = 7000
-"""Request port of programs up to 0.5.4.5, nep-js and C#."""
+"""Port to which programs up to 0.5.4.5, nep-js and C# send requests."""
 PORT_B = 50000
-"""Request port of programs since 0.5.4.6."""
+"""Port to which programs since 0.5.4.6 send requests."""
 
 _CODECS = {
     "json": "json",
@@ -39,17 +39,27 @@ _JSON_TOKEN = re.compile(rb'"(?:[^"\\]|\\.)*"|\s+', re.DOTALL)
 
 
 def codec_of(msg_type: str) -> str:
-    """Return the native codec for an original `msg_type`; unknown types use JSON."""
+    """Return the native codec for a message type of the original NEP; "json" for unknown types."""
     return _CODECS.get(msg_type, "json")
 
 
 def framing_of(port: int, msg_type: str) -> Framing:
-    """Return the framing of a program that sends its request to `port`, for a topic of `msg_type`."""
+    """Return the framing that a program uses.
+
+    Args:
+        port: Port to which the program sent its request.
+        msg_type: Message type of the topic.
+    """
     return "prefixed" if has_prefix("A" if port == PORT_A else "B", msg_type) else "bare"
 
 
 class FrameError(ValueError):
-    """Error for an invalid frame; `version` is the release of NEP that writes such frames, if known."""
+    """Error for an invalid frame.
+
+    Args:
+        sentence: Description of the problem.
+        version: Release of the original NEP that writes such frames, if known.
+    """
 
     def __init__(self, sentence: str, version: str | None = None) -> None:
         super().__init__(sentence)
@@ -58,7 +68,13 @@ class FrameError(ValueError):
 
 @dataclass(frozen=True)
 class Shape:
-    """Frame format of one topic for one kind of original program."""
+    """Frame format of a topic.
+
+    Attributes:
+        topic: Name of the topic.
+        framing: "prefixed" or "bare".
+        codec: Native codec of the payload.
+    """
 
     topic: str
     framing: Framing
@@ -66,11 +82,11 @@ class Shape:
 
     @property
     def prefix(self) -> bytes:
-        """Prefix of each frame: the topic and a space, or nothing."""
+        """Prefix of each frame: the topic and a space, or b"" for bare frames."""
         return f"{self.topic} ".encode() if self.framing == "prefixed" else b""
 
     def read(self, frame: bytes) -> bytes:
-        """Convert a frame to bytes of the native codec. Raises `FrameError`."""
+        """Convert a frame to data of the native codec. Raises `FrameError`."""
         data = self._strip_prefix(frame)
         if self.codec == "image":
             return _decode_base64(data)
@@ -79,18 +95,18 @@ class Shape:
         return data
 
     def write(self, data: bytes | memoryview) -> bytes:
-        """Convert bytes of the native codec to a frame."""
+        """Convert data of the native codec to a frame."""
         body = base64.b64encode(data) if self.codec == "image" else data
         return b"".join((self.prefix, body))
 
     def matches_filter(self, subscription: bytes) -> bool:
-        """Return True if a subscriber with this ZeroMQ filter receives frames of this format."""
+        """Return True if a subscriber with this ZeroMQ filter can read frames of this format."""
         if self.framing == "prefixed":
             return self.prefix.startswith(subscription) or subscription.startswith(self.prefix)
         return not self.is_from_0546(subscription)
 
     def is_from_0546(self, subscription: bytes) -> bool:
-        """Return True if a ZeroMQ filter belongs to nep 0.5.4.6.
+        """Return True if a ZeroMQ filter was set by nep 0.5.4.6.
 
         That version filters by topic although its frames are bare.
         """
@@ -123,12 +139,17 @@ class Shape:
 
 
 def has_replaced_nan(frame: bytes, data: bytes) -> bool:
-    """Return True if NaN or infinity in `frame` became `null` in `data`."""
+    """Return True if NaN or infinity was replaced with `null` when a frame was converted.
+
+    Args:
+        frame: Frame of the original NEP.
+        data: Converted data.
+    """
     return _NON_FINITE.search(frame) is not None and data.count(b"null") > frame.count(b"null")
 
 
 def shield_javascript(data: bytes, topic: str) -> bytes:
-    r"""Escape occurrences of the topic in JSON.
+    r"""Escape occurrences of the topic's name in JSON, for subscribers with nep-js.
 
     nep-js splits a frame at every occurrence of the topic and parses the second piece, so a payload that
     contains its own topic would crash the program. The topic's first character is written as ``\uXXXX``,
@@ -155,9 +176,9 @@ def shield_javascript(data: bytes, topic: str) -> bytes:
 
 
 def shield_csharp(data: bytes) -> bytes:
-    """Remove or escape white space in JSON.
+    """Remove or escape white space in JSON, for subscribers with the C# client.
 
-    The C# client splits a frame at spaces and keeps only the second piece.
+    The C# client splits a frame at spaces and drops everything after the second piece.
     """
     if not any(space in data for space in (b" ", b"\n", b"\t", b"\r")):
         return data

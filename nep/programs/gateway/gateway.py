@@ -1,4 +1,4 @@
-"""Thread of the gateway: replies to original programs, relays messages and updates the graph."""
+"""`Gateway`: thread that replies to original programs, relays messages and updates the graph."""
 
 from __future__ import annotations
 
@@ -24,45 +24,48 @@ from nep.system.descriptors import RESERVED_DESCRIPTORS, has_free_descriptors
 from nep.system.forks import close_in_child, watch
 
 _MAINTENANCE_S = 1.0
-"""Interval in seconds at which programs that exited are removed and ports in use are retried."""
+"""Interval in seconds at which exited programs are removed and ports that were in use are retried."""
 _MAX_SOCKETS = 8192
 _FILES_PER_PAIR = 20
 _ERROR_PAUSE_S = 0.2
 _MAX_REGISTRATIONS = 2000
-"""Maximum number of registrations; each request rewrites the file with all registrations."""
+"""Maximum number of registrations, because each request rewrites the file that contains them."""
 _logger = logging.getLogger("nep.programs.gateway")
 
 
 class GatewayNetwork(NativeSide, AlertSink, Protocol):
-    """Interface of the gateway to the native network, called in the gateway's thread."""
+    """Interface to the native network, called in the gateway's thread."""
 
     def start(self, inbox: NativeInbox) -> None:
         """Join the native network, and start posting native messages to `inbox`."""
 
     def data_of(self, message: Message) -> bytes | memoryview | None:
-        """Return the bytes that original programs can decode (for images JPEG or PNG), or None."""
+        """Return the data of a message in a form that original programs can decode, or None.
+
+        Images are encoded as JPEG or PNG.
+        """
 
     def tick(self) -> None:
-        """Process periodic work. Called once a second."""
+        """Perform periodic work. Called once a second."""
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """Register the original programs in the graph."""
+        """Register these original programs in the graph, and unregister all others."""
 
     def close(self) -> None:
         """Leave the native network."""
 
 
 class Gateway:
-    """Gateway between programs of the original NEP and the native network `outside`.
+    """Gateway between programs of the original NEP and the native network.
 
     Runs in one thread and binds to the loopback address only.
 
     Args:
         outside: Native network.
-        processes: Processes of this computer.
-        file: File that stores the ports of programs, so that the programs keep working after a restart of the
-            gateway.
-        ports: Fixed ports of the gateway.
+        processes: Information about the processes of this computer.
+        file: File that stores the ports of programs, so that the programs stay connected after a restart of
+            the gateway; None to store nothing.
+        ports: Fixed ports of the gateway (default: `Ports()`).
         boot: Boot time of this computer (s since 1970).
     """
 
@@ -95,19 +98,19 @@ class Gateway:
         watch(self)
 
     def forked(self) -> None:
-        """Release inherited ports in a forked child process. See `nep.system.forks`."""
+        """Release the inherited ports in a forked child process. See `nep.system.forks`."""
         for port in self._request_server.ports:
             close_in_child(f"tcp://{LOOPBACK}:{port}")
         for pair in tuple(self._relay.pairs):
             close_in_child(*(f"tcp://{LOOPBACK}:{end.port}" for end in pair.ends))
 
     def start(self, timeout_s: float = 5.0) -> bool:
-        """Start the thread; return True if requests are served within `timeout_s` seconds."""
+        """Start the thread; return False if it does not serve requests within `timeout_s` seconds."""
         self._thread.start()
         return self._ready.wait(timeout_s)
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Stop the thread and release all ports."""
+        """Stop the thread and release all ports, waiting at most `timeout_s` seconds."""
         self._ending.set()
         self._inbox.wake()
         if self._thread.ident is not None:

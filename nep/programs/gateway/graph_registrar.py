@@ -1,4 +1,7 @@
-"""Registration of original programs in the master's graph, with rates, as nodes of generation A or B."""
+"""`GraphRegistrar`: registers original programs in the master's graph, with message counts.
+
+The nodes have the generation "A" or "B".
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,7 @@ _MAX_NAME_LENGTH = 100
 
 @dataclass
 class _TopicCount:
-    """Number and size of the messages that original programs have published on one topic."""
+    """Number and total size of the messages that original programs have published on a topic."""
 
     messages: int = 0
     bytes: int = 0
@@ -50,15 +53,15 @@ class _TopicCount:
 
 
 class GraphRegistrar:
-    """Registrar of original programs.
+    """Registrar of original programs in the master's graph.
 
-    If several original programs publish on a topic, the publisher of a message is unknown; then the first
-    program is assigned the topic's statistics.
+    If several original programs publish on a topic, the publisher of a message is unknown; then the
+    statistics of the topic are reported for the first of these programs.
 
     Args:
         submit: Executes a request in the master.
         epoch: Epoch of the master.
-        load_of: Returns the meter of a process's CPU load.
+        load_of: Returns the CPU load meter of the process with an id.
     """
 
     def __init__(
@@ -77,14 +80,19 @@ class GraphRegistrar:
         self._stat_keys: dict[int, Key] = {}
 
     def count(self, key: Key, size_bytes: int) -> None:
-        """Count a message that an original program has published."""
+        """Count a message of an original program.
+
+        Args:
+            key: Topic and codec.
+            size_bytes: Size of the message.
+        """
         counted = self._counts.setdefault(key, _TopicCount())
         counted.messages += 1
         counted.bytes += size_bytes
         counted.last_ns = time.time_ns()
 
     def show(self, programs: tuple[OriginalProgram, ...]) -> None:
-        """Register these programs and remove all others."""
+        """Register these programs, and unregister all others."""
         wanted = {program.node_id: self._record(program) for program in programs}
         for node_id in [known for known in self._shown if known not in wanted]:
             del self._shown[node_id]
@@ -98,7 +106,7 @@ class GraphRegistrar:
         self._assign_stats(programs)
 
     def renew(self) -> None:
-        """Send the statistics to the master."""
+        """Renew the leases of the programs and send their statistics to the master."""
         for node_id, join in self._shown.items():
             publishers = tuple(self._publisher_count(record) for record in join.publishers)
             subscribers = tuple(SubscriberCount(record.id, None, None) for record in join.subscribers)

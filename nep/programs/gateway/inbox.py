@@ -1,4 +1,4 @@
-"""Bounded queue from native threads to the gateway's thread; wakes the poll of that thread."""
+"""Bounded queue from native threads to the gateway's thread, which polls a socket of the queue."""
 
 from __future__ import annotations
 
@@ -14,9 +14,13 @@ MAX_BYTES = 64 * 1024 * 1024
 
 
 class NativeInbox:
-    """Bounded queue for many writers and one reader.
+    """Bounded queue with many writers and one reader. Thread-safe.
 
     When it is full, new messages are dropped and counted.
+
+    Args:
+        max_messages: Maximum number of queued messages.
+        max_bytes: Maximum total size of queued messages.
     """
 
     def __init__(self, max_messages: int = MAX_MESSAGES, max_bytes: int = MAX_BYTES) -> None:
@@ -31,7 +35,7 @@ class NativeInbox:
         self._writer.setblocking(False)
 
     def fileno(self) -> int:
-        """Return the descriptor that becomes readable when a message is posted."""
+        """Return the file descriptor that becomes readable when a message is posted."""
         return self._reader.fileno()
 
     @property
@@ -40,7 +44,7 @@ class NativeInbox:
         return self._dropped
 
     def post(self, message: Message) -> None:
-        """Queue a message and wake the reader."""
+        """Queue a message and wake the reader, or drop the message if the queue is full."""
         size = message.size_bytes
         with self._lock:
             if len(self._messages) >= self._max_messages or self._size_bytes + size > self._max_bytes:
@@ -53,7 +57,7 @@ class NativeInbox:
             self.wake()
 
     def wake(self) -> None:
-        """Wake the reader even if no message was posted."""
+        """Wake the reader without posting a message."""
         with contextlib.suppress(OSError):  # full: the reader is already woken; closed: there is none
             self._writer.send(b"\x00")
 

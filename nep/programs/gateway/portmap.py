@@ -1,4 +1,4 @@
-"""Ports assigned to topics and programs of the original NEP.
+"""Assignment of ports to topics and programs of the original NEP.
 
 The assignments are stored in a file, because an original program requests its port only once.
 """
@@ -27,9 +27,16 @@ _SAME_BOOT_S = 120.0
 
 @dataclass(frozen=True, order=True)
 class TopicLine:
-    """Key of a pair of ports: a topic, its frame format, and its connection mode.
+    """Topic in one frame format and connection mode, for which a pair of ports is assigned.
 
-    For clients and servers, whose bytes are not converted, `codec` is "service".
+    Programs on the same line connect to the same ports.
+
+    Attributes:
+        topic: Name of the topic or service.
+        framing: "prefixed" or "bare".
+        codec: Native codec; "service" for clients and servers, whose bytes are not converted.
+        mode: Connection mode: "many2many", "one2many" (the publisher binds) or "many2one" (the subscriber
+            binds).
     """
 
     topic: str
@@ -39,13 +46,24 @@ class TopicLine:
 
     @property
     def is_service(self) -> bool:
-        """True if the line belongs to clients and servers."""
+        """True if the line is used by clients and servers instead of publishers and subscribers."""
         return self.codec == "service"
 
 
 @dataclass(frozen=True)
 class Registration:
-    """Request of an original program for a line. `started` is the start time of its process, if known."""
+    """Original program that has requested the port of a line.
+
+    Attributes:
+        line: Requested line.
+        node: Name of the program's node.
+        socket: Kind of socket: "publisher", "subscriber", "client", "server", "surveyor" or "respondent".
+        msg_type: Message type of the original NEP.
+        generation: Wire generation: "A" or "B".
+        language: Programming language, if known.
+        pid: Process id, if known.
+        started: Start time of the process (s since 1970), if known.
+    """
 
     line: TopicLine
     node: str
@@ -58,7 +76,7 @@ class Registration:
 
     @property
     def node_id(self) -> str:
-        """Unique id of the node. Nodes with the same name differ in the process id."""
+        """Unique id of the node, composed of its name and the process id."""
         return f"original:{escaped(self.node)}:{self.pid if self.pid is not None else '-'}"
 
 
@@ -68,8 +86,8 @@ class PortMap:
     Unused lines keep their ports until the range is exhausted.
 
     Args:
-        file: File that `save` replaces atomically, or None.
-        boot: Boot time of this computer; registrations from before are invalid.
+        file: File with stored assignments, which `save` replaces; None to store nothing.
+        boot: Boot time of this computer (s since 1970); earlier registrations are not loaded.
     """
 
     def __init__(self, file: Path | None, boot: float = 0.0) -> None:
@@ -87,32 +105,36 @@ class PortMap:
 
     @property
     def lines(self) -> Mapping[TopicLine, int]:
-        """Base port of each known line."""
+        """Base ports by line."""
         return self._ports
 
     def port_of(self, line: TopicLine) -> int | None:
-        """Return the base port of a line, or None if the line is unknown."""
+        """Return the base port of a line, or None if no port is assigned."""
         return self._ports.get(line)
 
     def candidates(self, is_used: Callable[[TopicLine], bool]) -> Iterator[int]:
-        """Yield base ports for a new line: first unassigned ports, then those of unused lines."""
+        """Yield base ports for a new line: first unassigned ports, then ports of unused lines.
+
+        Args:
+            is_used: Returns True if a program uses the line.
+        """
         assigned = {port: line for line, port in self._ports.items()}
         yield from (port for port in range(FIRST_PORT, LAST_PORT + 1, 2) if port not in assigned)
         yield from (port for port, line in assigned.items() if not is_used(line))
 
     def assign(self, line: TopicLine, port: int) -> None:
-        """Assign `port` to `line`; another line with this port loses it."""
+        """Assign a base port to a line, and remove its assignment to another line."""
         for other in [known for known, used in self._ports.items() if used == port and known != line]:
             del self._ports[other]
         self._ports[line] = port
 
     def add(self, registration: Registration) -> None:
-        """Add a registration. An earlier one for the same line and socket is replaced."""
+        """Add a registration, replacing an earlier one of the same node, line and socket."""
         key = (registration.node_id, registration.line, registration.socket)
         self._registrations[key] = registration
 
     def remove(self, registrations: set[Registration]) -> None:
-        """Remove registrations; their lines keep their ports."""
+        """Remove registrations. Their lines keep their ports."""
         self._registrations = {
             key: known for key, known in self._registrations.items() if known not in registrations
         }
@@ -157,7 +179,10 @@ class PortMap:
 
 
 def default_file(port: int) -> Path:
-    """Return the state file of the master at `port`, in `NEP_STATE_DIR` or the system's folder."""
+    """Return the state file for the master at `port`.
+
+    The file is in the folder `NEP_STATE_DIR`, or in the user's folder for application state.
+    """
     chosen = os.environ.get("NEP_STATE_DIR")
     if chosen:
         folder = Path(chosen)

@@ -1,4 +1,4 @@
-"""Information about the processes of original programs: start time, language, connections."""
+"""Information about the processes of original programs: start times, languages and connections."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ else:
 
 
 class Processes(Protocol):
-    """Interface to the processes of this computer; replaced in tests."""
+    """Interface to the processes of this computer, which tests replace."""
 
     def started(self, pid: int) -> float | None:
         """Return the start time of a process (s since 1970), or None if it doesn't exist."""
 
     def language(self, pid: int) -> str | None:
-        """Return the programming language of a process, derived from its interpreter, or None if unknown."""
+        """Return the programming language of a process according to its interpreter, or None if unknown."""
 
     def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
-        """Return True if the process has an established connection over `port`, None if access is denied.
+        """Return True if a process has an established connection over a port, None if access is denied.
 
         Args:
             pid: Process id.
-            port: Number of the port.
+            port: Port number.
             binds: True if the process itself binds the port.
         """
 
 
 def load_of(pid: int) -> CpuLoad:
-    """Return a meter of the CPU load of a process."""
+    """Return a CPU load meter for a process."""
 
     def used_s() -> float | None:
         try:
@@ -61,10 +61,13 @@ _INTERPRETERS = {
 
 
 class SystemProcesses:
-    """`Processes` of this computer."""
+    """Implementation of `Processes` with psutil."""
 
     def started(self, pid: int) -> float | None:
-        """Return the start time of a process; None if the process is missing or a zombie."""
+        """Return the start time of a process (s since 1970).
+
+        Returns None if the process doesn't exist or is a zombie, and 0 if access is denied.
+        """
         try:
             process = psutil.Process(pid)
             if process.status() == psutil.STATUS_ZOMBIE:
@@ -84,7 +87,7 @@ class SystemProcesses:
         return next((language for word, language in _INTERPRETERS.items() if name.startswith(word)), None)
 
     def is_joined(self, pid: int, port: int, *, binds: bool) -> bool | None:
-        """Return True if the process has an established connection over `port`; None if unknown."""
+        """Return True if a process has an established connection over a port, None if access is denied."""
         try:
             connections = psutil.Process(pid).net_connections(kind="tcp")
         except psutil.NoSuchProcess:

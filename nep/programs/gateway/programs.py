@@ -1,4 +1,4 @@
-"""Original programs and their roles, which are determined from their connections."""
+"""`ProgramTable`: original programs and their roles, which are derived from their connections."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from nep.programs.gateway.requests import Member, Role
 
 _SAME_PROCESS_S = 5.0
 _CONNECT_GRACE_S = 10.0
-"""Time in seconds after a request within which the program may still connect.
+"""Time in seconds that a program has to connect after its request.
 
-Until then, short connections may be those of other programs.
+Until then, short connections may belong to other programs.
 """
 
 
@@ -25,7 +25,15 @@ ServiceRole = Literal["server", "client"]
 
 @dataclass(frozen=True)
 class TopicLink:
-    """Role of an original program on a topic, or for a service at `port`."""
+    """Role of an original program on a topic or for a service.
+
+    Attributes:
+        topic: Name of the topic or service.
+        msg_type: Message type of the original NEP.
+        codec: Native codec, or "service".
+        role: "publisher", "subscriber", "server" or "client".
+        port: Port of the service; None for a topic.
+    """
 
     topic: str
     msg_type: str
@@ -36,7 +44,7 @@ class TopicLink:
 
 @dataclass(frozen=True)
 class OriginalProgram:
-    """Original node as shown in the graph.
+    """Node of an original program, as shown in the graph.
 
     Attributes:
         node_id: Unique id of the node.
@@ -56,7 +64,14 @@ class OriginalProgram:
 
 
 class ProgramTable:
-    """Tracker of the programs registered in a port map. Used in the gateway's thread only."""
+    """Tracker of the programs that are registered in a port map. Used in the gateway's thread only.
+
+    Args:
+        known: Port map with the registrations.
+        processes: Information about the processes of this computer.
+        pair_of: Returns the open sockets of a line, or None.
+        clock: Monotonic clock in seconds.
+    """
 
     def __init__(
         self,
@@ -74,7 +89,7 @@ class ProgramTable:
         self._openings: dict[Registration, tuple[int, float]] = {}
 
     def update(self, lines: Iterable[TopicLine] | None = None) -> None:
-        """Update the roles of programs on these lines (default: all)."""
+        """Update the roles of the programs on some lines, or on all lines if `lines` is None."""
         chosen = None if lines is None else set(lines)
         for registration in self._port_map.registrations:
             if chosen is None or registration.line in chosen:
@@ -84,12 +99,15 @@ class ProgramTable:
                     self._was_joined.add(registration)
 
     def expect(self, registration: Registration) -> None:
-        """Record a new request: the program may have left the line and will connect again."""
+        """Wait for a program to connect, because it has sent a new request.
+
+        Earlier connections of the program to the line are ignored.
+        """
         self._was_joined.discard(registration)
         self._openings.pop(registration, None)
 
     def remove_ended(self) -> bool:
-        """Remove programs that exited or closed their connections; return True if there were any."""
+        """Remove programs that exited or closed their connections; return True if any was removed."""
         ended = {registration for registration in self._port_map.registrations if self._is_gone(registration)}
         self._discard(ended)
         return bool(ended)
@@ -103,7 +121,7 @@ class ProgramTable:
                 self._openings.pop(registration, None)
 
     def evict_unconnected(self) -> bool:
-        """Remove the oldest program that sent a request but never connected; return True if there was one."""
+        """Remove the oldest registration without a connection; return False if there is none."""
         for registration in self._port_map.registrations:
             if not self._roles.get(registration):
                 self._discard({registration})
@@ -118,7 +136,7 @@ class ProgramTable:
         return tuple(self._program(node_id, asked) for node_id, asked in grouped.items())
 
     def names(self, line: TopicLine, role: Role) -> tuple[str, ...]:
-        """Return the names of the nodes that publish or subscribe on a line."""
+        """Return the names of the nodes that have a role on a line."""
         return tuple(
             dict.fromkeys(
                 registration.node
@@ -128,7 +146,7 @@ class ProgramTable:
         )
 
     def languages(self) -> dict[TopicLine, frozenset[str]]:
-        """Return the known programming languages of the programs on each line."""
+        """Return the known programming languages of the programs, by line."""
         members: dict[TopicLine, frozenset[str]] = {}
         for registration in self._port_map.registrations:
             if registration.language is not None:
@@ -158,7 +176,7 @@ class ProgramTable:
         return members
 
     def is_used(self, line: TopicLine) -> bool:
-        """Return True if a current program has requested this line or is connected to it."""
+        """Return True if a program has requested a line or is connected to it."""
         pair = self._pair_of(line)
         if pair is not None and any(pair.connections.values()):
             return True

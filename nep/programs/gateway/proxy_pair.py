@@ -1,4 +1,4 @@
-"""`ProxyPair`: the two sockets of a line. Original programs publish to one and subscribe at the other."""
+"""`ProxyPair`: the two sockets of a line, one for original publishers and one for original subscribers."""
 
 from __future__ import annotations
 
@@ -20,17 +20,26 @@ _DISCONNECT_EVENTS = zmq.EVENT_DISCONNECTED
 _QUEUE_LENGTH = 1000
 _IMAGE_QUEUE_LENGTH = 20
 MAX_BUFFERED_BYTES = 128 * 2**20
-"""Approximate buffer limit per slow subscriber in bytes; libzmq itself counts messages only."""
+"""Approximate limit of the messages buffered for a slow subscriber, in bytes.
+
+libzmq itself limits only their number.
+"""
 _LINGER_MS = 200
 _MAX_FRAME_BYTES = 2**28
 _MAX_FILTER_BYTES = 2**16
 _MAX_FILTERS = 1000
-"""Maximum number of filters per pair; an original program sets one or two."""
+"""Maximum number of subscription filters per pair. An original program sets one or two."""
 
 
 @dataclass(frozen=True)
 class Endpoint:
-    """Port of a line: the role of the programs that use it, and who binds it (program or gateway)."""
+    """One of the two ports of a `TopicLine`.
+
+    Attributes:
+        role: Role of the programs that connect to the port.
+        port: Port number.
+        is_bound_by_program: True if the program binds the port, False if the gateway does.
+    """
 
     role: Role
     port: int
@@ -38,7 +47,12 @@ class Endpoint:
 
 
 def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
-    """Return the endpoints for publishers and for subscribers of a line, given its base port."""
+    """Return the endpoints of a line for publishers and for subscribers.
+
+    Args:
+        line: Line of the endpoints.
+        base: Base port of the line.
+    """
     return (
         Endpoint("publisher", base, is_bound_by_program=line.mode == "one2many"),
         Endpoint("subscriber", base + 1, is_bound_by_program=line.mode == "many2one"),
@@ -46,14 +60,22 @@ def endpoints_of(line: TopicLine, base: int) -> tuple[Endpoint, Endpoint]:
 
 
 def reply_port(line: TopicLine, base: int, socket_name: str) -> int:
-    """Return the port to reply to a request; `many2many` subscribers add one to the base port themselves."""
+    """Return the port number to send in the reply to a request.
+
+    Subscribers in the mode `many2many` add one to this number themselves.
+
+    Args:
+        line: Requested line.
+        base: Base port of the line.
+        socket_name: Kind of socket that the program opens.
+    """
     if line.is_service or line.mode == "many2many" or socket_name == "publisher":
         return base
     return base + 1
 
 
 def is_free(port: int) -> bool:
-    """Return True if `port` of the loopback address can be bound."""
+    """Return True if a port of the loopback address can be bound."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         if sys.platform != "win32":  # without it, connections in TIME_WAIT block the port
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -65,10 +87,15 @@ def is_free(port: int) -> bool:
 
 
 class ProxyPair:
-    """XSUB socket that receives from original publishers, and XPUB socket for original subscribers.
+    """XSUB socket for original publishers, and XPUB socket for original subscribers, of one line.
 
-    Used in the gateway's thread only. `unserved` contains the incompatible versions seen, by role. The
-    constructor raises `zmq.ZMQError` if a port is in use.
+    Used in the gateway's thread only. `unserved` contains the incompatible versions of programs by role.
+    The constructor raises `zmq.ZMQError` if a port is in use.
+
+    Args:
+        context: ZeroMQ context.
+        line: Line of the sockets.
+        base: Base port of the line.
     """
 
     def __init__(self, context: zmq.Context[zmq.Socket[bytes]], line: TopicLine, base: int) -> None:
@@ -117,21 +144,21 @@ class ProxyPair:
 
     @property
     def connections(self) -> Mapping[Role, int]:
-        """Number of connected programs by role."""
+        """Number of connections by role."""
         return {role: len(handles) for role, handles in self._open_handles.items()}
 
     @property
     def has_subscribers(self) -> bool:
-        """True if an original program subscribes to this line."""
+        """True if an original program has subscribed to this line."""
         return any(self.shape.matches_filter(filter_) for filter_ in self.filters)
 
     @property
     def has_0546(self) -> bool:
-        """True if a subscriber uses nep 0.5.4.6, according to its filter."""
+        """True if a subscriber uses nep 0.5.4.6, according to its subscription filter."""
         return any(self.shape.is_from_0546(filter_) for filter_ in self.filters)
 
     def frames(self, limit: int) -> Iterator[bytes]:
-        """Yield at most `limit` frames published by original programs."""
+        """Yield at most `limit` pending frames of original publishers."""
         for _ in range(limit):
             try:
                 parts = self.incoming.recv_multipart(zmq.NOBLOCK)
@@ -140,7 +167,7 @@ class ProxyPair:
             yield parts[0]
 
     def read_filters(self) -> bool:
-        """Process subscriptions; return True if the filters changed."""
+        """Process pending subscription events; return True if the filters changed."""
         before = set(self.filters)
         while True:
             try:
@@ -153,7 +180,7 @@ class ProxyPair:
                 self.filters.discard(note[1:])
 
     def read_connections(self) -> bool:
-        """Process connection events; return True if there were any."""
+        """Process pending connection events; return True if there were any."""
         happened = False
         for role, monitor in self.monitors.items():
             while monitor.poll(0):
@@ -169,20 +196,25 @@ class ProxyPair:
         return happened
 
     def forward(self, frame: bytes, data: bytes) -> None:
-        """Send a frame of this line to the line's own subscribers.
+        """Send a frame that was received on this line to the subscribers of the same line.
 
-        The frame is unchanged unless the programming language of a subscriber requires shielding.
+        The frame is sent unchanged, unless a subscriber's language requires escaping (`shield_javascript`,
+        `shield_csharp`).
+
+        Args:
+            frame: Received frame.
+            data: Frame converted to the native codec.
         """
         if self.has_subscribers:
             self._send(self.shape.write(self._shield(data)) if self._needs_shield else frame)
 
     def deliver(self, data: bytes | memoryview) -> None:
-        """Encode bytes of the native codec in this line's format and send them to the line's subscribers."""
+        """Convert data of the native codec to a frame and send it to the subscribers of this line."""
         if self.has_subscribers:
             self._send(self.shape.write(self._shield(bytes(data)) if self._needs_shield else data))
 
     def close(self) -> None:
-        """Close both sockets, with a short linger."""
+        """Close both sockets. Pending frames are sent for up to 0.2 s."""
         self._closing.close()
 
     @property

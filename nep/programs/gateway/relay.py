@@ -1,4 +1,7 @@
-"""Relay between lines. A frame is converted at most once per format, and never returned to its line."""
+"""Relay of messages between lines.
+
+A frame is converted at most once per format, and never sent back to the line it came from.
+"""
 
 from __future__ import annotations
 
@@ -15,46 +18,55 @@ from nep.programs.gateway.proxy_pair import ProxyPair
 from nep.programs.gateway.requests import Role
 
 _MAX_BATCH = 200
-"""Maximum number of frames read from one line before the others are served."""
+"""Maximum number of frames read from one line before other lines are served."""
 
 
 class NativeSide(Protocol):
     """Interface of the relay to the native network. A topic uses one codec at a time."""
 
     def publish(self, topic: str, codec: str, data: bytes) -> None:
-        """Publish data to native subscribers; the first call opens the publisher."""
+        """Publish data to native subscribers. The first call opens the publisher."""
 
     def stop_publishing(self, topic: str, codec: str) -> None:
-        """Close the publisher, because no original program publishes the topic any more."""
+        """Close the publisher of a topic that no original program publishes any more."""
 
     def subscribe(self, topic: str, codec: str) -> bool:
-        """Subscribe to a topic, whose messages go to `Relay.deliver`; return False if a retry is needed."""
+        """Subscribe to a topic, whose messages are passed to `Relay.deliver`.
+
+        Returns False if the subscription failed and must be retried.
+        """
 
     def unsubscribe(self, topic: str, codec: str) -> None:
-        """Unsubscribe, because no original program subscribes to the topic any more."""
+        """Close the subscriber of a topic to which no original program subscribes any more."""
 
 
 class AlertSink(Protocol):
-    """Receiver of problems, which become alerts."""
+    """Interface through which problems are reported as alerts."""
 
     def report(self, id: str, sentence: str, hint: str = "") -> None:
-        """Report a problem; repeated reports have no effect."""
+        """Report a problem as an alert. Repeated reports of the same problem have no effect.
+
+        Args:
+            id: Id of the alert, for `resolve`.
+            sentence: Description of the problem.
+            hint: Next step for the user, or "".
+        """
 
     def resolve(self, id: str) -> None:
-        """Remove a problem that is solved."""
+        """Remove the alert of a problem that is solved."""
 
 
 Key = tuple[str, str]
-"""Topic and codec. Lines with the same key exchange messages."""
+"""Topic and codec. Lines with the same key receive each other's messages."""
 
 
 ProgramNames = Callable[[TopicLine, Role], Sequence[str]]
-"""Function that returns the names of known programs that publish or subscribe on a line."""
+"""Function that returns the names of the known programs with a role on a line."""
 
 
 @dataclass
 class _RejectedMessages:
-    """Count of invalid messages of a topic since its last valid one."""
+    """Count of a topic's invalid messages since its last valid message."""
 
     reason: str
     count: int = 0
@@ -63,13 +75,13 @@ class _RejectedMessages:
 
 
 class Relay:
-    """Open lines and the messages between them. Used in the gateway's thread only.
+    """Relay of messages between the open lines and the native network. Used in the gateway's thread only.
 
     Args:
         context: ZeroMQ context.
         native: Native network.
         alerts: Receiver of problems.
-        program_names: Returns the names of programs for use in alerts.
+        program_names: Returns the names of the programs on a line, for alerts.
     """
 
     def __init__(
@@ -90,20 +102,25 @@ class Relay:
 
     @property
     def pairs(self) -> Iterable[ProxyPair]:
-        """Pairs of sockets of all open lines."""
+        """Sockets of all open lines."""
         return self._pairs.values()
 
     def pair(self, line: TopicLine) -> ProxyPair | None:
-        """Return the pair of sockets of a line, or None if the line is not open."""
+        """Return the sockets of a line, or None if the line is not open."""
         return self._pairs.get(line)
 
     def open(self, line: TopicLine, base: int) -> ProxyPair:
-        """Open the sockets of `line`. Raises `zmq.ZMQError` if a port is in use."""
+        """Open the sockets of a line. Raises `zmq.ZMQError` if a port is in use.
+
+        Args:
+            line: Line to open.
+            base: Base port of the line.
+        """
         pair = self._pairs[line] = ProxyPair(self._context, line, base)
         return pair
 
     def close_line(self, line: TopicLine) -> None:
-        """Close the sockets of `line` and its native publisher and subscriber."""
+        """Close the sockets of a line, and native publishers and subscribers that are no longer needed."""
         pair = self._pairs.pop(line, None)
         if pair is not None:
             pair.close()
@@ -117,13 +134,13 @@ class Relay:
             self.close_line(line)
 
     def sockets(self) -> Iterator[tuple[zmq.Socket[bytes], ProxyPair]]:
-        """Yield all sockets to be polled, each with its pair."""
+        """Yield all sockets to be polled, each with the `ProxyPair` it belongs to."""
         for pair in self._pairs.values():
             for socket in (pair.incoming, pair.outgoing, *pair.monitors.values()):
                 yield socket, pair
 
     def serve(self, pair: ProxyPair) -> bool:
-        """Process the input of a pair; return True if connections or subscriptions changed."""
+        """Process the pending input of a pair; return True if connections or subscriptions changed."""
         changed = pair.read_connections()
         changed |= pair.read_filters()
         if changed:
@@ -133,12 +150,18 @@ class Relay:
         return changed
 
     def set_languages(self, languages: Mapping[TopicLine, frozenset[str]]) -> None:
-        """Set the programming languages used on each line; frames for some of them are shielded."""
+        """Set the programming languages of the programs on each line, some of which require escaping."""
         for line, pair in self._pairs.items():
             pair.languages = languages.get(line, frozenset())
 
     def deliver(self, topic: str, codec: str, data: bytes | memoryview) -> None:
-        """Send a native message to all original subscribers of a topic, each in its format."""
+        """Send a native message to all original subscribers of a topic, in the format of each.
+
+        Args:
+            topic: Name of the topic.
+            codec: Native codec of the data.
+            data: Encoded payload.
+        """
         for pair in self._pairs_of((topic, codec)):
             pair.deliver(data)
 
@@ -154,7 +177,11 @@ class Relay:
                 self._alerts.resolve(f"message:{topic}")
 
     def update_endpoints(self, key: Key) -> None:
-        """Open or close the native publisher and subscriber of a key, as original programs require."""
+        """Open or close the native publisher and subscriber of a key, as original programs require.
+
+        Args:
+            key: Topic and codec.
+        """
         pairs = self._pairs_of(key)
         wanted = any(pair.has_subscribers for pair in pairs)
         if wanted and key not in self._subscribed:

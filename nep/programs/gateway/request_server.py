@@ -1,4 +1,4 @@
-"""Fixed ports of the original NEP: two for requests, one for the broadcast of all topics."""
+"""`RequestServer`: fixed ports of the original NEP, two for requests and one for the list of topics."""
 
 from __future__ import annotations
 
@@ -24,12 +24,18 @@ from nep.programs.gateway.requests import (
 
 _logger = logging.getLogger("nep.programs.gateway")
 _MAX_REQUEST_BYTES = 2**24
-"""Size above which ZeroMQ disconnects the sender; requests have a few hundred bytes."""
+"""Size above which ZeroMQ disconnects the sender. Requests usually have a few hundred bytes."""
 
 
 @dataclass(frozen=True)
 class Ports:
-    """Fixed ports of the original NEP; 0 disables a port."""
+    """Fixed ports of the original NEP; 0 disables a port.
+
+    Attributes:
+        requests_a: Request port of programs up to 0.5.4.5, nep-js and C#.
+        requests_b: Request port of programs since 0.5.4.6.
+        broadcast: Port at which the list of topics is published.
+    """
 
     requests_a: int = PORT_A
     requests_b: int = PORT_B
@@ -37,7 +43,7 @@ class Ports:
 
 
 class RequestServer:
-    """Server that replies to every request, even an invalid one. Used in the gateway's thread only.
+    """Server that replies to every request, even to invalid ones. Used in the gateway's thread only.
 
     A port in use is reported as an alert and retried.
 
@@ -69,7 +75,7 @@ class RequestServer:
         return tuple(port for port in wanted if port)
 
     def open(self) -> bool:
-        """Bind the ports that are not bound yet; return True if any was bound."""
+        """Bind the ports that are not bound yet; return True if a request port was bound."""
         before = len(self._request_sockets)
         for port, versions in (
             (self._ports.requests_a, _("nep up to 0.5.4.5, nep-js and C#")),
@@ -96,7 +102,12 @@ class RequestServer:
             yield counter, port
 
     def reply(self, counter: zmq.Socket[bytes], port: int) -> None:
-        """Reply to a pending request. Never raises because of the request's content."""
+        """Reply to a pending request. Never raises because of the request's content.
+
+        Args:
+            counter: Request socket.
+            port: Port of the socket.
+        """
         try:
             parts = counter.recv_multipart(zmq.NOBLOCK)
         except zmq.Again:
@@ -117,7 +128,7 @@ class RequestServer:
         counter.send_multipart([*envelope, reply])
 
     def publish_members(self, members: Iterable[Member]) -> None:
-        """Broadcast all topics to tools of the original NEP."""
+        """Publish the list of all topics to tools of the original NEP."""
         if self._broadcast_socket is not None:
             self._broadcast_socket.send(encode_broadcast(members))
 

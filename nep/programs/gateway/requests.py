@@ -1,4 +1,4 @@
-"""Requests to the master of the original NEP, its replies and its broadcast. No input or output."""
+"""Format of the requests, replies and broadcasts of the original NEP's master. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -21,7 +21,12 @@ _MODES: Mapping[str, Mode] = {"many2many": "many2many", "one2many": "one2many", 
 
 
 class RequestError(ValueError):
-    """Error for a request that can't be granted; `topic` is the requested topic, if known."""
+    """Error for a request that can't be granted.
+
+    Args:
+        sentence: Reason of the rejection.
+        topic: Requested topic, if known.
+    """
 
     def __init__(self, sentence: str, topic: object = None) -> None:
         super().__init__(sentence)
@@ -30,7 +35,19 @@ class RequestError(ValueError):
 
 @dataclass(frozen=True)
 class Request:
-    """Request of an original program for a topic."""
+    """Request of an original program for the port of a topic or service.
+
+    Attributes:
+        node: Name of the program's node.
+        topic: Name of the topic or service.
+        socket: Kind of socket: "publisher", "subscriber", "client", "server", "surveyor" or "respondent".
+        mode: Connection mode: "many2many", "one2many" (the publisher binds) or "many2one" (the subscriber
+            binds).
+        msg_type: Message type of the original NEP.
+        pid: Process id, if known.
+        asked_port: Port to which the request was sent.
+        language: Programming language, if known.
+    """
 
     node: str
     topic: str
@@ -43,12 +60,12 @@ class Request:
 
     @property
     def generation(self) -> str:
-        """Wire generation of the original NEP: "A" or "B"; the two are incompatible."""
+        """Wire generation of the program: "A" or "B", which are incompatible."""
         return "B" if self.request_port == PORT_B else "A"
 
     @property
     def framing(self) -> Framing:
-        """Frame format that the program uses."""
+        """Frame format of the program: "prefixed" or "bare"."""
         return framing_of(self.request_port, self.msg_type)
 
     @property
@@ -63,7 +80,12 @@ class Request:
 
 
 def parse_request(data: bytes, asked_port: int) -> Request:
-    """Parse a request received at `asked_port`. Raises `RequestError`."""
+    """Parse a request. Raises `RequestError`.
+
+    Args:
+        data: Request as JSON.
+        asked_port: Port to which the request was sent.
+    """
     if len(data) > MAX_REQUEST_BYTES:
         raise RequestError(f"the request has {len(data)} bytes; at most {MAX_REQUEST_BYTES} are read")
     try:
@@ -94,13 +116,26 @@ def encode_grant(request: Request, port: int) -> bytes:
 
 
 def encode_rejection(error: RequestError) -> bytes:
-    """Encode the reply to a rejected request. Programs read `state`; `error` is for people."""
+    """Encode the reply to a rejected request.
+
+    Original programs evaluate only `state`; `error` is the reason for people.
+    """
     return _encode_json({"topic": error.topic, "state": "failure", "error": str(error)})
 
 
 @dataclass(frozen=True)
 class Member:
-    """Program on a topic, as listed in the broadcast."""
+    """Program on a topic, as listed in the broadcast.
+
+    Attributes:
+        topic: Name of the topic or service.
+        node: Name of the program's node.
+        port: Base port of the line.
+        socket: Kind of socket.
+        mode: Connection mode; None for a service.
+        msg_type: Message type of the original NEP.
+        pid: Process id, if known.
+    """
 
     topic: str
     node: str
@@ -112,7 +147,7 @@ class Member:
 
 
 def encode_broadcast(members: Iterable[Member]) -> bytes:
-    """Encode the broadcast for port 7777, with its prefix: all topics and their nodes."""
+    """Encode the list of all topics and their nodes, with the prefix "master ", for port 7777."""
     topics: dict[str, dict[str, object]] = {}
     nodes: dict[str, dict[str, object]] = {}
     for member in members:

@@ -1,8 +1,8 @@
-"""Motion protection: which topics move a robot, and which programs may publish there.
+"""Motion protection: which topics move a robot, and which programs may publish on them.
 
-`moving` determines whether a topic moves a robot, and which one, from descriptions, types and subscribers.
-`guard` reads the current descriptions for programs without a window, and denies publishing unless it was
-allowed. Commands, drivers and Studio's permission dialog are in `app`.
+`moving` determines the robots that a topic moves, from descriptions, types and subscribers. `guard` reads the
+current descriptions for programs without a window, and denies publishing on topics that are not allowed.
+Commands, drivers and Studio's permission dialog are in `app`.
 """
 
 from nep.programs.robots.guard import MotionGuard

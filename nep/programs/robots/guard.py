@@ -1,4 +1,4 @@
-"""Motion guard of programs without a window, which may move only robots that were allowed.
+"""Motion guard of programs without a window, which may move only robots that the user allowed.
 
 The guard subscribes to the descriptions of all robots on the network. A description's claim "virtual" is not
 trusted here, because only the program that started a virtual robot can verify it (docs/trust.md).
@@ -40,15 +40,15 @@ _GRAPH_TIMEOUT_S = 0.5
 
 
 class MotionGuard:
-    """Check that decides on which topics a program may publish. Thread-safe.
+    """Guard that decides on which topics a program may publish. Thread-safe.
 
-    Call `see` with each new graph. `refusal` is a dictionary look-up unless something has changed. Before the
-    first graph no robots are known, and only the message type and RIZE's topic decide.
+    Call `update_graph` with each new graph. `refusal` is a dictionary look-up unless something has changed.
+    Before the first graph no robots are known, and only the message type and RIZE's topic decide.
 
     Args:
         node: Node that subscribes to the robots' descriptions.
-        allowed: Names of robots that may be moved. A topic stands for the robots that it moves.
-        own_nodes: Ids of the program's own nodes (default: that of `node`).
+        allowed: Names of robots that may be moved. The name of a topic allows publishing on that topic.
+        own_nodes: Ids of the program's own nodes (default: the id of `node`).
     """
 
     def __init__(
@@ -76,12 +76,12 @@ class MotionGuard:
 
     @property
     def is_settled(self) -> bool:
-        """True if a graph was processed and all descriptions in it were read."""
+        """True if a graph was processed and the descriptions of all its robots were read."""
         with self._lock:
             return self._view is not None and not self._is_dirty and not self._unread_topics(self._view)
 
     def update_graph(self, view: GraphView) -> None:
-        """Process a new graph. Cheap if nothing has changed."""
+        """Process a new graph. Returns quickly if nothing has changed."""
         with self._lock:
             before = self._view
             if before is not None and (before.epoch, before.revision) == (view.epoch, view.revision):
@@ -92,7 +92,7 @@ class MotionGuard:
             self._rebuild(view)
 
     def poll(self) -> None:
-        """Query and process the graph. Does nothing while the master doesn't reply."""
+        """Query the graph and process it. Does nothing if the master doesn't reply."""
         try:
             view = self._node.graph(_GRAPH_TIMEOUT_S)
         except NepError:
@@ -100,7 +100,7 @@ class MotionGuard:
         self.update_graph(view)
 
     def wait_for_descriptions(self, timeout_s: float) -> bool:
-        """Wait until all descriptions are read; return False after `timeout_s` seconds."""
+        """Wait until the descriptions of all robots are read; return False after `timeout_s` seconds."""
         until = time.monotonic() + timeout_s
         while True:
             self.poll()
@@ -109,18 +109,30 @@ class MotionGuard:
             threading.Event().wait(_POLL_S)
 
     def set_allowed(self, names: Collection[str]) -> None:
-        """Replace the names of robots (or topics) that may be moved, from the next call of `refusal` on."""
+        """Replace the names of the robots and topics that are allowed; takes effect immediately."""
         with self._lock:
             self._allowed = frozenset(names)
             self._cache = {}
 
     def denied_robots(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
-        """Return the robots because of which a topic is denied; the topic itself for an unknown robot."""
+        """Return the names of the robots that publishing would move without permission.
+
+        A robot of unknown name is represented by the topic.
+
+        Args:
+            topic: Topic to publish on.
+            msg_type: Message type to publish with, if known.
+        """
         with self._lock:
             return _denied_robots(topic, self._moving.robots_moved_by(topic, msg_type), self._allowed)
 
     def refusal(self, topic: str, msg_type: str = "") -> str:
-        """Return why publishing on a topic is denied, with the option that allows it; "" if it is allowed."""
+        """Return the reason why publishing is denied, with the option that allows it; "" if it is allowed.
+
+        Args:
+            topic: Topic to publish on.
+            msg_type: Message type to publish with, if known.
+        """
         key = topic, msg_type
         said = self._cache.get(key)
         if said is None:
@@ -132,7 +144,7 @@ class MotionGuard:
         return said
 
     def close(self) -> None:
-        """Unsubscribe from the descriptions; known robots stay protected."""
+        """Unsubscribe from the descriptions. Robots that are already known stay protected."""
         with self._lock:
             subscribers, self._subscribers = list(self._subscribers.values()), {}
         for each in subscribers:
@@ -206,7 +218,16 @@ def _denied_robots(topic: str, robots: Sequence[str], allowed: Collection[str]) 
 
 
 def refusal_text(topic: str, robots: Sequence[str], allowed: Collection[str]) -> str:
-    """Return a message naming the robots and the option that allows moving them; "" if all are allowed."""
+    """Return an error message that names the robots and the option that allows moving them.
+
+    Args:
+        topic: Topic to publish on.
+        robots: Names of the robots that would move.
+        allowed: Names of the robots and topics that are allowed.
+
+    Returns:
+        The message; "" if all robots are allowed.
+    """
     missing = list(_denied_robots(topic, robots, allowed))
     if not missing:
         return ""

@@ -1,7 +1,7 @@
-"""Topics that move robots, determined from descriptions, types and subscribers. No input or output.
+"""Topics that move robots, determined from descriptions, types and subscribers. Performs no I/O.
 
-Everything that publishes on behalf of a person or a program calls `MovingTopics.moved_by`: alarms, `nep
-play`, `nep bridge`, behaviours, and the Publish panel of Studio.
+All code that publishes on behalf of a person or a program calls `MovingTopics.robots_moved_by`: alarms,
+`nep play`, `nep bridge`, behaviours, and the Publish panel of Studio.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ DESCRIPTION_TYPE = "robot/description"
 COMMAND_TYPE = "robot/command"
 REPLY_TYPE = "robot/answer"
 RIZE_COMMAND_TOPIC = "robot_action"
-"""Topic for commands to all RIZE robots. Robots of the driver kit subscribe to this topic, too."""
+"""Topic for commands to all RIZE robots, to which robots of the driver kit also subscribe."""
 _CONTROL_KEYS = ("command", "world")
 _DESCRIPTION, _ANSWER = "/description", "/answer"
 _HREF_SCHEME = "nep:"
@@ -31,14 +31,19 @@ _MAX_NAME_LENGTH = 256
 
 @dataclass(frozen=True, slots=True)
 class RobotControls:
-    """Topics or patterns on which messages move one robot or change its world."""
+    """Topics that control one robot.
+
+    Attributes:
+        name: Name of the robot.
+        topics: Topics or patterns on which messages move the robot or change its world.
+    """
 
     name: str
     topics: frozenset[str]
 
 
 class MovingTopics:
-    """Topics that move robots at one moment. Immutable, hence thread-safe.
+    """Snapshot of the topics that move robots. Immutable, hence thread-safe.
 
     Args:
         robots: Robots and the topics that move them.
@@ -74,14 +79,14 @@ class MovingTopics:
 
     @property
     def topics(self) -> dict[str, tuple[str, ...]]:
-        """Topics and patterns that move identified robots, each with the names of these robots."""
+        """Names of the identified robots by the topic or pattern that moves them."""
         found = dict(self._by_topic)
         if self._all_names:
             found[RIZE_COMMAND_TOPIC] = self._all_names
         return found
 
     def robots_on(self, topic: str) -> tuple[str, ...]:
-        """Return the names of identified robots that a message on a topic moves."""
+        """Return the names of the identified robots that messages on a topic move."""
         if topic == RIZE_COMMAND_TOPIC:
             return self._all_names
         names = dict.fromkeys(self._by_topic.get(topic, ()))
@@ -91,10 +96,10 @@ class MovingTopics:
         return tuple(names)
 
     def robots_moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
-        """Return the names of the robots that a message moves; empty if the message moves none.
+        """Return the names of the robots that messages on a topic move; empty if there are none.
 
         If a robot of unknown name is moved (because of the type ``robot/command``, RIZE's topic, or
-        subscribers in the graph), the topic stands for its name.
+        subscribers in the graph), the topic is returned in place of its name.
 
         Args:
             topic: Topic to publish on.
@@ -113,9 +118,9 @@ class MovingTopics:
 
 
 def parse_controls(description: object, fallback_name: str = "") -> RobotControls | None:
-    """Read the name and the controlling topics from a robot's description.
+    """Parse the name and the controlling topics in a robot's description.
 
-    Only these parts are read, so an otherwise invalid description still protects its robot.
+    The rest of the description is not validated, so that an invalid description still protects its robot.
 
     Args:
         description: Decoded message of the type ``robot/description``.
@@ -158,7 +163,10 @@ def description_topics(view: GraphView) -> frozenset[str]:
 
 
 def described_name(topic: str) -> str:
-    """Return the robot's name according to its description topic: ``Rover`` for ``/Rover/description``."""
+    """Return the robot's name according to its description topic.
+
+    For example, the name is ``Rover`` for ``/Rover/description``.
+    """
     return topic.strip("/").removesuffix(_DESCRIPTION) or topic
 
 
@@ -173,8 +181,8 @@ def moving_topics(
     Args:
         view: Current graph.
         robots: Robots whose descriptions were read.
-        unread: Description topics that were not read yet. All topics to which their programs subscribe count
-            as moving, and so do a robot's default topics.
+        unread: Description topics that were not read yet. All topics to which their programs subscribe
+            count as moving, as do the default topics of a robot.
         own_nodes: Ids of the caller's nodes, whose subscriptions are ignored.
     """
     known = [*robots, *_unread_robots(view, unread, own_nodes)]
@@ -226,7 +234,7 @@ def _subscriptions(view: GraphView) -> dict[str, set[str]]:
 
 
 def original_robots(view: GraphView) -> Iterator[RobotControls]:
-    """Yield programs of the original NEP that subscribe to RIZE commands: robots without a description."""
+    """Yield robots without a description: programs of the original NEP that subscribe to RIZE commands."""
     info = view.topics.get(RIZE_COMMAND_TOPIC)
     for subscriber in info.subscribers if info is not None else ():
         node = view.nodes.get(subscriber.node_id)

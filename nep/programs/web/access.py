@@ -1,4 +1,4 @@
-"""Access control by the page's origin, the token, or rosbridge's ``auth``. No input or output.
+"""Access control by the page's origin, the token, or rosbridge's ``auth``. Performs no I/O.
 
 Any web page shown in a browser on this computer can open a WebSocket to 127.0.0.1. The browser sends the
 page's origin, so only pages of this computer and explicitly allowed origins are accepted. Programs send no
@@ -28,12 +28,12 @@ _DEFAULT_PORTS = {"http": 80, "https": 443}
 
 
 def new_token() -> str:
-    """Create a random token that is valid in a URL."""
+    """Return a new random token that can be part of a URL."""
     return secrets.token_urlsafe(24)
 
 
 def query_of(token: str) -> str:
-    """Return the path and query of a URL with the token ("/?token=..."), or "/" without a token."""
+    """Return the path and query of a URL with a token ("/?token=..."); "/" if the token is ""."""
     return f"/?token={quote(token, safe='')}" if token else "/"
 
 
@@ -50,8 +50,8 @@ def is_own_host(host: str) -> bool:
 def checked_origin(origin: str) -> str:
     """Validate an origin and return it in the form that browsers send. Raises `NepError`.
 
-    "null" is the origin of pages opened as files, and of every sandboxed frame of any page. "file://" is that
-    of desktop programs such as Lichtblick.
+    "null" is the origin of pages opened as files, and of every sandboxed frame. "file://" is the origin of
+    desktop programs such as Lichtblick.
     """
     if origin in {"null", "file://"}:
         return origin
@@ -74,10 +74,10 @@ def checked_origin(origin: str) -> str:
 
 @dataclass(frozen=True)
 class Access:
-    """Access rules.
+    """Rules that decide which pages and programs may connect.
 
     Attributes:
-        origins: Allowed origins of pages, in addition to those of this computer.
+        origins: Allowed origins of pages, in addition to the pages of this computer.
         token: Token required from pages and programs; "" if none is required.
     """
 
@@ -104,9 +104,11 @@ class Access:
         ).format(origin=quotable(origin), option=quotable(origin))
 
     def check_token(self, path: str, authorization: str | None) -> bool | None:
-        """Return True if the token in the URL or the header is valid, False if not, None if there is none.
+        """Return True if a handshake contains the valid token, False if it is wrong, None if there is none.
 
-        Accepted forms are ``ws://host:9090/?token=TOKEN`` and ``Authorization: Bearer TOKEN``.
+        Args:
+            path: Path of the URL, with a query such as ``/?token=TOKEN``.
+            authorization: Authorization header, such as ``Bearer TOKEN``, or None.
         """
         given = [*parse_qs(urlsplit(path).query, keep_blank_values=True).get("token", ())]
         scheme, _space, value = (authorization or "").partition(" ")
@@ -121,7 +123,12 @@ class Access:
 
 
 class AuthCheck:
-    """Validator of rosbridge's ``auth`` operations, each of which is valid once and for a few seconds."""
+    """Validator of rosbridge's ``auth`` operations, each of which is valid once and for a few seconds.
+
+    Args:
+        token: Required token.
+        clock: Clock in seconds since 1970.
+    """
 
     def __init__(self, token: str, clock: Callable[[], float] = time.time) -> None:
         self._token = token
@@ -129,7 +136,7 @@ class AuthCheck:
         self._used: dict[str, None] = {}
 
     def verify(self, auth: Auth) -> bool:
-        """Return True if the MAC is valid for the token, current, and not used before."""
+        """Return True if the credentials match the token, are not expired, and were not used before."""
         parts = (self._token, auth.client, auth.dest, auth.rand, auth.time_s, auth.level, auth.end_s)
         text = "".join(map(str, parts)).encode("utf-8", "replace")
         mac = hashlib.sha512(text).hexdigest()

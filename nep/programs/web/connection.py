@@ -1,4 +1,7 @@
-"""Base class for connections of both protocols: node, send queue and sending task of one page."""
+"""`PageConnection`: base class for the connection of a page in any protocol.
+
+A connection has a node, a send queue, and a task that sends queued messages.
+"""
 
 from __future__ import annotations
 
@@ -35,9 +38,15 @@ _ids = itertools.count(1)
 
 
 class PageConnection:
-    """WebSocket connection of a page. Runs in the server's event loop.
+    """Base class for the WebSocket connection of a page. Runs in the server's event loop.
 
     Subclasses implement a protocol: `_frames_of`, `_warn`, `_reject` and `_topic_list`.
+
+    Args:
+        connection: WebSocket connection.
+        name: Name of the page's node.
+        new_node: Creates the node.
+        counts: Counters of the server.
     """
 
     protocol: ClassVar[Protocol]
@@ -69,7 +78,7 @@ class PageConnection:
         raise NotImplementedError
 
     async def _frames_of(self, queued: QueuedMessage) -> list[Frame]:
-        """Encode a message of a topic. Raises `NepError` if it can't be sent to this page."""
+        """Encode a message of a topic. Raises `NepError` if the protocol can't represent the message."""
         raise NotImplementedError
 
     def _warn(self, sentence: str) -> None:
@@ -143,7 +152,7 @@ class PageConnection:
         self.start_closing("the page does not read its answers")
 
     def _log_connection(self) -> None:
-        """Log the connection with the page's node, because a node without topics is not in the graph.
+        """Log the connection through the page's node, because the graph doesn't show a node without topics.
 
         Called in the page's thread.
         """
@@ -157,7 +166,7 @@ class PageConnection:
     # ---- sending
 
     async def _write(self) -> None:
-        """Send queued messages as fast as the page reads them."""
+        """Send queued messages until the connection is closed, as fast as the page reads them."""
         try:
             while True:
                 await self._send(await self._queue.pop())

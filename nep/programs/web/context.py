@@ -1,4 +1,4 @@
-"""Objects shared by the parts of a page's connection, and descriptions of pages and refusals."""
+"""Objects shared by the parts of a page's connection, and public data about pages and rejections."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class PageTopic:
 
     Attributes:
         topic: Name of the topic.
-        is_published: True if the page publishes the topic, False if it subscribes.
-        at_most_per_s: Rate limit that the page requested (``throttle_rate``), or None.
-        rate: Messages per second, sent to or received from the page, averaged over two seconds.
+        is_published: True if the page publishes the topic, False if the page subscribes to it.
+        max_rate_hz: Maximum messages per second that the page requested (``throttle_rate``), or None.
+        rate_hz: Messages per second, sent to or received from the page, averaged over two seconds.
         bytes_per_s: Bytes per second, averaged in the same way.
         sent_count: Number of messages sent to the page.
-        dropped_count: Number of messages dropped because the page was too slow, without those beyond its
-            limit.
+        dropped_count: Number of messages dropped because the page was too slow; messages beyond the
+            requested rate are not counted.
     """
 
     topic: str
@@ -58,8 +58,8 @@ class ConnectedPage:
 
     Attributes:
         id: Id for `WebServer.disconnect`.
-        name: Name of its node, whose ``language`` in the graph is "web".
-        address: Address of the client.
+        name: Name of the page's node, whose ``language`` in the graph is "web".
+        address: Address and port of the client.
         origin: Origin of the page; "" for programs.
         since_s: Time of the connection (s since 1970).
         client: Name of the program, such as "Chrome" or "roslibpy"; "" if unknown.
@@ -81,7 +81,7 @@ class ConnectedPage:
     topics: tuple[PageTopic, ...] = ()
     dropped_count: int = 0
     device: Device = ""
-    """Kind of device according to the User-Agent; many tablets claim to be computers."""
+    """Kind of device according to the User-Agent header; many tablets claim to be computers."""
 
     @property
     def subscribed_topics(self) -> tuple[str, ...]:
@@ -98,14 +98,14 @@ class ConnectedPage:
 class Refusal:
     """Rejected connection, or (kind "robot") rejected message that would have moved a robot.
 
-    A page and robot are listed at most once in ten seconds.
+    Rejected messages of a page to the same robot are listed at most once in ten seconds.
 
     Attributes:
-        time_s: Time of the refusal (s since 1970).
-        who: Origin of the page, or its address.
+        time_s: Time of the rejection (s since 1970).
+        client: Origin of the page, or its address.
         reason: Reason as a sentence.
         origin: Origin of the page if allowing it would let the page connect, else "".
-        kind: Kind of the refusal.
+        kind: Kind of the rejection.
         robot: Name of the robot that the page tried to move, or the topic of a robot of unknown name.
     """
 
@@ -119,7 +119,7 @@ class Refusal:
 
 @dataclass
 class WebCounts:
-    """Counters of a server since its start. Written only in the thread of its event loop."""
+    """Counters of a server since its start. Modified only in the thread of its event loop."""
 
     opened: int = 0
     """Number of accepted connections."""
@@ -127,7 +127,7 @@ class WebCounts:
     """Number of rejected connections: wrong origin, no valid token, or too many connections."""
     operations: int = 0
     rejected: int = 0
-    """Number of failed operations; the page received a status for each."""
+    """Number of failed operations, for each of which the page received a status."""
     motions_refused: int = 0
     """Number of rejected messages that would have moved a robot."""
     sent: int = 0
@@ -157,12 +157,12 @@ class PageContext:
 
         Args:
             node: Node of the page.
-            queue: Messages to be sent to the page.
-            thread: Thread for calls that wait for the network.
-            guard: Decides on which topics the page may publish.
+            queue: Queue of messages to be sent to the page.
+            thread: Executor with a single thread, for calls that wait for the network.
+            guard: Motion guard that decides on which topics the page may publish.
             counts: Counters of the server.
             on_robot_refused: Called with the name of a robot that the page may not move, and the reason.
-            send_status: Sends a status in a protocol other than rosbridge.
+            send_status: Sends a status in another protocol; None for rosbridge.
         """
         self.node = node
         self.queue = queue
@@ -176,12 +176,15 @@ class PageContext:
         self._refused_lock = threading.Lock()
 
     async def run_in_thread(self, function: Callable[_P, _T], *args: _P.args, **named: _P.kwargs) -> _T:
-        """Call a function that waits for the network in the page's thread. Calls are executed in order."""
+        """Call a function in the page's thread, because the function waits for the network.
+
+        Calls are executed in order.
+        """
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, lambda: function(*args, **named))
 
     def motion_refusal(self, topic: str, msg_type: str) -> str:
-        """Return and report the reason why the page may not publish on a topic; "" if allowed.
+        """Return and report the reason why the page may not publish on a topic; "" if it may.
 
         Thread-safe.
         """
@@ -203,7 +206,13 @@ class PageContext:
         self._on_robot_refused(robot, reason)
 
     def send_status(self, level: Level, sentence: str, id_: OperationId = None) -> None:
-        """Send a status unless its level is below the one that the page requested."""
+        """Send a status to the page unless its level is below the level that the page requested.
+
+        Args:
+            level: Level of the status.
+            sentence: Message for the page.
+            id_: Id of the operation that caused the status, if any.
+        """
         if LEVELS.index(level) < LEVELS.index(self.level):
             return
         if self._send_status is not None:

@@ -1,4 +1,4 @@
-"""Properties of a handshake: the client's address and origin."""
+"""Address and origin of a client, from its WebSocket handshake."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def is_handshake(request: Request) -> bool:
 
 
 def own_origin(connection: ServerConnection) -> str:
-    """Return the origin of the server's own pages, at the address that the client chose.
+    """Return the origin of the server's own pages at the address to which the client connected.
 
     The host is always numeric, because another site can make its own host name resolve to this computer.
     """
@@ -24,7 +24,7 @@ def own_origin(connection: ServerConnection) -> str:
 
 
 def host_of(connection: ServerConnection) -> str:
-    """Return the address of the client without the port."""
+    """Return the IP address of the client, without the port."""
     return address_of(connection).rpartition(":")[0]
 
 
@@ -35,6 +35,6 @@ def origin_of(connection: ServerConnection) -> str | None:
 
 
 def address_of(connection: ServerConnection) -> str:
-    """Return the address of the client with the port."""
+    """Return the IP address and port of the client."""
     address = connection.remote_address
     return f"{address[0]}:{address[1]}" if isinstance(address, tuple) else str(address)

@@ -1,4 +1,4 @@
-"""Blocked pages, which the user of the server disconnected and which may not connect again."""
+"""Blocked pages: pages that the user disconnected and that may not connect again."""
 
 from __future__ import annotations
 
@@ -29,7 +29,12 @@ class BlockedPages:
         self._visitors: dict[int, _Visitor] = {}
 
     def add(self, page_id: int, connection: ServerConnection) -> None:
-        """Block a page. Beyond 100 pages, the page that was blocked first is removed."""
+        """Block a page. When more than 100 pages are blocked, the page blocked first is unblocked.
+
+        Args:
+            page_id: Id of the page, for `remove`.
+            connection: Connection of the page.
+        """
         with self._lock:
             self._visitors[page_id] = _visitor(connection, connection.request)
             while len(self._visitors) > _MAX_PAGES:
@@ -41,7 +46,7 @@ class BlockedPages:
             self._visitors.pop(page_id, None)
 
     def is_blocked(self, connection: ServerConnection, request: Request) -> bool:
-        """Return True if the page that sent this handshake is blocked."""
+        """Return True if the page that sent a handshake is blocked."""
         with self._lock:
             return _visitor(connection, request) in self._visitors.values()
 

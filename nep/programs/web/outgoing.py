@@ -1,4 +1,7 @@
-"""Encoding of operations to a page as WebSocket messages, compressed or fragmented. No input or output."""
+"""Encoding of operations for a page as WebSocket messages, with compression and fragments.
+
+Performs no input or output.
+"""
 
 from __future__ import annotations
 
@@ -33,19 +36,30 @@ _TYPED_ARRAYS = {
     "int8": (72, "b"), "uint16": (69, "H"), "uint32": (70, "I"), "uint64": (71, "Q"), "int16": (77, "h"),
     "int32": (78, "i"), "int64": (79, "q"), "float32": (85, "f"), "float64": (86, "d"),
 }  # fmt: skip
-"""Tags of little-endian typed arrays (RFC 8746), and the type codes of `array`."""
+"""Tag of the little-endian typed array (RFC 8746) and type code of `array`, by ROS type."""
 _fragment_numbers = itertools.count(1)
 
 
 class Frame(NamedTuple):
-    """WebSocket message."""
+    """WebSocket message.
+
+    Attributes:
+        data: Content; UTF-8 for text.
+        is_text: True for a text message, False for a binary message.
+    """
 
     data: bytes
     is_text: bool
 
 
 class EncodingOptions(NamedTuple):
-    """Form in which a page requests its messages."""
+    """Encoding that a page requests for its messages.
+
+    Attributes:
+        compression: Compression of the messages.
+        fragment_size: Maximum number of characters in a message to the page; None for no limit.
+        as_pixels: Send images as the pixels of ``sensor_msgs/Image``.
+    """
 
     compression: Compression = "none"
     fragment_size: int | None = None
@@ -55,7 +69,13 @@ class EncodingOptions(NamedTuple):
 def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[Frame]:
     """Encode a message of a topic for a subscriber.
 
-    Raises `NepError` if the message can't be decoded or has no such form.
+    Args:
+        topic: Name of the topic.
+        message: Message to encode.
+        form: Encoding that the page requests.
+
+    Raises:
+        NepError: The message can't be decoded, or can't be encoded in this form.
     """
     if form.compression == "cbor-raw":
         secs, nsecs = divmod(message.stamp_ns or time.time_ns(), _NS_PER_S)
@@ -76,7 +96,7 @@ def publish_frames(topic: str, message: Message, form: EncodingOptions) -> list[
 
 
 def operation_frames(operation: Mapping[str, object], form: EncodingOptions) -> list[Frame]:
-    """Encode another operation, such as the reply of a service. Raises `EncodeError`."""
+    """Encode any other operation, such as the reply of a service. Raises `EncodeError`."""
     if form.compression in {"cbor", "cbor-raw"}:
         return [Frame(_cbor(operation), is_text=False)]
     return _text_frames(json_bytes(operation), form)
@@ -99,7 +119,7 @@ def _text_frames(text: bytes, form: EncodingOptions) -> list[Frame]:
 
 
 def _json_payload(message: Message) -> bytes | None:
-    """Return a JSON payload unchanged if it is valid for pages, else None."""
+    """Return the data of a JSON message if pages can parse it, else None."""
     data = bytes(message.data)
     if json_is_too_deep(data):
         return None
@@ -136,7 +156,7 @@ def _with_typed_arrays(msg: Mapping[str, object], definition: Definition) -> obj
 
 
 def _typed_array_fields(value: object, kinds: list[tuple[str, FieldKind]]) -> dict[str, object]:
-    """Return the fields of a map that are, or contain, arrays of numbers, converted to typed arrays."""
+    """Return the fields of a map that contain arrays of numbers, converted to typed arrays."""
     packed: dict[str, object] = {}
     if not isinstance(value, Mapping):
         return packed
@@ -155,7 +175,7 @@ def _typed_array_fields(value: object, kinds: list[tuple[str, FieldKind]]) -> di
 
 
 def _pack_typed_array(values: object, kind: str) -> object:
-    """Convert a list of numbers to a typed array; `null`, which represents NaN in JSON, becomes NaN."""
+    """Convert a list of numbers to a typed array, in which `null` (NaN in JSON) becomes NaN."""
     tag, letter = _TYPED_ARRAYS[kind]
     if not isinstance(values, list):
         return values

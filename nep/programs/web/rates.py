@@ -1,4 +1,4 @@
-"""`RateMeter`: messages and bytes per second over the last two seconds. No input or output."""
+"""`RateMeter`: messages and bytes per second over the last two seconds. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ _WINDOW_S = _SLOT_S * _SLOTS
 
 
 class RateMeter:
-    """Sliding window of counters with slots of half a second; counting takes a few additions.
+    """Meter of message and byte rates over a sliding window of two seconds.
 
-    Call `count` in one thread. `rates` can be called in any thread; if a slot is replaced meanwhile, one
-    value is imprecise.
+    Call `count` in one thread. `rates` can be called in any thread; its result may be slightly imprecise
+    while `count` is running.
+
+    Args:
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -33,7 +36,7 @@ class RateMeter:
         self._slots[number % len(self._slots)] = number, messages + 1, size + size_bytes
 
     def rates(self) -> tuple[float, float]:
-        """Return messages and bytes per second; 0 during the first half second."""
+        """Return messages and bytes per second; (0, 0) during the first half second."""
         now = self._clock()
         current = int(now / _SLOT_S)
         begin = current - _SLOTS

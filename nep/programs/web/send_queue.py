@@ -1,8 +1,8 @@
-"""Send queue of a page: messages of topics, which can be dropped, and other messages, which can't.
+"""Send queue of a page, for messages of topics, which can be dropped, and for other messages.
 
-A `Feed` contains the messages of one topic, limited as the page's subscriptions request. `SendQueue` serves
-all feeds of a page in turn, so that a topic with many messages does not delay the others. Used in the event
-loop's thread only.
+A `Feed` contains the messages of one topic, within the limits that the page's subscriptions request.
+`SendQueue` serves all feeds of a page in turn, so that a topic with many messages does not delay the others.
+Used in the event loop's thread only.
 """
 
 from __future__ import annotations
@@ -21,23 +21,31 @@ from nep.programs.web.outgoing import EncodingOptions, Frame
 from nep.programs.web.rates import RateMeter
 
 _MAX_QUEUED_IMAGES = 4
-"""Maximum queue length for images if the page doesn't set a limit; longer queues would only add delay."""
+"""Maximum number of queued images if the page doesn't request a queue length.
+
+A longer queue would only add delay.
+"""
 _MAX_LATCHED_BYTES = MAX_QUEUED_BYTES // 4
-"""Maximum size of a topic's latched messages that are kept for further subscriptions of a page."""
+"""Maximum size in bytes of a topic's latched messages, which are sent to further subscriptions of a page."""
 
 
 class QueuedMessage(NamedTuple):
-    """Message and the feed that contained it."""
+    """Message taken from a feed."""
 
     feed: Feed
     message: Message
 
 
 class Feed:
-    """Queue of messages of one topic to a page. The oldest are dropped if the page is too slow.
+    """Queue of a topic's messages to a page. If the page is too slow, the oldest messages are dropped.
 
     Several subscriptions of the page share one feed, with the shortest throttle time, the longest queue and
     the smallest fragments.
+
+    Args:
+        topic: Name of the topic.
+        msg_type: Message type, which determines the default queue length.
+        clock: Monotonic clock in seconds.
     """
 
     def __init__(self, topic: str, msg_type: str = "", clock: Callable[[], float] = time.monotonic) -> None:
@@ -68,7 +76,14 @@ class Feed:
         return len(self._wishes)
 
     def subscribe(self, wish: Subscribe, *, as_pixels: bool) -> None:
-        """Add or replace a subscription. Latched messages are sent again for each further subscription."""
+        """Add a subscription, or replace the one with the same id.
+
+        A further subscription receives the latched messages again.
+
+        Args:
+            wish: Subscription that the page requests.
+            as_pixels: Send images as the pixels of ``sensor_msgs/Image``.
+        """
         if self._wishes and wish.id not in self._wishes:
             for each in tuple(self._latched.values()):
                 self.add(each)
@@ -76,7 +91,11 @@ class Feed:
         self._update_options(as_pixels=as_pixels)
 
     def unsubscribe(self, id_: OperationId) -> bool:
-        """End the subscription with this id, or all if the id is None; return True if there was one."""
+        """End the subscription with an id, or all subscriptions if the id is None.
+
+        Returns:
+            False if there was no such subscription.
+        """
         found = bool(self._wishes) if id_ is None else id_ in self._wishes
         if id_ is None:
             self._wishes.clear()
@@ -96,7 +115,7 @@ class Feed:
         self._capacity = longest or (1 if self._throttle_s else self._default_capacity)
 
     def add(self, message: Message) -> None:
-        """Append a message; drop the oldest beyond the queue's length."""
+        """Append a message, and drop the oldest ones that exceed the queue length."""
         if message.is_latched:
             self._store_latched(message)
         self._messages.append(message)
@@ -111,7 +130,7 @@ class Feed:
             del self._latched[next(iter(self._latched))]
 
     def drop_oldest(self) -> None:
-        """Drop the oldest message and count it."""
+        """Drop the oldest message and update the counts."""
         self.size_bytes -= self._messages.popleft().size_bytes
         if self._throttle_s:
             self.throttled_count += 1
@@ -121,16 +140,20 @@ class Feed:
 
     @property
     def max_rate_hz(self) -> float | None:
-        """Maximum messages per second that the page requested; None for no limit."""
+        """Maximum number of messages per second that the page requested; None for no limit."""
         return 1 / self._throttle_s if self._throttle_s else None
 
     @property
     def next_at(self) -> float:
-        """Time from which the next message may be taken, on the clock of `pop`."""
+        """Earliest time at which the next message may be taken, on the clock of `pop`."""
         return self._next_at
 
     def pop(self, now: float) -> Message:
-        """Remove and return the oldest message."""
+        """Remove and return the oldest message.
+
+        Args:
+            now: Current time in seconds, from which the throttle time is counted.
+        """
         message = self._messages.popleft()
         self.size_bytes -= message.size_bytes
         self._next_at = now + self._throttle_s
@@ -144,13 +167,13 @@ class Feed:
 
 
 class SendQueue:
-    """Queue of everything to be sent to one page.
+    """Queue of all messages to be sent to one page.
 
     Args:
-        clock: Clock of the event loop.
-        on_overflow: Called once when messages that can't be dropped exceed their limit, because the page does
-            not read. Nothing more is sent then.
-        max_bytes: Maximum size of all queued messages of topics.
+        clock: Clock of the event loop in seconds.
+        on_overflow: Called once when messages that can't be dropped exceed their limit, because the page
+            does not read. After this, nothing more is sent.
+        max_bytes: Maximum total size in bytes of queued messages of topics.
     """
 
     def __init__(
@@ -183,7 +206,7 @@ class SendQueue:
     def add(self, feed: Feed, message: Message) -> None:
         """Append a message of a topic.
 
-        Beyond the limit, the oldest message of the largest feed is dropped.
+        When the size limit is exceeded, the oldest message of the largest feed is dropped.
         """
         feed.add(message)
         self.activate(feed)
@@ -196,7 +219,7 @@ class SendQueue:
                 self._active.remove(largest)
 
     def activate(self, feed: Feed) -> None:
-        """Include a feed in the turns, because it may contain messages."""
+        """Add a feed that has messages to the feeds that are served in turn."""
         if len(feed) and feed not in self._active:
             self._active.append(feed)
         self._is_filled.set()

@@ -1,4 +1,4 @@
-"""`WebServer`: serves pages and programs in a background thread with an event loop."""
+"""`WebServer`: serves web pages and programs in a background thread with an event loop."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ if TYPE_CHECKING:
 
 
 DEFAULT_PORT = 9090
-"""Default port of rosbridge."""
+"""Default TCP port, as in rosbridge."""
 _logger = logging.getLogger("nep.programs.web")
 _LOOPBACK = "127.0.0.1"
 _NODE_NAME = "nep_web"
 _REFRESH_S = 1.0
-"""Interval in seconds at which the guard checks for new robots while pages are connected."""
+"""Interval in seconds at which the motion guard checks for new robots while pages are connected."""
 _MASTER_TIMEOUT_S = 2.0
 _OPEN_TIMEOUT_S = 5.0
 _CLOSE_TIMEOUT_S = 2.0
@@ -58,21 +58,22 @@ _JOIN_TIMEOUT_S = 10.0
 _POLICY_VIOLATION = 1008
 _MAX_REFUSALS = 50
 LANGUAGE = "web"
-"""Language of pages' nodes in the graph, by which other programs recognize them."""
+"""Language of the pages' nodes in the graph, by which other programs recognize pages."""
 _MAX_UNAUTHENTICATED = 16
-"""Maximum number of connections without a token that may still send an ``auth`` operation."""
+"""Maximum number of connections without a token that wait for an ``auth`` operation."""
 
 
 @dataclass(frozen=True)
 class WebSettings:
-    """Settings of a server.
+    """Settings of a `WebServer`.
 
     Attributes:
-        port: TCP port; 0 for a free one.
-        listen: Further addresses of this computer at which other computers can connect. They require a token.
-        access: Access rules.
+        port: TCP port; 0 for any free port.
+        listen: Further addresses of this computer at which other computers can connect. They require a
+            token.
+        access: Rules that decide which pages may connect.
         allow_moving: Names of the robots that pages may move.
-        master: Address of the master.
+        master: Address of the master; None for the default.
         transport: Name of the back end.
     """
 
@@ -85,7 +86,7 @@ class WebSettings:
     foxglove: ChannelFormat | None = None
     """Encoder for clients of Foxglove's WebSocket protocol; None rejects these clients."""
     rosbridge: bool = True
-    """True to serve rosbridge clients, which are all clients without Foxglove's subprotocol."""
+    """True to accept rosbridge clients, which are all clients without Foxglove's subprotocol."""
 
     @property
     def hosts(self) -> tuple[str, ...]:
@@ -107,13 +108,10 @@ class _Rejection(NamedTuple):
 
 
 class WebServer:
-    """WebSocket server, running from `start` until `close`. Usable as a context manager.
+    """WebSocket server that runs from `start` until `close`. Usable as a context manager.
 
     Each page has a node with the ``language`` "web" in the graph (`NodeInfo.language`) and the name
     `ConnectedPage.name`. The server's own node is "nep_web" with the language "Python".
-
-    `start` raises `AddressInUseError`, and `NepError` for an address that this computer doesn't have or if
-    the libraries are not installed.
     """
 
     def __init__(self, settings: WebSettings) -> None:
@@ -155,24 +153,25 @@ class WebServer:
 
     @property
     def pages(self) -> tuple[ConnectedPage, ...]:
-        """Connected pages and programs, in the order of their connection. Thread-safe."""
+        """Connected pages and programs, in the order in which they connected. Thread-safe."""
         pages = sorted(self._pages.copy(), key=lambda page: page.id)
         return tuple(each.snapshot for each in pages if not each.is_closing)
 
     @property
     def refusals(self) -> tuple[Refusal, ...]:
-        """Latest rejected connections and messages, the newest one last. Thread-safe.
+        """Latest rejected connections and messages, oldest first. Thread-safe.
 
-        A repeated rejection, such as of a page that reconnects, is listed once with its last time.
+        A repeated rejection, such as of a page that reconnects, is listed once with the time of the last
+        one.
         """
         return self._refusals
 
     def disconnect(self, page_id: int) -> None:
-        """Close the connection of a page without waiting; the page may connect again. Thread-safe."""
+        """Close the connection of a page without waiting. The page may connect again. Thread-safe."""
         self._disconnect(lambda page, _access: page.id == page_id, "disconnected by the user of the server")
 
     def block_page(self, page_id: int) -> None:
-        """Disconnect a page, and reject its connections until `unblock_page` is called. Thread-safe.
+        """Disconnect and block a page until `unblock_page` is called. Thread-safe.
 
         A page is identified by its address, origin and User-Agent. Other connected pages with the same
         identity stay connected.
@@ -183,15 +182,14 @@ class WebServer:
             self.disconnect(page_id)
 
     def unblock_page(self, page_id: int) -> None:
-        """Allow a page that `block_page` disconnected to connect again. Thread-safe."""
+        """Unblock a page that `block_page` has blocked. Thread-safe."""
         self._kept_out.remove(page_id)
 
     def set_access(self, access: Access) -> int:
         """Replace the access rules; return the number of pages that are disconnected. Thread-safe.
 
-        Pages that the new rules don't allow are disconnected: those of a removed origin, and those that
-        connected with another token or without one. All others stay connected. Raises `NepError` for rules
-        without a token if other computers can connect.
+        A page is disconnected if its origin is no longer allowed, or if it connected without the new token.
+        Raises `NepError` for rules without a token if other computers can connect.
         """
         check_token(replace(self.settings, access=access))
         with self._lock:
@@ -204,7 +202,10 @@ class WebServer:
             )
 
     def set_allow_moving(self, names: Collection[str]) -> None:
-        """Replace the names of robots that pages may move, also for connected pages. Thread-safe."""
+        """Replace the names of the robots that pages may move. Thread-safe.
+
+        The names also apply to connected pages.
+        """
         with self._lock:
             self.settings = replace(self.settings, allow_moving=frozenset(names))
             if self._guard is not None:
@@ -216,8 +217,8 @@ class WebServer:
         Thread-safe.
 
         Args:
-            channels: A `nep.recordings.formats.channels.LiveChannels`; None disables the protocol and
-                disconnects its clients.
+            channels: Encoder of messages, such as `nep.recordings.formats.channels.LiveChannels`; None
+                disables the protocol and disconnects its clients.
         """
         with self._lock:
             self.settings = replace(self.settings, foxglove=channels)
@@ -251,7 +252,13 @@ class WebServer:
         return len(found)
 
     def start(self) -> Self:
-        """Start the thread and return when pages can connect."""
+        """Start the server and wait until pages can connect.
+
+        Raises:
+            AddressInUseError: The port is in use.
+            NepError: The libraries are not installed, this computer doesn't have an address, or a token is
+                required.
+        """
         check_installed()
         check_token(self.settings)
         for host in self.settings.listen:
@@ -368,7 +375,10 @@ class WebServer:
         )
 
     async def _watch_robots(self, guard: MotionGuard) -> None:
-        """Poll the graph while pages are connected: a robot may appear after a page advertised its topic."""
+        """Poll the graph while pages are connected.
+
+        A robot may appear after a page has advertised its topic.
+        """
         loop = asyncio.get_running_loop()
         stop = self._stop
         with ThreadPoolExecutor(1, "nep-web-robots") as thread:
@@ -381,7 +391,7 @@ class WebServer:
     # ---- who connects
 
     def _refusal(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Return the response to a rejected handshake or an HTTP request; None accepts a handshake."""
+        """Return the response to a rejected handshake or to an HTTP request; None accepts a handshake."""
         if not is_handshake(request):
             return self._page_response(connection, request)
         access = self.settings.access
@@ -410,7 +420,7 @@ class WebServer:
         return connection.respond(refusal.status, refusal.message + "\n")
 
     def _page_response(self, connection: ServerConnection, request: Request) -> Response:
-        """Respond to an HTTP request for one of the server's own pages."""
+        """Return the response to an HTTP request for one of the server's own pages."""
         from websockets.datastructures import Headers  # noqa: PLC0415 - only this command needs it
         from websockets.http11 import Response  # noqa: PLC0415 - only this command needs it
 
@@ -456,7 +466,7 @@ class WebServer:
     def _subprotocol(
         self, _connection: ServerConnection, offered: Sequence[Subprotocol]
     ) -> Subprotocol | None:
-        """Select Foxglove's subprotocol if the client offers it; rosbridge has none."""
+        """Return Foxglove's subprotocol if the client offers it, else None (rosbridge has no subprotocol)."""
         if self.settings.foxglove is None:
             return None
         return next((each for each in offered if each in SUBPROTOCOLS), None)
@@ -566,7 +576,7 @@ def check_token(settings: WebSettings) -> None:
 
 
 def check_own_address(host: str) -> None:
-    """Raise `NepError` if this computer doesn't have the address.
+    """Raise `NepError` if this computer doesn't have an address.
 
     asyncio of Python 3.13 silently ignores such an address if another one can be bound.
     """
@@ -578,16 +588,21 @@ def check_own_address(host: str) -> None:
 
 
 def node_name(origin: str | None, address: str) -> str:
-    """Return the name for a page's node: its origin and port, or the address of a program."""
+    """Return the node name for a page or program.
+
+    Args:
+        origin: Origin of the page; None for a program.
+        address: IP address and port of the client.
+    """
     host = urlsplit(origin).netloc if origin else ""
     port = address.rpartition(":")[2]
     return escaped(f"web_{host}_{port}" if host else f"web_{address}")[:150]
 
 
 def _quiet_logger() -> logging.Logger:
-    """Return a logger that discards the websockets library's records.
+    """Return a logger that discards the records of the websockets library.
 
-    The library logs each failed handshake with a traceback, so port scanners would fill the log.
+    The library logs each failed handshake with a traceback, so that port scanners would fill the log.
     """
     logger = logging.getLogger("nep.programs.web.connections")
     logger.setLevel(logging.CRITICAL)

@@ -1,4 +1,4 @@
-"""Display names of connected pages: client, kind of device and title, from the handshake. No I/O."""
+"""Display names of connected pages, from their handshakes: client, device and title. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _CLIENTS = (
     ("Chrome/", "Chrome"),
     ("Safari/", "Safari"),
 )
-"""Substrings of User-Agents and client names, in order of priority.
+"""Client names by the substring of the User-Agent that identifies them, in order of priority.
 
-Most browsers also claim to be Chrome and Safari.
+The order matters because most browsers also claim to be Chrome and Safari.
 """
 _PRODUCT = re.compile(r"[A-Za-z][\w.+-]*")
 
@@ -36,8 +36,8 @@ def client_name(user_agent: str, *, is_foxglove: bool = False) -> str:
     """Return the name of the client program; "" if unknown.
 
     Args:
-        user_agent: User-Agent header, which is untrusted. A program's own name is bounded in length.
-        is_foxglove: True if the client uses Foxglove's protocol; "Foxglove" is then the default name.
+        user_agent: User-Agent header, which is untrusted. Names of programs are shortened.
+        is_foxglove: True if the client uses Foxglove's protocol, for which "Foxglove" is the default name.
     """
     given = user_agent[:_MAX_READ_LENGTH]
     if is_foxglove:
@@ -61,9 +61,9 @@ def page_title(path: str, referer: str, origin: str) -> str:
     """Return a short title for a page, such as "buttons.html"; "" if there is none.
 
     Args:
-        path: Path of the WebSocket URL. Its parameter ``title`` has priority.
-        referer: URL of the page, which few browsers send; its last path segment is used next.
-        origin: Origin of the page, which every browser sends; its host and port are used last.
+        path: Path of the WebSocket URL. Its parameter ``title`` has the highest priority.
+        referer: URL of the page, which few browsers send. Its last path segment has the second priority.
+        origin: Origin of the page, which every browser sends. Its host and port have the lowest priority.
     """
     for title in (_title_parameter(path), _last_part(referer), _host(origin)):
         if shown := escaped(title.strip())[:MAX_SHOWN_LENGTH]:

@@ -1,1 +1,1 @@
-"""Reading recordings in a separate process, and the frames exchanged with this process."""
+"""Reading of recordings in a separate process, and the frames exchanged with that process."""

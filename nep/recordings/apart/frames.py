@@ -1,4 +1,4 @@
-"""Frames exchanged with the reader process: msgpack maps with a length prefix."""
+"""Frames exchanged with the reader process: msgpack maps with a prefix that contains the length."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_FRAME_BYTES = 2**31 - 1
 
 
 def write_frame(stream: IO[bytes], content: Mapping[str, object]) -> None:
-    """Write a frame and flush. Raises `OSError`, or `ValueError` if the stream is closed."""
+    """Write a frame and flush the stream. Raises `OSError`, or `ValueError` if the stream is closed."""
     packed = pack(content)
     stream.write(_LENGTH.pack(len(packed)))
     stream.write(packed)
@@ -42,7 +42,7 @@ def read_frame(stream: IO[bytes]) -> dict[str, object] | None:
 
 
 def pack_messages(messages: Iterable[RawMessage]) -> bytes:
-    """Encode messages as consecutive MCAP records, to be read with `messages_in`."""
+    """Encode messages as consecutive MCAP records, which `messages_in` decodes."""
     pieces: list[bytes | memoryview] = []
     for raw in messages:
         size = raw.data.nbytes
@@ -51,17 +51,17 @@ def pack_messages(messages: Iterable[RawMessage]) -> bytes:
 
 
 def corruption_to_plain(damage: Iterable[CorruptRange]) -> list[dict[str, object]]:
-    """Convert damage to plain values for a frame."""
+    """Convert the damage of a file to plain values for a frame."""
     return [asdict(each) for each in damage]
 
 
 def corruption_from_plain(plain: object) -> tuple[CorruptRange, ...]:
-    """Convert plain values of a frame to damage. Raises `TypeError` for invalid data."""
+    """Convert plain values of a frame to the damage of a file. Raises `TypeError` for invalid data."""
     return tuple(CorruptRange(**each) for each in plain) if isinstance(plain, list) else ()
 
 
 def facts_to_plain(facts: FileFacts) -> dict[str, object]:
-    """Convert the facts about a file to plain values for a frame."""
+    """Convert the properties of a file to plain values for a frame."""
     return {
         **{name: getattr(facts, name) for name in _SCALAR_FIELDS},
         "channels": {
@@ -86,7 +86,10 @@ _SCALAR_FIELDS = ("start_ns", "end_ns", "size_bytes", "is_complete", "profile", 
 
 
 def facts_from_plain(plain: object) -> FileFacts:
-    """Convert plain values of a frame to facts. Raises `TypeError` or `KeyError` for invalid data."""
+    """Convert plain values of a frame to the properties of a file.
+
+    Raises `TypeError` or `KeyError` for invalid data.
+    """
     if not isinstance(plain, dict):
         raise TypeError("facts")
     definitions = {

@@ -1,8 +1,8 @@
 """Process that reads recordings for another program: `python -m nep.recordings.apart.reader_process`.
 
 Recordings may be untrusted, so Studio reads them in this process, whose memory is limited and which can be
-killed at any time. Requests are frames (`nep.recordings.apart.frames`) on standard input, one at a time. Each
-request gets any number of progress frames and one reply frame.
+killed at any time. Requests are frames (`nep.recordings.apart.frames`) on standard input, executed one at a
+time. The reply to a request is any number of progress frames and one reply frame.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ Reply = Mapping[str, object]
 
 
 class RecordingService:
-    """Executor of requests.
+    """Executor of the requests of another process.
 
     Args:
-        tell: Called with progress frames.
+        tell: Called with the content of progress frames.
     """
 
     def __init__(self, tell: Callable[[Reply], object]) -> None:
@@ -60,7 +60,7 @@ class RecordingService:
         }
 
     def reply(self, request: Mapping[str, Any]) -> Reply:
-        """Execute a request and return the reply. Errors are returned, not raised."""
+        """Execute a request and return the reply. Errors are returned in the reply, not raised."""
         path = str(request.get("path", ""))
         try:
             answer = dict(self._operations[request["op"]](request))
@@ -166,14 +166,19 @@ def _limit_memory(limit_mb: int) -> None:
 
 
 def serve(requests: IO[bytes], answers: IO[bytes]) -> None:
-    """Execute requests until the input stream ends."""
+    """Execute requests until the input stream ends.
+
+    Args:
+        requests: Stream of request frames.
+        answers: Stream to which progress and reply frames are written.
+    """
     service = RecordingService(lambda content: write_frame(answers, content))
     while (request := read_frame(requests)) is not None:
         write_frame(answers, service.reply(request))
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the process: execute requests from standard input until it ends."""
+    """Run the process: execute requests from standard input until the input ends."""
     parser = argparse.ArgumentParser(prog="nep.recordings.apart.reader_process")
     parser.add_argument("--memory-mb", type=int, default=1024)
     _limit_memory(parser.parse_args(arguments).memory_mb)

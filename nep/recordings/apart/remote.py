@@ -1,6 +1,6 @@
 """Client of the process that reads recordings (`nep.recordings.apart.reader_process`).
 
-If the process takes too long, needs too much memory or crashes, reading its files raises `RecordingError`.
+If the process takes too long, needs too much memory or crashes, reads from its files raise `RecordingError`.
 Opening the next file starts a new process.
 """
 
@@ -35,12 +35,12 @@ _FIRST_BATCH, _GROWTH, _MAX_BATCH = 16, 4, 4_096
 class ReaderProcess:
     """Process that reads recordings. Thread-safe; usable as a context manager.
 
-    Requests are executed one at a time. Iteration requests at most a megabyte at a time, so that other
+    Requests are executed one at a time. Iterators request at most a megabyte at a time, so that other
     requests don't wait long.
     """
 
     def __init__(self, command: Sequence[str], *, timeout_s: float = _REQUEST_TIMEOUT_S) -> None:
-        """Initialize without starting a process.
+        """Store the settings; the process is started by `open`.
 
         Args:
             command: Command line of `nep.recordings.apart.reader_process`.
@@ -64,9 +64,11 @@ class ReaderProcess:
 
         Args:
             path: File to open.
-            cache_bytes: Maximum size of decompressed chunks that the process caches.
-            progress: As for `Recording`; an exception kills the process and propagates.
-            budget: Maximum work for the file in bytes and seconds, including opening.
+            cache_bytes: Maximum size of the decompressed chunks that the process caches.
+            progress: Called with bytes done and in total while the file is scanned. An exception kills the
+                process and propagates.
+            budget: Maximum work for the file, including opening, as (bytes, seconds); None limits only
+                opening.
 
         Raises:
             RecordingError: The file can't be opened, or the process can't be started.
@@ -99,7 +101,10 @@ class ReaderProcess:
 
 
 class _Pipe:
-    """Process with its pipes. A thread reads the replies, so that waiting for a reply can time out."""
+    """Running process with its pipes.
+
+    A thread reads the replies, so that waiting for a reply can time out.
+    """
 
     def __init__(self, command: Sequence[str], path: Path) -> None:
         try:

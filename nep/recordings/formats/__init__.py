@@ -1,4 +1,4 @@
 """File format of recordings: records, chunks, channels, indexes, limits and damage.
 
-The parent package reads, plays, repairs and exports messages.
+The parent package uses these modules to read, play, repair and export recordings.
 """

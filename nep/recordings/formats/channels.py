@@ -1,7 +1,7 @@
-"""Channels of a recording: encodings from which messages can be restored exactly.
+"""Channels of a recording, with encodings from which messages can be restored exactly.
 
-A channel contains similar messages of one publisher on one topic. The channel's metadata has their common
-properties (codec, type, publisher, latched). A record has the log time (time of receipt), the publish time
+A channel contains messages of one publisher on one topic that have the same codec, type and latched flag;
+these properties are in the channel's metadata. A record has the log time (time of receipt), the publish time
 (time stamp) and the lower half of the sequence number. JSON and msgpack are stored as received. Images, text
 and bytes are stored in a Protocol Buffers message that contains them unchanged
 (`nep.recordings.formats.protobuf`). Other data, such as invalid JSON, is wrapped in such a message, too;
@@ -34,7 +34,7 @@ from nep.recordings.formats.records import RawMessage
 from nep.recordings.formats.schemas import schema_of
 
 METADATA_PREFIX = "nep."
-"""Prefix of metadata keys that nep uses."""
+"""Prefix of nep's keys in the metadata of channels."""
 _U32, _U64 = 2**32 - 1, 2**64 - 1
 Role = str
 OWN_TOPICS: Mapping[Role, str] = {
@@ -44,12 +44,24 @@ OWN_TOPICS: Mapping[Role, str] = {
     "runs": "/nep/recording/runs",
     "alarms": "/nep/recording/alarms",
 }
-"""Topics of the recorder's own entries by role: counts, alerts, notes, and events of runs and alarms."""
+"""Topics of the entries that the recorder itself writes, by role.
+
+The entries are message counts, alerts, notes, and events of runs and alarms.
+"""
 
 
 @dataclass(frozen=True)
 class ChannelDefinition:
-    """Channel and its schema as stored in the file."""
+    """Channel and its schema, as stored in the file.
+
+    Attributes:
+        topic: Name of the topic.
+        message_encoding: Encoding of the messages, such as "json".
+        schema_name: Name of the message type.
+        schema_encoding: Encoding of the schema, such as "jsonschema"; "" without a schema.
+        schema_data: Encoded schema.
+        metadata: Keys and values of the channel's metadata.
+    """
 
     topic: str
     message_encoding: str
@@ -66,7 +78,7 @@ class Encoding(NamedTuple):
         form: Name of the encoding, such as "json" or "picture".
         before: Bytes that precede the message's data.
         sequence: Sequence number in the record.
-        publish_ns: Publish time in the record.
+        publish_ns: Publish time in the record (ns since 1970).
         is_decodable: True if the message can be decoded.
     """
 
@@ -76,7 +88,7 @@ class Encoding(NamedTuple):
     publish_ns: int
     is_decodable: bool
     is_self_contained: bool = False
-    """True if the record contains its publisher and type, because the recording has too many channels."""
+    """True if the record contains its publisher and type, because its publisher has no channel."""
 
 
 _SCHEMAS = {"picture": "foxglove.CompressedImage", "raw": "foxglove.RawImage", "text": "nep.Text"}
@@ -91,9 +103,12 @@ _VIEWABLE_LAYOUTS = frozenset({
 
 
 def encoding_of(message: Message, log_ns: int, *, is_self_contained: bool = False) -> Encoding:
-    """Return the encoding of a message received at `log_ns`. Never raises.
+    """Return the encoding of a message. Never raises.
 
-    With `is_self_contained`, the record contains all properties, because its publisher has no channel.
+    Args:
+        message: Message to store.
+        log_ns: Time of receipt in ns since 1970.
+        is_self_contained: Store all properties in the record, because its publisher has no channel.
     """
     seq, stamp = message.seq, message.stamp_ns
     codec, extension = message.kind.codec, message.extension
@@ -193,7 +208,7 @@ def _pixel_bytes(numbers: str, channels: int) -> int:
 
 
 def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
-    """Return the channel for a message with this encoding."""
+    """Return the channel in which a message with this encoding is stored."""
     kind, form = message.kind, encoding.form
     metadata = [("nep.form", form)]
     if not encoding.is_self_contained:
@@ -218,7 +233,7 @@ def definition_of(message: Message, encoding: Encoding) -> ChannelDefinition:
 
 
 def own_channel(role: Role) -> ChannelDefinition:
-    """Return the JSON channel for the recorder's own entries of a role."""
+    """Return the channel for the recorder's own entries of a role, encoded as JSON."""
     topic = OWN_TOPICS[role]
     return ChannelDefinition(
         topic, "json", f"nep/{role}", "jsonschema", b'{"type":"object"}', (("nep.role", role),)
@@ -226,7 +241,7 @@ def own_channel(role: Role) -> ChannelDefinition:
 
 
 class LiveChannels:
-    """Channels of live topics, for clients that use the encodings of recordings (`nep web --foxglove`)."""
+    """Encoder of live messages as in a recording, for clients of `nep web --foxglove`."""
 
     _FORMS: ClassVar[Mapping[str, str]] = {
         "json": "json", "msgpack": "msgpack", "string": "text", "image": "picture",
@@ -240,7 +255,11 @@ class LiveChannels:
         return definition_of(message, Encoding(form, b"", 0, 0, is_decodable=True))
 
     def encode(self, message: Message, log_ns: int) -> tuple[ChannelDefinition, bytes]:
-        """Return the channel of a message that was received at `log_ns`, and the message's encoded data.
+        """Return the channel of a message, and the message's encoded data.
+
+        Args:
+            message: Message to encode.
+            log_ns: Time of receipt in ns since 1970.
 
         Raises:
             DecodeError: The message is malformed. A recorder stores such messages, but a client can't show
@@ -256,7 +275,11 @@ class LiveChannels:
 
 
 class ChannelDecoder:
-    """Decoder for the records of one channel. Supports recordings of other programs as far as possible."""
+    """Decoder for the records of one channel, which supports many recordings of other programs.
+
+    Args:
+        definition: Channel of the records.
+    """
 
     def __init__(self, definition: ChannelDefinition) -> None:
         self.definition = definition
@@ -296,11 +319,11 @@ class ChannelDecoder:
 
     @property
     def publisher(self) -> int | None:
-        """Id of the publisher, if all messages have the same one."""
+        """Id of the publisher of all messages; None if unknown, or if there are several publishers."""
         return self._publisher
 
     def message(self, raw: RawMessage) -> Message:
-        """Decode a record to the message as it was received; an invalid record becomes a message of bytes."""
+        """Restore the message that was recorded. An invalid record is returned as a message of bytes."""
         kind, data = self._kind, raw.data
         seq = raw.sequence if self._has_seq else None
         stamp = raw.publish_ns if self._has_stamp else None

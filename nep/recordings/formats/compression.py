@@ -1,7 +1,7 @@
-"""Compression of chunks, with limits for decompression. Performs no input or output.
+"""Compression and decompression of chunks, with bounded memory. Performs no input or output.
 
 python-zstandard ignores ``max_output_size`` if a frame declares its size, so the declared size is compared
-with that of the chunk before memory is allocated. Other frames are decompressed as a stream with a limit.
+with the chunk's size before memory is allocated. Other frames are decompressed as a stream with a limit.
 """
 
 from __future__ import annotations
@@ -46,7 +46,12 @@ def check_packages() -> None:
 
 
 def compress(data: bytes, compression: str) -> bytes:
-    """Compress the data of a chunk with "zstd", "lz4" or "" for none."""
+    """Compress the data of a chunk.
+
+    Args:
+        data: Data to compress.
+        compression: "zstd", "lz4", or "" for none.
+    """
     if compression == "zstd":
         return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(data)
     if compression == "lz4":
@@ -56,10 +61,16 @@ def compress(data: bytes, compression: str) -> bytes:
 
 
 def decompress(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """Decompress the records of a chunk, verifying size and CRC.
+    """Decompress the records of a chunk, and verify the size and the CRC.
 
-    Raises `ValueError` if the chunk is damaged or too large. Memory is limited to the declared size plus one
-    step, and the declared size to `max_chunk_bytes`.
+    Memory is limited to the declared size plus one step, and the declared size to `max_chunk_bytes`.
+
+    Args:
+        data: Compressed data.
+        head: Header of the chunk.
+
+    Raises:
+        ValueError: The chunk is damaged or too large.
     """
     size = head.uncompressed_bytes
     if size > max_chunk_bytes(head.data_bytes):
@@ -82,7 +93,12 @@ def decompress(data: memoryview, head: ChunkHead) -> bytes | memoryview:
 
 
 def decompress_partial(data: memoryview, head: ChunkHead) -> bytes | memoryview:
-    """Decompress as many records as the first bytes of a truncated chunk contain, without verification."""
+    """Decompress as many records as possible from a truncated chunk, without verification.
+
+    Args:
+        data: First bytes of the compressed data.
+        head: Header of the chunk.
+    """
     if not head.compression:
         return data
     size = min(head.uncompressed_bytes, max_chunk_bytes(head.data_bytes))

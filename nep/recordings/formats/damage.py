@@ -1,4 +1,4 @@
-"""Summary of the damage of a recording, as a sentence without full stop."""
+"""Formatting of the damage of a recording as text."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ _MAX_RANGES_LISTED = 3
 
 
 def corruption_text(damage: Sequence[CorruptRange], start_ns: int) -> str:
-    """Format a summary of the skipped pieces, their times and the missing messages; "" if there is no damage.
+    """Format the number of skipped places, their times and the missing messages, without full stop.
 
-    Times are in seconds after ``start_ns``, the start of the recording.
+    Args:
+        damage: Damage to describe.
+        start_ns: Start of the recording in ns since 1970, from which times are counted.
+
+    Returns:
+        The text; "" if there is no damage.
     """
     if not damage:
         return ""

@@ -1,4 +1,4 @@
-"""Destination of a recording: a single file, with checks of the file and its disk."""
+"""`OneFile`: destination of a recording in a single file, with checks of the file and its disk."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class WriterLimits:
     Attributes:
         queue_bytes: Maximum size of queued messages.
         queue_messages: Maximum number of queued messages.
-        least_free_bytes: Free disk space below which a recording stops, so that other programs have some
-            left.
-        flush_s: Maximum time until a received message is written to the file.
-        stats_interval_s: Interval at which the counts by topic are written.
+        least_free_bytes: Free disk space at which a recording stops, so that other programs can still
+            write.
+        flush_interval_s: Maximum time in seconds until a received message is written to the file.
+        stats_interval_s: Interval in seconds at which the message counts by topic are written.
     """
 
     queue_bytes: int = 256_000_000
@@ -37,37 +37,45 @@ DEFAULT_LIMITS = WriterLimits()
 
 
 class Destination(Protocol):
-    """Destination of a writer. Called in the writer's thread only."""
+    """Interface to the file or files to which a writer writes. Called in the writer's thread only."""
 
     @property
     def file(self) -> FileWriter:
-        """File that is currently written."""
+        """File to which messages are currently written."""
 
     def on_flushed(self) -> None:
-        """Process the end of a written chunk. Raises `OSError` or `RecordingError`."""
+        """Called after a chunk was written. Raises `OSError` or `RecordingError`."""
 
     @property
     def is_full(self) -> bool:
         """True if the recording should continue in another file."""
 
     def next_file(self) -> None:
-        """Finish the current file, which has its counts and metadata, and open the next one.
+        """Finish the current file and open the next one. Raises the exceptions of `finish`.
 
-        Raises the exceptions of `finish`.
+        The counts and metadata of the current file have already been written.
         """
 
     def check_file(self) -> None:
-        """Check the file and its disk. Called once a second. Raises `RecordingError` if the disk is full."""
+        """Check the file and its disk; called once a second.
+
+        Raises `RecordingError` if the file is missing or the disk is full.
+        """
 
     def finish(self) -> None:
         """Finish the recording. Raises `OSError`."""
 
     def abort(self) -> None:
-        """Close the file without a summary, after an error."""
+        """Close the file without a summary, because an error has occurred."""
 
 
 class OneFile:
-    """Destination with a single file."""
+    """Destination that writes a single file.
+
+    Args:
+        file: Writer of the file.
+        least_free_bytes: Free disk space at which the recording stops.
+    """
 
     def __init__(self, file: FileWriter, least_free_bytes: int) -> None:
         self.file = file
@@ -77,13 +85,13 @@ class OneFile:
     is_full = False
 
     def on_flushed(self) -> None:
-        """Do nothing."""
+        """Do nothing, because the file has no maximum size."""
 
     def next_file(self) -> None:
         """Do nothing, because there is only one file."""
 
     def check_file(self) -> None:
-        """Check that the file still exists and the disk is not full. Raises `RecordingError`."""
+        """Raise `RecordingError` if the file no longer exists or the disk is full."""
         if _file_identity(self.file.path) != self._identity:
             raise RecordingError(str(self.file.path), _("the file was moved or deleted during recording"))
         if shutil.disk_usage(self.file.path.parent).free < self._least_free_bytes:
@@ -109,7 +117,7 @@ def _file_identity(path: Path) -> tuple[int, int] | None:
 
 
 def disk_error(path: Path, error: OSError) -> RecordingError:
-    """Convert an I/O error to a `RecordingError`."""
+    """Return a `RecordingError` for an I/O error."""
     if error.errno in {errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC, errno.EFBIG}:
         reason = _("the disk is full; everything recorded before is saved")
     else:

@@ -1,6 +1,6 @@
 """Counts of received, lost, late, undecodable and dropped messages by topic.
 
-Lost messages are gaps in the sequence numbers of a publisher. Performs no input or output; used in the
+Lost messages are gaps in the sequence numbers of a publisher. Performs no input or output. Used in the
 writer's thread.
 """
 
@@ -12,16 +12,19 @@ from dataclasses import dataclass, field
 import orjson
 
 MAX_TOPICS = 10_000
-"""Maximum number of topics that are counted separately; all others share one counter."""
+"""Maximum number of topics with their own counter. All further topics share one counter."""
 MAX_PUBLISHERS = 1_000
-"""Maximum number of publishers per topic whose losses are counted; losses of others are unknown."""
+"""Maximum number of publishers per topic whose losses are counted.
+
+Losses of further publishers are unknown.
+"""
 MAX_LOST = 2**63 - 1
-"""Maximum count of losses; random sequence numbers would cause values that JSON can't represent."""
+"""Maximum count of losses, because random sequence numbers would cause values that JSON can't represent."""
 
 
 @dataclass(frozen=True)
 class TopicStats:
-    """Counts of one topic.
+    """Message counts of one topic.
 
     Attributes:
         received: Number of received messages.
@@ -40,7 +43,7 @@ class TopicStats:
     size_bytes: int = 0
 
     def difference(self, earlier: TopicStats) -> TopicStats:
-        """Return the difference to earlier counts."""
+        """Return the difference between these counts and earlier ones."""
         return TopicStats(
             max(0, self.received - earlier.received),
             None if self.lost is None else max(0, self.lost - (earlier.lost or 0)),
@@ -63,7 +66,7 @@ class TopicStats:
 
 
 def parse_stats(value: object) -> TopicStats | None:
-    """Parse counts from a map or its JSON text; return None if the data is invalid."""
+    """Convert a map, or its JSON text, to counts; return None if the data is invalid."""
     if isinstance(value, str):
         try:
             value = orjson.loads(value)
@@ -93,7 +96,7 @@ class _SequenceRange:
 
 @dataclass
 class TopicCounter:
-    """Counter of one topic's messages."""
+    """Counter of the messages of one topic."""
 
     received: int = 0
     late: int = 0
@@ -105,7 +108,14 @@ class TopicCounter:
     _publishers: dict[int | None, _SequenceRange] = field(default_factory=dict)
 
     def add(self, publisher: int | None, seq: int | None, size_bytes: int, *, is_decodable: bool) -> None:
-        """Count a recorded message."""
+        """Count a recorded message.
+
+        Args:
+            publisher: Id of the publisher, if known.
+            seq: Sequence number, if any.
+            size_bytes: Size of the payload.
+            is_decodable: True if the message can be decoded.
+        """
         self.received += 1
         self.size_bytes += size_bytes
         self.is_changed = True
@@ -126,7 +136,13 @@ class TopicCounter:
             numbers.first = min(numbers.first, seq)
 
     def count_skipped(self, publisher: int | None, count: int, size_bytes: int) -> None:
-        """Count messages of a publisher that were received but not recorded."""
+        """Count received messages of a publisher that are not recorded because the queue is full.
+
+        Args:
+            publisher: Id of the publisher, if known.
+            count: Number of messages.
+            size_bytes: Total size of the payloads.
+        """
         self.received += count
         self.unkept += count
         self.size_bytes += size_bytes

@@ -1,4 +1,4 @@
-"""Index of a recording, from its summary or, without one, from a scan of its records.
+"""Index of a recording, read from its summary or, without one, built by scanning its records.
 
 Files without summary, chunk index or chunks are supported. Messages outside of chunks (ROS 2's preset
 "fastwrite") are grouped into runs of about 1 MB, which are read like uncompressed chunks. The package `mcap`
@@ -47,7 +47,10 @@ if TYPE_CHECKING:
 
 _FOOTER_BYTES = HEAD_BYTES + 20 + len(MAGIC)
 MAX_RECORD_BYTES = 64_000_000
-"""Maximum size of records other than chunks; larger ones are damaged, or attachments, which are not read."""
+"""Maximum size in bytes of records other than chunks.
+
+Larger records are damaged, or are attachments, which are not read.
+"""
 _MAX_SCHEMA_BYTES = 8_000_000
 _MAX_CHANNEL_BYTES = 256_000
 _MAX_SIZES: Mapping[int, int] = {Opcode.SCHEMA: _MAX_SCHEMA_BYTES, Opcode.CHANNEL: _MAX_CHANNEL_BYTES}
@@ -55,26 +58,26 @@ _MAX_DEFINITION_BYTES = 64_000_000
 _MAX_OTHER_RECORDS = 200_000
 _UNCOUNTED_OPCODES = frozenset({Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX})
 _MAX_METADATA_BYTES = 4_000_000
-"""Maximum size of all metadata; that of a recording with 10,000 topics is half of this."""
+"""Maximum total size of metadata in bytes, twice the size in a recording with 10,000 topics."""
 _MAX_ATTACHMENTS = 1_000
 _MAX_HEADER_BYTES = 64_000
 _MAX_COUNTED_CHUNKS = 10_000
 _RUN_BYTES = 1_000_000
 _MAX_INSIDE_BYTES = 65_536
-"""Record size above which a run of messages ends, so that long records are not read with it."""
+"""Record size in bytes above which a run of messages ends, so that long records are not part of a run."""
 _READ_BYTES = 1_048_576
 
 
 @dataclass(frozen=True)
 class CorruptRange:
-    """Unreadable piece of a file.
+    """Unreadable place of a file.
 
     Attributes:
         offset: Offset in the file.
         length: Length in bytes.
-        start_ns: Time of the first message in the piece (ns since 1970), or 0 if unknown.
-        end_ns: Time of the last message in the piece, or 0 if unknown.
-        message_count: Number of missing messages, or None if unknown.
+        start_ns: Time of the first missing message (ns since 1970); 0 if unknown.
+        end_ns: Time of the last missing message (ns since 1970); 0 if unknown.
+        message_count: Number of missing messages; None if unknown.
     """
 
     offset: int
@@ -86,7 +89,13 @@ class CorruptRange:
 
 @dataclass(frozen=True)
 class AttachedFile:
-    """Attached file: name, media type and size."""
+    """Attachment of a recording, whose content is not read.
+
+    Attributes:
+        name: Name of the file.
+        media_type: Media type of the file.
+        size_bytes: Size of the file.
+    """
 
     name: str
     media_type: str
@@ -94,7 +103,11 @@ class AttachedFile:
 
 
 class RecordCounter:
-    """Counter that limits the number of records other than chunks and messages."""
+    """Limit on the number of records other than chunks and messages.
+
+    Args:
+        path: Path of the file, for error messages.
+    """
 
     def __init__(self, path: Path) -> None:
         self._path, self._count = path, 0
@@ -110,7 +123,7 @@ class RecordCounter:
 
 
 class Definitions:
-    """Channels by number, collected from schema and channel records."""
+    """Channels by number, collected from the schema and channel records of a file."""
 
     def __init__(self) -> None:
         self.channels: dict[int, ChannelDefinition] = {}
@@ -123,14 +136,18 @@ class Definitions:
 
     @property
     def lacks_schemas(self) -> bool:
-        """True if the schema of a channel has not been read yet."""
+        """True if a channel refers to a schema that has not been read yet."""
         return bool(self._without_schema)
 
     def add(self, opcode: int, content: bytes | memoryview) -> list[int]:
         """Add a schema or channel record. Other, damaged and oversized records are ignored.
 
+        Args:
+            opcode: Opcode of the record.
+            content: Content of the record.
+
         Returns:
-            Numbers of the channels that the record completes.
+            Numbers of the channels that are now complete.
         """
         most = _MAX_SIZES.get(opcode, 0)
         if not 2 <= len(content) <= most:
@@ -166,7 +183,12 @@ class Definitions:
 
 @dataclass
 class FileIndex:
-    """Index of a file. `chunks` are sorted by start; `is_complete` is True if the file has a footer."""
+    """Index of a recording file.
+
+    Attributes:
+        chunks: Chunks, sorted by start.
+        is_complete: True if the file has a footer, so that it was closed properly.
+    """
 
     definitions: Definitions = field(default_factory=Definitions)
     chunks: list[ChunkInfo] = field(default_factory=list)
@@ -174,7 +196,7 @@ class FileIndex:
     attachments: list[AttachedFile] = field(default_factory=list)
     corruption: list[CorruptRange] = field(default_factory=list)
     counts: dict[int, int] | None = None
-    """Number of messages by channel; None if the file doesn't contain it."""
+    """Number of messages by channel; None if the file has no statistics."""
     is_complete: bool = True
     end: int = 0
     """Size of the intact part of the file in bytes."""
@@ -189,13 +211,13 @@ def read_index(
     progress: Callable[[int, int], object] | None = None,
     budget: ReadBudget | None = None,
 ) -> FileIndex:
-    """Read or build the index of a recording.
+    """Read the index of a recording, or build it by scanning the file.
 
     Args:
         file: Open file.
         path: Path of the file, for error messages.
         progress: Called with bytes done and in total during a scan.
-        budget: Limit of the work.
+        budget: Limit of the work; None for the default.
 
     Raises:
         RecordingError: The file is not a recording.
@@ -261,7 +283,7 @@ def _read_metadata(file: BinaryIO, place: RecordLocation, index: FileIndex) -> N
 
 
 class _Summary:
-    """Reader that validates a summary."""
+    """Reader that validates the summary of a file."""
 
     def __init__(self, file: BinaryIO, path: Path, size: int, budget: ReadBudget) -> None:
         self._file, self._size, self._budget = file, size, budget
@@ -367,7 +389,7 @@ class _Summary:
 
 
 class _Scan:
-    """Builder of the index for a file without summary, from its chunks and runs of messages."""
+    """Builder of an index for a file without summary, from its chunks and runs of messages."""
 
     def __init__(
         self,
@@ -544,9 +566,11 @@ def _index_from_records(
 
 
 def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
-    """Read and decompress the records of a chunk.
+    """Read a chunk and return its decompressed records.
 
-    Raises `ValueError` if the chunk is damaged or too large, and `OSError`.
+    Raises:
+        ValueError: The chunk is damaged or too large.
+        OSError: The file can't be read.
     """
     if info.length > MAX_CHUNK_BYTES:
         raise ValueError("size")
@@ -565,7 +589,16 @@ def read_chunk(file: BinaryIO, info: ChunkInfo) -> bytes | memoryview:
 
 
 def read_entries(file: BinaryIO, info: ChunkInfo, channel: int) -> Sequence[tuple[int, int]] | None:
-    """Return (time, offset in the chunk) for a channel's messages; None if there is no message index."""
+    """Read the message index of a channel in a chunk.
+
+    Args:
+        file: Open file.
+        info: Metadata of the chunk.
+        channel: Number of the channel.
+
+    Returns:
+        Tuples (log time, offset in the chunk) of the channel's messages; None if there is no message index.
+    """
     offset = info.index_offsets.get(channel, 0)
     if not info.has_index_at(offset):
         return None

@@ -1,7 +1,7 @@
-"""Limits of the cost of reading a recording, which may be untrusted.
+"""Limits on the cost of reading a recording, which may be untrusted.
 
-A file may declare any sizes and numbers. Memory is limited per chunk (`max_chunk_bytes`) and work per file
-(`ReadBudget`). Both limits depend on the actual size of the file, never on its declarations.
+A file may declare any sizes and counts. Memory is limited per chunk (`max_chunk_bytes`) and work per file
+(`ReadBudget`). Both limits depend on the actual size of the file, not on its declarations.
 """
 
 from __future__ import annotations
@@ -14,26 +14,36 @@ from nep.errors import RecordingTooLargeError
 from nep.i18n import _
 
 MAX_PLAIN_CHUNK_BYTES = 64 * 2**20
-"""Decompressed size of a chunk that is always accepted."""
+"""Decompressed size in bytes up to which a chunk is always accepted."""
 _MAX_RATIO = 2
 _MAX_CHUNK_BYTES = 2**30
 RECORD_COST_BYTES = 200
-"""Cost of parsing a record, as the number of bytes decompressed in that time (1 µs, Python 3.11)."""
+"""Cost of parsing a record, in bytes that can be decompressed in the same time (1 µs, Python 3.11)."""
 _OPEN_BYTES = 400_000_000
 _OPEN_RATIO = 64
 
 
 def max_chunk_bytes(compressed_bytes: int) -> int:
-    """Return the maximum decompressed size of a chunk, given its size in the file.
+    """Return the maximum decompressed size of a chunk, in bytes.
 
     The maximum is 64 MiB or twice the compressed size: a single message of 200 MB is accepted, a kilobyte
     that expands to gigabytes is not.
+
+    Args:
+        compressed_bytes: Size of the chunk in the file.
     """
     return min(_MAX_CHUNK_BYTES, max(MAX_PLAIN_CHUNK_BYTES, _MAX_RATIO * compressed_bytes))
 
 
 class ReadBudget:
-    """Limit of the work for reading one file, in bytes and optionally in seconds. Not thread-safe."""
+    """Limit of the work for reading one file. Not thread-safe.
+
+    Args:
+        path: Path of the file, for error messages.
+        work_bytes: Maximum number of bytes to process.
+        seconds: Maximum time in seconds; None for no limit.
+        clock: Monotonic clock in seconds.
+    """
 
     def __init__(
         self,
@@ -47,7 +57,7 @@ class ReadBudget:
         self._until = None if seconds is None else clock() + seconds
 
     def spend(self, work_bytes: int) -> None:
-        """Count work. Raises `RecordingTooLargeError` if the budget is exceeded."""
+        """Subtract work from the budget. Raises `RecordingTooLargeError` if the budget is exceeded."""
         self._left -= work_bytes
         if self._left < 0:
             raise RecordingTooLargeError(str(self._path), _("it is too large to read"))
@@ -56,5 +66,10 @@ class ReadBudget:
 
 
 def open_budget(path: Path, size_bytes: int) -> ReadBudget:
-    """Return the budget for opening a file. Linear in the file's size, and ample for real recordings."""
+    """Return the budget for opening a file, which is proportional to the file's size.
+
+    Args:
+        path: Path of the file, for error messages.
+        size_bytes: Size of the file.
+    """
     return ReadBudget(path, _OPEN_BYTES + _OPEN_RATIO * size_bytes)

@@ -41,17 +41,20 @@ else:  # optional for programs that don't record
 
 CHUNK_BYTES = 1_000_000
 MAX_CHANNELS = 65_535
-"""Maximum number of channels, whose numbers have 16 bits."""
+"""Maximum number of channels, because channel numbers have 16 bits."""
 
 
 class ChannelTable:
-    """Table of the numbers of channels and schemas.
+    """Assignment of numbers to channels and schemas.
 
-    Files with a common table can copy each other's chunks.
+    Files that share a table can copy each other's chunks.
+
+    Args:
+        definitions: Channels that already have a number, by number.
     """
 
     def __init__(self, definitions: Mapping[int, ChannelDefinition] | None = None) -> None:
-        """Create a table with the numbered channels in `definitions`."""
+        """Create a table."""
         self.definitions: dict[int, ChannelDefinition] = {}
         self._numbers: dict[ChannelDefinition, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}
@@ -60,7 +63,7 @@ class ChannelTable:
             self._add(number, definition)
 
     def number(self, definition: ChannelDefinition) -> int | None:
-        """Return the number of a channel (from 1), assigning one if needed; None if there are too many."""
+        """Return the number of a channel, assigning one if needed; None if there are too many channels."""
         known = self._numbers.get(definition)
         if known is None:
             if self._next > MAX_CHANNELS:
@@ -70,12 +73,12 @@ class ChannelTable:
         return known
 
     def add_numbered(self, number: int, definition: ChannelDefinition) -> None:
-        """Add a channel with a given number, for copied chunks."""
+        """Add a channel with a given number, unless the number is already assigned."""
         if number not in self.definitions:
             self._add(number, definition)
 
     def has(self, definition: ChannelDefinition) -> bool:
-        """Return True if the channel has a number already."""
+        """Return True if a channel already has a number."""
         return definition in self._numbers
 
     def _add(self, number: int, definition: ChannelDefinition) -> None:
@@ -88,7 +91,7 @@ class ChannelTable:
         self._next = max(self._next, number + 1)
 
     def records(self, number: int) -> tuple[mcap_records.Schema | None, mcap_records.Channel]:
-        """Return the schema and channel records of a channel."""
+        """Return the schema record (None without a schema) and the channel record of a channel."""
         definition = self.definitions[number]
         key = (definition.schema_name, definition.schema_encoding, definition.schema_data)
         schema_number = self._schemas.get(key, 0)
@@ -128,7 +131,7 @@ class _Chunk:
 class FileWriter:
     """Writer of one file. Not thread-safe. Every method raises `OSError` if the file can't be written.
 
-    After an error, the file ends with its last whole record, and `finish` may still be called.
+    After an error, the file ends with the last whole record, and `finish` may still be called.
     """
 
     def __init__(
@@ -146,9 +149,9 @@ class FileWriter:
         Args:
             path: File to write.
             table: Table of channel numbers; None for a new one.
-            compression: "zstd", "lz4" or "" for none.
-            is_new: Raise `FileExistsError` if the file exists.
-            keeps_chunks: Keep `chunks` in memory.
+            compression: "zstd", "lz4", or "" for none.
+            is_new: Raise `FileExistsError` if the file exists; False to overwrite it.
+            keeps_chunks: Keep the list `chunks` in memory, for copying chunks.
             profile: MCAP profile of the messages, such as "ros2".
         """
         check_packages()
@@ -188,12 +191,12 @@ class FileWriter:
 
     @property
     def size_bytes(self) -> int:
-        """Size of the file on disk."""
+        """Size of the file on disk in bytes."""
         return self._at
 
     @property
     def pending_bytes(self) -> int:
-        """Size of the current chunk, which is not written yet."""
+        """Size in bytes of the current chunk, which is not written yet."""
         return self._chunk.size
 
     @property
@@ -213,7 +216,7 @@ class FileWriter:
 
         Args:
             channel: Number of the channel.
-            times: Log time and publish time.
+            times: Log time and publish time in ns since 1970.
             sequence: Sequence number in the record.
             before: Bytes that precede the data.
             data: Data of the message.
@@ -238,7 +241,7 @@ class FileWriter:
         chunk.size += len(head) + size
 
     def flush(self) -> int:
-        """Write the current chunk; return its number of messages."""
+        """Write the current chunk; return the number of messages written."""
         chunk = self._chunk
         if not chunk.parts:
             return 0
@@ -304,7 +307,11 @@ class FileWriter:
             self.counts[number] = self.counts.get(number, 0) + count
 
     def define(self, channels: Mapping[int, object]) -> None:
-        """Write the channels, and their schemas, that the file does not contain yet."""
+        """Write the channels, and their schemas, that are not in the file yet.
+
+        Args:
+            channels: Channel numbers, as the keys of a mapping.
+        """
         new = [number for number in channels if number not in self._written_channels]
         if not new:
             return
@@ -354,7 +361,7 @@ class FileWriter:
     # ---- closing
 
     def finish(self) -> None:
-        """Write the current chunk and the summary, sync and close. Raises `OSError`."""
+        """Write the current chunk and the summary, sync and close the file."""
         try:
             self.flush()
             self._write(self._summary())
@@ -363,7 +370,7 @@ class FileWriter:
             self._file.close()
 
     def close(self) -> None:
-        """Close the file without a summary; readers then scan the records."""
+        """Close the file without a summary, so that readers must scan its records."""
         self._file.close()
 
     def _summary(self) -> bytes:

@@ -1,8 +1,8 @@
 """Protocol Buffers messages that wrap recorded images, text and bytes.
 
-The payload is contained unchanged and in one piece, so writing needs no conversion and reading is a slice.
-Programs without nep (Foxglove, Lichtblick) can show the payload, and a replay has the original bytes. JSON
-would need base64: a third larger, and 0.8 ms per image. There are four messages:
+The payload is contained unchanged and in one piece, so that it is written without conversion and read as a
+slice. Programs without nep (Foxglove, Lichtblick) can show the payload, and a replay has the original bytes.
+JSON would need base64: a third larger, and 0.8 ms per image. There are four messages:
 
     foxglove.CompressedImage    timestamp 1, data 2, format 3, frame_id 4
     foxglove.RawImage           timestamp 1, width 2, height 3, encoding 4, step 5, data 6, frame_id 7
@@ -20,7 +20,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 
 EXTRA_FIELD = 1000
-"""Number of the field with properties of nep."""
+"""Number of the field that contains properties of nep."""
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 _U32, _U64 = struct.Struct("<I"), struct.Struct("<Q")
 _NS_PER_S = 1_000_000_000
@@ -36,7 +36,12 @@ def _varint(number: int) -> bytes:
 
 
 def bytes_field(number: int, size_bytes: int) -> bytes:
-    """Encode the prefix of a field of bytes, text or a message; the content follows."""
+    """Encode the part of a field of bytes, text or a message that precedes its content.
+
+    Args:
+        number: Number of the field.
+        size_bytes: Size of the content.
+    """
     return _varint(number << 3 | _BYTES) + _varint(size_bytes)
 
 
@@ -50,7 +55,12 @@ def fixed_field(number: int, value: int) -> bytes:
 
 
 def timestamp_field(number: int, stamp_ns: int) -> bytes:
-    """Encode a field of type `google.protobuf.Timestamp`."""
+    """Encode a field of type `google.protobuf.Timestamp`.
+
+    Args:
+        number: Number of the field.
+        stamp_ns: Time in ns since 1970.
+    """
     seconds, rest = divmod(stamp_ns, _NS_PER_S)
     return _complete_field(number, b"\x08" + _varint(seconds) + b"\x10" + _varint(rest))
 
@@ -68,9 +78,9 @@ def _read_varint(data: memoryview, at: int) -> tuple[int, int]:
 
 
 def fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
-    """Iterate over the fields of a message as (number, value); bytes are slices of the message.
+    """Iterate over the fields of a message as (number, value).
 
-    Raises `ValueError` for invalid data.
+    A value is a whole number, or a slice of the message. Raises `ValueError` for invalid data.
     """
     at, size = 0, len(message)
     while at < size:
@@ -122,7 +132,7 @@ SCHEMAS: Mapping[str, _Fields] = {
     "nep.Text": {"data": (1, _STRING)},
     "nep.Bytes": {"data": (1, _BYTES_TYPE)},
 }
-"""Fields of each message by the message's name."""
+"""Fields of each message, by the name of the message."""
 
 
 def _message_type(name: str, fields_of_it: _Fields) -> bytes:
@@ -145,7 +155,11 @@ def _file(name: str, package: str, depends_on: str, message: bytes) -> bytes:
 
 @cache
 def descriptor_set(schema: str) -> bytes:
-    """Return the data of an MCAP schema record: the message's descriptor and its dependencies."""
+    """Return the data of an MCAP schema record: the descriptor of a message and its dependencies.
+
+    Args:
+        schema: Name of the message.
+    """
     package, name = schema.split(".")
     message = _message_type(name, SCHEMAS[schema])
     needs = "google/protobuf/timestamp.proto" if "timestamp" in SCHEMAS[schema] else ""

@@ -1,8 +1,8 @@
 """Encoding and decoding of MCAP records. Performs no input or output.
 
 The specification is at https://mcap.dev/spec. Messages, chunks and their indexes, of which there are
-thousands per second, are encoded and decoded here. Rare records (schemas, channels, statistics) use the
-classes of the package `mcap`.
+thousands per second, are encoded and decoded by this module. Rare records (schemas, channels, statistics) use
+the classes of the package `mcap`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ RECORD_HEAD = struct.Struct("<BQ")  # opcode, length of the content
 HEAD_BYTES = RECORD_HEAD.size
 MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MAX_OTHER_RECORDS = 200_000
-"""Maximum number of schemas and channels in a chunk."""
+"""Maximum number of schema and channel records in a chunk."""
 MESSAGE_REST_BYTES = MESSAGE_HEAD.size - HEAD_BYTES
 MESSAGE_START = struct.Struct("<HIQ")  # channel, sequence, log time
 _CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, length of the compression's name
@@ -45,13 +45,13 @@ _INFO = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of the inde
 _INDEX_LENGTH = struct.Struct("<QI")
 _SIZES = struct.Struct("<QQ")
 MAX_CHUNK_BYTES = 2**31
-"""Maximum size of a chunk; larger ones can't be read into memory."""
+"""Maximum size of a chunk in bytes. Larger chunks can't be read into memory."""
 CHUNK_HEAD_BYTES = HEAD_BYTES + _CHUNK.size + 16 + _SIZE.size
-"""Number of bytes that is enough for the header of any chunk."""
+"""Maximum size of the header of a chunk, in bytes."""
 
 
 class Opcode(IntEnum):
-    """Opcodes of records, as in the specification."""
+    """Opcodes of the records in an MCAP file."""
 
     HEADER = 1
     FOOTER = 2
@@ -71,7 +71,12 @@ class Opcode(IntEnum):
 
 
 def read_record(kind: str, content: bytes | memoryview) -> Any:  # noqa: ANN401 - any record of mcap
-    """Parse a record, given the name of its class in `mcap`. Raises `ValueError`."""
+    """Parse a record as an object of `mcap`. Raises `ValueError`.
+
+    Args:
+        kind: Name of the class in `mcap.records`.
+        content: Content of the record.
+    """
     stream_class, record_class = _classes(kind)
     try:
         return record_class.read(stream_class(io.BytesIO(content)))
@@ -90,7 +95,7 @@ def _builder_class() -> Any:  # noqa: ANN401 - of mcap
 
 
 def pack_record(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
-    """Encode a record of `mcap`."""
+    """Encode a record object of the package `mcap`."""
     builder = _builder_class()()
     record.write(builder)
     made: bytes = builder.end()
@@ -101,7 +106,16 @@ def pack_record(record: Any) -> bytes:  # noqa: ANN401 - any record of mcap
 
 
 class RawMessage(NamedTuple):
-    """Message record of a chunk; `data` is a slice of the chunk."""
+    """Message record of a chunk.
+
+    Attributes:
+        offset: Offset of the record in the chunk.
+        channel: Number of the channel.
+        sequence: Sequence number.
+        log_ns: Time of receipt in ns since 1970.
+        publish_ns: Time stamp in ns since 1970.
+        data: Data of the message, as a slice of the chunk.
+    """
 
     offset: int
     channel: int
@@ -112,16 +126,28 @@ class RawMessage(NamedTuple):
 
 
 def message_head(channel: int, sequence: int, log_ns: int, publish_ns: int, size_bytes: int) -> bytes:
-    """Encode the part of a message record that precedes the data."""
+    """Encode the part of a message record that precedes the data.
+
+    Args:
+        channel: Number of the channel.
+        sequence: Sequence number.
+        log_ns: Time of receipt in ns since 1970.
+        publish_ns: Time stamp in ns since 1970.
+        size_bytes: Size of the data.
+    """
     return MESSAGE_HEAD.pack(
         Opcode.MESSAGE, MESSAGE_REST_BYTES + size_bytes, channel, sequence, log_ns, publish_ns
     )
 
 
 def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessage | tuple[int, memoryview]]:
-    """Iterate over the records of a chunk from an offset: messages, and other records as (opcode, content).
+    """Iterate over the records of a chunk: messages, and other records as (opcode, content).
 
     Stops without an error at the end or at invalid bytes, because the last record may be truncated.
+
+    Args:
+        chunk: Decompressed records.
+        offset: Offset of the first record to return.
     """
     whole = memoryview(chunk)
     size, other_count = whole.nbytes, 0
@@ -149,7 +175,7 @@ def messages_in(chunk: bytes | memoryview, offset: int = 0) -> Iterator[RawMessa
 
 
 class ChunkHead(NamedTuple):
-    """Header of a chunk record; `data_at` is the offset of the data in the record."""
+    """Parsed header of a chunk record; `data_offset` is the offset of the data in the record."""
 
     start_ns: int
     end_ns: int
@@ -161,9 +187,13 @@ class ChunkHead(NamedTuple):
 
 
 def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
-    """Parse the header of a chunk record of this length; return None if the bytes are invalid.
+    """Parse the header of a chunk record; return None if the bytes are invalid.
 
     Validation is strict, so that arbitrary bytes of a damaged file are not mistaken for a chunk.
+
+    Args:
+        record: First bytes of the record.
+        length: Length of the record's content.
     """
     if len(record) < HEAD_BYTES + _CHUNK.size:
         return None
@@ -184,7 +214,15 @@ def chunk_head(record: bytes | memoryview, length: int) -> ChunkHead | None:
 def pack_chunk(
     data: bytes, compression: str, uncompressed_bytes: int, crc: int, times: tuple[int, int]
 ) -> bytes:
-    """Encode the part of a chunk record that precedes its data."""
+    """Encode the part of a chunk record that precedes its data.
+
+    Args:
+        data: Compressed data.
+        compression: Name of the compression.
+        uncompressed_bytes: Size of the decompressed data.
+        crc: CRC-32 of the decompressed data.
+        times: Log times of the first and last message.
+    """
     letters = compression.encode("ascii")
     rest = _CHUNK.pack(*times, uncompressed_bytes, crc, len(letters)) + letters + _SIZE.pack(len(data))
     return RECORD_HEAD.pack(Opcode.CHUNK, len(rest) + len(data)) + rest
@@ -194,14 +232,19 @@ def pack_chunk(
 
 
 class IndexEntry(NamedTuple):
-    """Time of a message and its offset in the chunk."""
+    """Log time of a message, and its offset in the chunk."""
 
     log_ns: int
     offset: int
 
 
 def pack_message_index(channel: int, entries: Sequence[int]) -> bytes:
-    """Encode the message index record of a channel, from (time, offset, time, offset, …)."""
+    """Encode the message index record of a channel.
+
+    Args:
+        channel: Number of the channel.
+        entries: Alternating log times and offsets.
+    """
     rest = struct.pack(f"<HI{len(entries)}Q", channel, 8 * len(entries), *entries)
     return RECORD_HEAD.pack(Opcode.MESSAGE_INDEX, len(rest)) + rest
 
@@ -212,7 +255,7 @@ def message_count(index: bytes | memoryview) -> int:
 
 
 def read_message_index(content: bytes | memoryview) -> tuple[int, list[IndexEntry]]:
-    """Parse a message index: (channel, entries). Raises `ValueError`."""
+    """Parse a message index record; return the channel number and the entries. Raises `ValueError`."""
     try:
         channel, size = _ENTRIES.unpack_from(content)
         whole = memoryview(content)[_ENTRIES.size : _ENTRIES.size + size]
@@ -228,12 +271,12 @@ class ChunkInfo:
     """Metadata of a chunk.
 
     Attributes:
-        start_ns: Time of the first message.
-        end_ns: Time of the last message.
+        start_ns: Time of the first message (ns since 1970).
+        end_ns: Time of the last message (ns since 1970).
         offset: Offset of the chunk record in the file.
         length: Length of the chunk record.
-        packed_offsets: Offsets of the message indexes by channel, encoded as in the file, because few are
-            used.
+        packed_offsets: Offsets of the message indexes by channel, encoded as in the file, because most of
+            them are never used.
         index_bytes: Total size of the message indexes.
         compression: Name of the compression.
         compressed_bytes: Size of the data in the file.
@@ -266,15 +309,15 @@ class ChunkInfo:
         return dict(_OFFSET.iter_unpack(self.packed_offsets))
 
     def has_index_at(self, offset: int) -> bool:
-        """Return True if a message index can be at the offset, which must be directly after the chunk."""
+        """Return True if a message index may start at an offset, which must follow the chunk."""
         after = self.offset + self.length
         return after <= offset < after + self.index_bytes
 
     @property
     def counts(self) -> dict[int, int]:
-        """Number of messages by channel, from the distances between the indexes (16 bytes per message).
+        """Number of messages by channel, computed from the sizes of the indexes (16 bytes per message).
 
-        Channels without an index are omitted; they can be counted only by reading the chunk.
+        Channels without an index are omitted, because counting them requires reading the chunk.
         """
         if self.packed_counts:
             return dict(_OFFSET.iter_unpack(self.packed_counts))
@@ -299,7 +342,7 @@ _second = itemgetter(1)
 
 
 def pack_offsets(offsets: Mapping[int, int]) -> bytes:
-    """Encode offsets of message indexes for `ChunkInfo.packed_offsets`."""
+    """Encode the offsets of message indexes by channel, for `ChunkInfo.packed_offsets`."""
     return b"".join([_OFFSET.pack(*each) for each in offsets.items()])
 
 

@@ -1,8 +1,8 @@
-"""JSON Schemas of message types: those of `nep.geometry` and `nep.sensor`, and declared types.
+"""JSON Schemas of message types: types of `nep.geometry` and `nep.sensor`, and declared types.
 
-From a schema, viewers list the fields of a topic before the first message. They support a small part of JSON
-Schema: scalars, objects, and lists of these. Other fields are omitted, and an unknown type is an object with
-any fields.
+Viewers use a schema to list the fields of a topic before the first message. They support a small part of JSON
+Schema: scalars, objects, and lists of these. Other fields are omitted. The schema of an unknown type is an
+object with any fields.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ def _known_types() -> Mapping[str, type]:
 
 
 def schema_of(msg_type: str) -> bytes:
-    """Return the JSON Schema of a message type, given its name."""
+    """Return the encoded JSON Schema of a message type, given the name of the type."""
     declared = _known_types().get(msg_type)
     return ANY_OBJECT if declared is None else json_schema(declared)
 
 
 @cache
 def json_schema(declared: type) -> bytes:
-    """Return the JSON Schema of a dataclass or TypedDict."""
+    """Return the encoded JSON Schema of a dataclass or TypedDict."""
     schema = _schema_for(declared, 0) or {"type": "object"}
     return orjson.dumps({"title": getattr(declared, "MSG_TYPE", declared.__name__), **schema})
 

@@ -1,4 +1,4 @@
-"""Iteration over the records of an MCAP file without reading their content."""
+"""Iteration over the records of an MCAP file without reading their whole content."""
 
 from __future__ import annotations
 
@@ -13,7 +13,14 @@ _BUDGET_INTERVAL = 1_000
 
 
 class RecordLocation(NamedTuple):
-    """Place of a record in a file; `begin` has the first bytes of the content, read with the header."""
+    """Location of a record in a file.
+
+    Attributes:
+        offset: Offset of the record.
+        opcode: Opcode of the record.
+        length: Length of the content.
+        begin: First bytes of the content, which were read together with the header.
+    """
 
     offset: int
     opcode: int
@@ -33,10 +40,21 @@ def walk_records(
     offset: int = len(MAGIC),
     begin_bytes: int = 64,
 ) -> Iterator[RecordLocation]:
-    """Iterate over the records from an offset, up to ``size`` or to invalid bytes.
+    """Iterate over the records of a file up to `size`, or to the first invalid bytes.
 
     The file is read in windows that grow while records are short, so that millions of empty records take a
-    second, and only the headers of large chunks are read. Raises `RecordingTooLargeError` or `OSError`.
+    second, and only the headers of large chunks are read.
+
+    Args:
+        file: Open file.
+        size: Size of the file.
+        budget: Limit of the work.
+        offset: Offset of the first record.
+        begin_bytes: Number of content bytes to return in `Place.prefix`.
+
+    Raises:
+        RecordingTooLargeError: The budget is exceeded.
+        OSError: The file can't be read.
     """
     window, base, step, count = b"", offset, _SMALL_WINDOW, 0
     while offset + HEAD_BYTES <= size:

@@ -136,6 +136,6 @@ def test_call_history_and_stored_replies_are_bounded(bench) -> None:
     records = bench.calls.records
     assert len(records) == MAX_RECORDS
     assert first.number not in {each.number for each in records}
-    assert sum(each.is_kept for each in records) == MAX_REPLIES
+    assert sum(each.is_retained for each in records) == MAX_REPLIES
     bench.calls.clear()
     assert list(bench.calls.records) == []

@@ -23,12 +23,12 @@ FULL = """
 import json, resource, signal, sys
 from pathlib import Path
 from app.core.documents.document import Document
-from app.core.documents.journal import Journal
+from app.core.documents.journal_name import Journal
 from app.errors import DocumentError
 path, journals = Path(sys.argv[1]), Path(sys.argv[2])
 document = Document(lambda: Journal(journals))
 document.open(path)
-document.edited({"blocks": {"blocks": [{"type": "events_started", "id": "x" * 200000}]}})
+document.apply_edit({"blocks": {"blocks": [{"type": "events_started", "id": "x" * 200000}]}})
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, resource.RLIM_INFINITY))
 try:
@@ -37,7 +37,7 @@ try:
 except DocumentError as error:
     said = str(error)
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-print(json.dumps({"said": said, "dirty": document.dirty, "journal": document.journal}))
+print(json.dumps({"said": said, "dirty": document.dirty, "journal": document.journal_name}))
 """
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from app.core.messages import snapshots
 from app.core.documents.file_format import BehaviourFile, write_file
 from app.core.documents.document import Document
-from app.core.documents.versions import keep_earlier
-from app.core.documents.journal import Journal, left_behind
+from app.core.documents.versions import save_version
+from app.core.documents.journal_name import Journal, unsaved_work
 from app.core.storage.settings import Settings
 from app.errors import AppError
 from nep.messages.message import Message
@@ -40,7 +40,7 @@ settings = Settings(disk / "home")
 settings.set("theme", "dark")
 document = Document(lambda: Journal(disk / "journal"))
 document.open(path)
-document.edited(blocks("first"))
+document.apply_edit(blocks("first"))
 kept = [each.read_bytes() for each in (disk / "journal").glob("*.json")]
 shape = {"shape": [64, 64, 3], "encoding": "bgr8"}
 picture = Message("/cam", bytes(range(256)) * 48, "image", "image", stamp_ns=1, extension=shape)
@@ -54,11 +54,11 @@ with filler.open("wb", buffering=0) as file:
         full = error.strerror
 
 told = {"full": full}
-document.edited(blocks("y" * 50_000))
+document.apply_edit(blocks("y" * 50_000))
 told["edit"] = document.journal_error
 told["save"] = said(document.save)
 told["setting"] = said(lambda: settings.set("theme", "x" * 20_000))
-told["earlier"] = said(lambda: keep_earlier(path, disk / "earlier"))
+told["earlier"] = said(lambda: save_version(path, disk / "earlier"))
 told["snapshot"] = said(lambda: snapshots.save(picture, disk / "pictures"))
 told["dirty"] = document.dirty
 told["old"] = path.read_bytes() == old
@@ -68,7 +68,7 @@ told["parts"] = parts()
 told["pictures"] = [each.name for each in (disk / "pictures").iterdir()]
 
 filler.unlink()
-document.edited(blocks("z" * 50_000))
+document.apply_edit(blocks("z" * 50_000))
 told["edit then"] = document.journal_error
 told["save then"] = said(document.save)
 again = Document(lambda: Journal(disk / "journal"))

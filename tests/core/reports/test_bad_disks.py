@@ -40,11 +40,11 @@ except AppError as error:
 told["old"] = old.read_bytes() == data
 told["crash"] = str(reports.add(Crash("studio", "x" * 9000)))
 run = StudioRun(disk / "runs", disk / "log")
-run.begin()
-told["noted"] = run.is_noted
+run.start()
+told["noted"] = run.is_recorded
 told["left"] = [str(each) for each in run.left()]
 told["offered"] = [each.part for each in reports.take_new()]
-run.end()
+run.finish()
 told["files"] = sorted(each.name for each in disk.rglob("*") if each.is_file())
 print(json.dumps(told))
 """
@@ -84,7 +84,7 @@ class Lines(logging.Handler):
 logging.getLogger().addHandler(Lines())
 disk = Path(sys.argv[1])
 with StudioRun(disk / "runs", disk / "log") as run:
-    noted, left = run.is_noted, run.left()
+    noted, left = run.is_recorded, run.left()
 reports = CrashReports(disk / "log" / "crashes")
 print(json.dumps({"noted": noted, "left": len(left), "lines": len(lines), "new": len(reports.take_new()),
                   "all": len(reports.all())}))

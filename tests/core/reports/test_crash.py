@@ -40,8 +40,8 @@ def test_unknown_signal_is_described_by_its_number() -> None:
 def test_crash_trace_follows_output_of_the_process() -> None:
     code = (
         "import os, signal, sys\n"
-        "from nep.system.crash_trace import say_where_it_crashes\n"
-        "say_where_it_crashes()\n"
+        "from nep.system.crash_trace import enable_crash_trace\n"
+        "enable_crash_trace()\n"
         "print('my last words', file=sys.stderr, flush=True)\n"
         "def deep_inside(): os.kill(os.getpid(), signal.SIGSEGV)\n"
         "deep_inside()\n"
@@ -75,8 +75,8 @@ def test_output_without_trace_is_not_split() -> None:
 def test_crash_handler_works_without_stderr() -> None:
     code = (
         "import sys; sys.stderr = None\n"
-        "from nep.system.crash_trace import say_where_it_crashes\n"
-        "say_where_it_crashes(); print('well')"
+        "from nep.system.crash_trace import enable_crash_trace\n"
+        "enable_crash_trace(); print('well')"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "well\n"

@@ -20,7 +20,7 @@ BEGIN = (
     "from pathlib import Path\n"
     "from app.core.reports.studio_run import StudioRun\n"
     "run = StudioRun(Path(sys.argv[1]), Path(sys.argv[2]))\n"
-    "run.begin()\n"
+    "run.start()\n"
     "print('begun', flush=True)\n"
 )
 

@@ -33,11 +33,11 @@ MODULES = ("app.robots.turtle",)
 STRANGER = """
 import json, sys
 import nep
-from app.robots.description.description import td_for
+from app.robots.description.description import thing_description
 from app.robots.turtle import ROBOT
 with nep.node("stranger") as node:
     publisher = node.new_pub("/Turtle/description", "robot/description", latched=True)
-    publisher.publish(td_for(ROBOT.thing_model, "Turtle"))
+    publisher.publish(thing_description(ROBOT.thing_model, "Turtle"))
     sys.stdin.read()
 """
 

@@ -23,13 +23,13 @@ import os, subprocess, sys, threading
 from pathlib import Path
 from app.core.self_test import SelfTest, bounds, prepare
 
-bounds.STEP_S["window"], bounds.GRACE_S = 0.2, 0.2
+bounds.STEP_TIMEOUTS_S["window"], bounds.GRACE_S = 0.2, 0.2
 test = SelfTest(prepare(Path(sys.argv[1]), os.environ, is_root=False), {})
 child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
 print(child.pid, flush=True)
 
 def show():
-    test.begin("window", "the window")
+    test.start_step("window", "the window")
     threading.Event().wait()
 
 test.run(show)

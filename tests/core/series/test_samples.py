@@ -144,7 +144,7 @@ def test_figures_of_a_range_match_its_samples(made, one, other) -> None:
     if not inside:
         assert found == RangeStats()
         return
-    assert (found.count, found.minimum, found.most) == (len(inside), min(inside), max(inside))
+    assert (found.count, found.minimum, found.maximum) == (len(inside), min(inside), max(inside))
     assert found.mean == pytest.approx(
         math.fsum(inside) / len(inside), rel=1e-9, abs=1e-9 * max(map(abs, inside))
     )

@@ -341,7 +341,7 @@ def test_missing_participant_index_is_reported() -> None:
     """In a program of its own: Cyclone DDS leaves its sockets behind."""
     code = """
     from nep.backends.ros2 import environment
-    environment._PARTICIPANTS = 0
+    environment._MAX_PARTICIPANT_INDEX = 0
     try:
         node.new_pub('t')
     except nep.NepError as error:

@@ -27,7 +27,7 @@ ELSEWHERE = """
     real_ns, shift_ns = time.time_ns, round(float(sys.argv[2]) * 1e9)
     time.time_ns = lambda: real_ns() + shift_ns
     from nep.system import computer
-    computer.clock_name = lambda: "another computer"
+    computer.system_identifier = lambda: "another computer"
     import nep
     with nep.node("far", master=sys.argv[1]) as node:
         pub = node.new_pub("/far")

@@ -396,7 +396,7 @@ def test_slots_of_a_killed_reader_are_released() -> None:
         print("open")
         kept = []
         for line in sys.stdin:
-            kept.append(reader._next())
+            kept.append(reader._receive_next())
             print(len(kept))
     """
     writer = SharedWriter(next(_ids))

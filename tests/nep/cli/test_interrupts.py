@@ -95,8 +95,8 @@ def test_interrupt_during_interpreter_shutdown_exits_with_130():
 
 def test_second_interrupt_ends_a_command_during_cleanup():
     done = python(
-        "import os, signal; from nep.cli.interrupts import ask_first\n"
-        "ask_first()\n"
+        "import os, signal; from nep.cli.interrupts import raise_on_interrupt\n"
+        "raise_on_interrupt()\n"
         "try: os.kill(os.getpid(), signal.SIGINT)\n"
         "except KeyboardInterrupt: print('bye', flush=True); os.kill(os.getpid(), signal.SIGINT)\n"
         "print('never')"
@@ -107,10 +107,10 @@ def test_second_interrupt_ends_a_command_during_cleanup():
 @pytest.mark.parametrize("kept", ["SIG_IGN", "SIG_DFL"])
 def test_inherited_signal_handling_is_preserved(kept):
     done = python(
-        f"import os, signal; from nep.cli.interrupts import ask_first, end_at_once\n"
+        f"import os, signal; from nep.cli.interrupts import raise_on_interrupt, exit_on_interrupt\n"
         f"signal.signal(signal.SIGINT, signal.{kept})\n"
-        f"ask_first(); assert signal.getsignal(signal.SIGINT) is signal.{kept}\n"
-        f"end_at_once(); assert signal.getsignal(signal.SIGINT) is signal.{kept}\n"
+        f"raise_on_interrupt(); assert signal.getsignal(signal.SIGINT) is signal.{kept}\n"
+        f"exit_on_interrupt(); assert signal.getsignal(signal.SIGINT) is signal.{kept}\n"
     )
     assert done.returncode == 0, done.stderr
 
@@ -118,16 +118,16 @@ def test_inherited_signal_handling_is_preserved(kept):
 def test_every_termination_signal_is_handled_once_and_nohup_is_respected():
     done = python(
         "import os, signal\n"
-        "from nep.cli.interrupts import call_first, leave_when_told\n"
+        "from nep.cli.interrupts import call_on_signal, exit_on_termination\n"
         "for name in ('SIGINT', 'SIGTERM', 'SIGHUP'):\n"
         "    seen = []\n"
-        "    leave_when_told(7)\n"
-        "    call_first(lambda: seen.append(name))\n"
+        "    exit_on_termination(7)\n"
+        "    call_on_signal(lambda: seen.append(name))\n"
         "    os.kill(os.getpid(), getattr(signal, name))\n"
         "    assert seen == [name]\n"
         "    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL\n"
         "signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
-        "leave_when_told(7)\n"
+        "exit_on_termination(7)\n"
         "assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN\n"
         "try: os.kill(os.getpid(), signal.SIGTERM)\n"
         "finally: print('bye', flush=True)\n"

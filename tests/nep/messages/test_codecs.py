@@ -315,8 +315,8 @@ def test_encoding_an_unknown_value_does_not_import_numpy():
     """orjson would, in the middle of `publish`: the publisher stalled for 0.1 s at its first subscriber."""
     code = (
         "import sys\n"
-        "from nep.messages.codecs import JSON, Encoded, ordinary\n"
-        "for encode in (JSON.encode, ordinary(JSON)):\n"
+        "from nep.messages.codecs import JSON, Encoded, fast_encoder\n"
+        "for encode in (JSON.encode, fast_encoder(JSON)):\n"
         "    for payload in ({1, 2}, Encoded(b'1')):\n"
         "        try: encode(payload)\n"
         "        except Exception: pass\n"

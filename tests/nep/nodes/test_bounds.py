@@ -131,7 +131,7 @@ def test_graph_reply_without_a_pending_call_is_not_decoded(pair: SimpleNamespace
     pair.router.send_multipart([sender, encoding.encode_reply(Done(7, 1), 1)])
     answers: list[object] = []
     eventually(lambda: bool(answers.extend(pair.calls.read()) or answers))
-    assert [type(each.what) for each in answers] == [Done]  # type: ignore[attr-defined]
+    assert [type(each.content) for each in answers] == [Done]  # type: ignore[attr-defined]
 
 
 def test_many_pushes_are_read_in_slices(pair: SimpleNamespace) -> None:

@@ -294,7 +294,7 @@ def test_record_is_dropped_if_the_log_thread_cannot_start():
     threading.stack_size(1 << 30)
     resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30))
     handler.logger.warning("nobody can publish this")
-    print(handler.left_out)
+    print(handler.unreported_drops)
     handler.close()
     """
     with running(code) as program:

@@ -29,7 +29,7 @@ assert bus.registerService("org.freedesktop.portal.Desktop")
 print("up", flush=True)
 app.exec()
 """
-ASK = "from app.ui.startup.portal import chooser_answers; print(chooser_answers())"
+ASK = "from app.ui.startup.portal import has_file_chooser; print(has_file_chooser())"
 BOTH = """
 import subprocess, sys
 def ask():

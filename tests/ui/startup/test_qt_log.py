@@ -101,8 +101,8 @@ WINDOWED = """
 import json, sys, threading
 sys.stdout = sys.stderr = None
 from PySide6.QtCore import qWarning
-from app.ui.startup.qt_log import listen
-log = listen()
+from app.ui.startup.qt_log import install_handlers
+log = install_handlers()
 def fail():
     raise ValueError("in a thread")
 thread = threading.Thread(target=fail)

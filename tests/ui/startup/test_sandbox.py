@@ -40,7 +40,7 @@ def told(*of):
     if (child := os.fork()) == 0:
         if of:
             guard(*of)
-        os._exit(0 if SandboxTrial().allowed() else 1)
+        os._exit(0 if SandboxTrial().is_allowed() else 1)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 print(told(), told(UNSHARE, 0x10000000, 13), told(UNSHARE, 0x20000000, 1), told(CHROOT, 0, 1))
 """

@@ -32,9 +32,9 @@ WAIT_MS = 30_000
 SECOND = """
 import sys
 from pathlib import Path
-from app.ui.startup.single_instance import StartRequest, hand_over
+from app.ui.startup.single_instance import StartRequest, send_request
 files = tuple(Path(each) for each in sys.argv[2:])
-sys.exit(0 if hand_over(sys.argv[1], StartRequest(files)) else 3)
+sys.exit(0 if send_request(sys.argv[1], StartRequest(files)) else 3)
 """
 
 
@@ -73,11 +73,11 @@ STARTING = """
 import sys
 from pathlib import Path
 from app.core.storage.file_lock import FileLock
-from app.ui.startup.single_instance import StartRequest, found
+from app.ui.startup.single_instance import StartRequest, pass_to_running
 print("begun", flush=True)
 turn = FileLock(Path(sys.argv[2]))
-there = found(sys.argv[1], StartRequest((Path("a.nepb"),)), turn, 60.0)
-print("found" if there else "first", flush=True)
+there = pass_to_running(sys.argv[1], StartRequest((Path("a.nepb"),)), turn, 60.0)
+print("pass_to_running" if there else "first", flush=True)
 sys.stdin.read()
 """
 

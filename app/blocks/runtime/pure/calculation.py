@@ -1,6 +1,6 @@
 """Functions of the category "Numbers".
 
-Angles are in degrees. Values that aren't finite numbers raise BehaviourError (`values.number`).
+Angles are in degrees. Functions raise BehaviourError for values that aren't finite numbers (`values.number`).
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ _MAX_EXACT_INTEGER = 2**53
 
 
 def square_root(value: object) -> int | float:
-    """Return the square root."""
+    """Return the square root of a number. Raises BehaviourError for negative numbers."""
     return _apply(math.sqrt, value, lazy("“square root”"))
 
 
 def absolute(value: object) -> int | float:
-    """Return the absolute value."""
+    """Return the absolute value of a number."""
     return abs(number(value, lazy("“absolute value”")))
 
 
@@ -53,7 +53,7 @@ def cosine(degrees: object) -> int | float:
 
 
 def tangent(degrees: object) -> int | float:
-    """Return the tangent of an angle in degrees. Raises BehaviourError at 90 degrees."""
+    """Return the tangent of an angle in degrees. Raises BehaviourError at odd multiples of 90 degrees."""
     what = lazy("“tan”")
     if abs(number(degrees, what)) % 180 == 90:
         raise _no_result_error(what, degrees)
@@ -61,27 +61,27 @@ def tangent(degrees: object) -> int | float:
 
 
 def arc_sine(value: object) -> int | float:
-    """Return the angle in degrees with this sine."""
+    """Return the angle in degrees whose sine is a number."""
     return _rounded_result(math.degrees(_apply(math.asin, value, lazy("“asin”"))))
 
 
 def arc_cosine(value: object) -> int | float:
-    """Return the angle in degrees with this cosine."""
+    """Return the angle in degrees whose cosine is a number."""
     return _rounded_result(math.degrees(_apply(math.acos, value, lazy("“acos”"))))
 
 
 def arc_tangent(value: object) -> int | float:
-    """Return the angle in degrees with this tangent."""
+    """Return the angle in degrees whose tangent is a number."""
     return _rounded_result(math.degrees(math.atan(number(value, lazy("“atan”")))))
 
 
 def natural_logarithm(value: object) -> int | float:
-    """Return the logarithm to the base e."""
+    """Return the logarithm of a number to the base e."""
     return _apply(math.log, value, lazy("“ln”"))
 
 
 def logarithm(value: object) -> int | float:
-    """Return the logarithm to the base 10."""
+    """Return the logarithm of a number to the base 10."""
     return _apply(math.log10, value, lazy("“log”"))
 
 
@@ -108,23 +108,27 @@ def rounded_to(value: object, places: object) -> int | float:
 
 
 def smaller(one: object, other: object) -> int | float:
-    """Return the smaller of both numbers."""
+    """Return the smaller of two numbers."""
     return min(number(one, lazy("“smaller”")), number(other, lazy("“smaller”")))
 
 
 def larger(one: object, other: object) -> int | float:
-    """Return the larger of both numbers."""
+    """Return the larger of two numbers."""
     return max(number(one, lazy("“larger”")), number(other, lazy("“larger”")))
 
 
 def limited(value: object, low: object, high: object) -> int | float:
-    """Limit a number to a range, whose ends may be swapped."""
+    """Limit a number to a range; the limits may be given in any order."""
     found, first, last = (number(each, lazy("“limit”")) for each in (value, low, high))
     return max(min(first, last), min(max(first, last), found))
 
 
 def mapped(value: object, low: object, high: object, new_low: object, new_high: object) -> int | float:
-    """Map a number linearly from one range to another. Raises BehaviourError if the first range is empty."""
+    """Scale a number linearly from one range to another.
+
+    Raises:
+        BehaviourError: The first range is empty.
+    """
     what = lazy("“map”")
     found, first, last, to_first, to_last = (
         number(each, what) for each in (value, low, high, new_low, new_high)
@@ -135,39 +139,39 @@ def mapped(value: object, low: object, high: object, new_low: object, new_high: 
 
 
 def is_even(value: object) -> bool:
-    """Return True for an even whole number."""
+    """Return True if the value is an even integer."""
     return is_whole(value) and int(number(value, lazy("“even”"))) % 2 == 0
 
 
 def is_odd(value: object) -> bool:
-    """Return True for an odd whole number."""
+    """Return True if the value is an odd integer."""
     return is_whole(value) and int(number(value, lazy("“odd”"))) % 2 == 1
 
 
 def is_whole(value: object) -> bool:
-    """Return True for a number without a fractional part."""
+    """Return True if the number has no fractional part."""
     found = number(value, lazy("“is”"))
     return isinstance(found, int) or found.is_integer()
 
 
 def is_positive(value: object) -> bool:
-    """Return True for a number greater than 0."""
+    """Return True if the number is greater than 0."""
     return number(value, lazy("“positive”")) > 0
 
 
 def is_negative(value: object) -> bool:
-    """Return True for a number less than 0."""
+    """Return True if the number is less than 0."""
     return number(value, lazy("“negative”")) < 0
 
 
 def is_divisible(value: object, by: object) -> bool:
-    """Return True if the remainder is 0, in decimal arithmetic: 0.3 is divisible by 0.1."""
+    """Return True if a number is divisible by another one, in decimal arithmetic: 0.3 is divisible by 0.1."""
     found, divisor = (number(each, lazy("“is divisible by”")) for each in (value, by))
     return Fraction(str(found)) % Fraction(str(divisor)) == 0
 
 
 def counting(first: object, last: object, step: object) -> Iterator[int | float]:
-    """Yield the numbers from first to last, up or down; the sign of the step is ignored."""
+    """Yield the numbers from `first` to `last`, ascending or descending; the sign of `step` is ignored."""
     what = lazy("“count”")
     begin, end, wide = (number(each, what) for each in (first, last, step))
     if wide == 0:

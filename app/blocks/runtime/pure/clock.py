@@ -1,4 +1,4 @@
-"""Functions of the category "Time": date and time of this computer."""
+"""Functions of the category "Time": local date and time of this computer."""
 
 from __future__ import annotations
 
@@ -22,12 +22,17 @@ _DAYS = (
 
 
 def now(part: str) -> object:
-    """Return one part of the current date and time; Monday is day 1 of the week."""
+    """Return one part of the current date and time.
+
+    Args:
+        part: "year", "month", "day", "hour", "minute", "second", "weekday" (1 for Monday), "day name",
+            "date", "time" or "date and time".
+    """
     return date_part(_now(), part)
 
 
 def date_part(moment: datetime, part: str) -> object:
-    """Return one part of a date and time."""
+    """Return one part of a date and time; see `now`."""
     if part in ("year", "month", "day", "hour", "minute", "second"):
         return getattr(moment, part)
     if part == "weekday":
@@ -38,12 +43,24 @@ def date_part(moment: datetime, part: str) -> object:
 
 
 def seconds_since(moment: object) -> float:
-    """Return the seconds since a time of today, a date, or both; negative if it is in the future."""
+    """Return the seconds since a time of today, a date, or a date with time; negative for the future.
+
+    Raises:
+        BehaviourError: The text is not a date or time.
+    """
     return round((_now() - parse_moment(text(moment), _now())).total_seconds(), 3)
 
 
 def parse_moment(written: str, today: datetime) -> datetime:
-    """Parse “14:30”, “2026-11-23” or “2026-11-23 14:30:05”. Raises BehaviourError."""
+    """Parse a text such as “14:30”, “2026-11-23” or “2026-11-23 14:30:05”.
+
+    Args:
+        written: Text.
+        today: Date that is used if the text contains only a time.
+
+    Raises:
+        BehaviourError: The text is not a date or time.
+    """
     words = written.strip()
     if ":" in words and "-" not in words:
         words = f"{today:%Y-%m-%d} {words.zfill(5) if words.count(':') == 1 else words.zfill(8)}"

@@ -1,7 +1,8 @@
 """Functions of the category "Lists".
 
-Items are numbered from 1. A list holds at most `MAX_ITEMS` items, including those of nested lists. Inserted
-lists are copied, so that no list contains itself.
+Items are numbered from 1. A list holds at most `MAX_ITEMS` items, including the items of nested lists.
+Inserted lists are copied, so that no list contains itself. Functions raise BehaviourError for values that
+aren't lists and for positions that don't exist.
 """
 
 from __future__ import annotations
@@ -26,25 +27,36 @@ FIRST, LAST, RANDOM = "first", "last", "random"
 
 
 def new_list(*items: object) -> list[object]:
-    """Return a list of these values."""
+    """Return a list with copies of the given values."""
     return _copy_list(items)
 
 
 def item(of: object, where: object) -> object:
-    """Return the item at a position: its number, "first", "last" or "random"."""
+    """Return an item of a list.
+
+    Args:
+        of: List.
+        where: Number of the item, "first", "last" or "random".
+    """
     items = _as_list(of)
     return items[_index(items, where)]
 
 
 def set_item(of: object, where: object, value: object) -> None:
-    """Replace the item at a position."""
+    """Replace an item of a list; see `item` for positions."""
     items = _mutable_list(of)
     place = _index(items, where)
     items[place] = _copy_if_room(items, value)
 
 
 def insert_item(of: object, where: object, value: object) -> None:
-    """Insert a value before the item at a position, or at the end (also for the number after the last)."""
+    """Insert a value before an item of a list, or at the end.
+
+    Args:
+        of: List.
+        where: Number of the item, "first" or "random"; "last" or the number after the last item appends.
+        value: Value to insert.
+    """
     items = _mutable_list(of)
     if where == LAST or (where != FIRST and where == len(items) + 1):
         place = len(items)
@@ -56,36 +68,40 @@ def insert_item(of: object, where: object, value: object) -> None:
 
 
 def add_item(of: object, value: object) -> None:
-    """Append a value."""
+    """Append a value to a list."""
     items = _mutable_list(of)
     items.append(_copy_if_room(items, value))
 
 
 def remove_item(of: object, where: object) -> object:
-    """Remove and return an item."""
+    """Remove and return an item of a list; see `item` for positions."""
     items = _mutable_list(of)
     return items.pop(_index(items, where))
 
 
 def contains(where: object, value: object) -> bool:
-    """Return True if a list has an equal item, or a text contains this text."""
+    """Return True if a list contains an item, or a text contains another text."""
     if isinstance(where, str):
         return text(value) in where
     return any(_are_equal(each, value) for each in _as_list(where))
 
 
 def position(of: object, value: object) -> int:
-    """Return the number of the first equal item, or 0."""
+    """Return the number of the first item that equals a value; 0 if there is none."""
     return next((place for place, each in enumerate(_as_list(of), 1) if _are_equal(each, value)), 0)
 
 
 def each(of: object) -> list[object]:
-    """Return a copy of the items, so that a loop isn't affected by changes."""
+    """Return a shallow copy of a list for a loop, so that changes during the loop don't affect it."""
     return list(_as_list(of))
 
 
 def join_items(of: object, between: object) -> str:
-    """Join all items to a text with a separator."""
+    """Convert all items of a list to text and join them with a separator.
+
+    Raises:
+        BehaviourError: The text is too long.
+    """
     joint, pieces, size = text(between), [], 0
     for one in _as_list(of):
         pieces.append(text(one))
@@ -107,71 +123,71 @@ def split_text(words: object, at: object) -> list[object]:
 
 
 def part_of_list(of: object, first: object, last: object) -> list[object]:
-    """Return the items from one number to another, inclusive; numbers outside of the list are ignored."""
+    """Return the items from one number to another, inclusive; the range is limited to the list."""
     begin, end = (math.floor(number(each, lazy("“items”"))) for each in (first, last))
     return _copy_list(_as_list(of)[max(begin, 1) - 1 : max(end, 0)])
 
 
 def is_empty_list(of: object) -> bool:
-    """Return True if the list is empty."""
+    """Return True if a list is empty."""
     return not _as_list(of)
 
 
 def clear_list(of: object) -> None:
-    """Remove all items."""
+    """Remove all items from a list."""
     _mutable_list(of).clear()
 
 
 def copy_of(of: object) -> list[object]:
-    """Return a copy of the list."""
+    """Return a deep copy of a list."""
     return _copy_list(_as_list(of))
 
 
 def sorted_up(of: object) -> list[object]:
-    """Return the items in ascending order: numbers, then texts ignoring case, then the rest."""
+    """Return a list sorted in ascending order: numbers, then texts (ignoring case), then other values."""
     return sorted(_copy_list(_as_list(of)), key=_sort_key)
 
 
 def sorted_down(of: object) -> list[object]:
-    """Return the items in descending order."""
+    """Return a list sorted in descending order; see `sorted_up`."""
     return sorted_up(of)[::-1]
 
 
 def turned_round(of: object) -> list[object]:
-    """Return the items in reverse order."""
+    """Return a list in reverse order."""
     return _copy_list(_as_list(of))[::-1]
 
 
 def shuffled(of: object) -> list[object]:
-    """Return the items in random order."""
+    """Return a list in random order."""
     items = _copy_list(_as_list(of))
     random.shuffle(items)
     return items
 
 
 def sum_of(of: object) -> int | float:
-    """Return the sum of the numbers; 0 for an empty list."""
+    """Return the sum of a list of numbers; 0 if the list is empty."""
     return sum(_numbers(of, lazy("“sum”")))
 
 
 def average_of(of: object) -> float:
-    """Return the mean of the numbers."""
+    """Return the mean of a list of numbers. Raises BehaviourError if the list is empty."""
     items = _non_empty(_numbers(of, lazy("“average”")))
     return sum(items) / len(items)
 
 
 def smallest_of(of: object) -> int | float:
-    """Return the smallest number."""
+    """Return the smallest number of a list. Raises BehaviourError if the list is empty."""
     return min(_non_empty(_numbers(of, lazy("“smallest number”"))))
 
 
 def largest_of(of: object) -> int | float:
-    """Return the largest number."""
+    """Return the largest number of a list. Raises BehaviourError if the list is empty."""
     return max(_non_empty(_numbers(of, lazy("“largest number”"))))
 
 
 def middle_of(of: object) -> int | float:
-    """Return the median of the numbers."""
+    """Return the median of a list of numbers. Raises BehaviourError if the list is empty."""
     return statistics.median(_non_empty(_numbers(of, lazy("“middle number”"))))
 
 

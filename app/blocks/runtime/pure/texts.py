@@ -1,7 +1,6 @@
 """Functions of the category "Text and answers".
 
-Characters are counted from 1 as the user sees them (`values.letters`). All values are converted to text
-first.
+Characters are grapheme clusters (`values.letters`), numbered from 1. All values are converted to text first.
 """
 
 from __future__ import annotations
@@ -27,7 +26,12 @@ _MAX_DIGITS = 300
 
 
 def letter(of: object, where: object) -> str:
-    """Return the character at a position: its number, "first", "last" or "random"."""
+    """Return a character of a text.
+
+    Args:
+        of: Text.
+        where: Number of the character, "first", "last" or "random".
+    """
     all_of_it = grapheme_clusters(text(of))
     if not all_of_it:
         raise BehaviourError(_("The text is empty."))
@@ -51,16 +55,13 @@ def letter(of: object, where: object) -> str:
 
 
 def part_of_text(of: object, first: object, last: object) -> str:
-    """Return the characters from one number to another, inclusive.
-
-    Numbers outside of the text are ignored.
-    """
+    """Return the characters from one number to another, inclusive; the range is limited to the text."""
     begin, end = (math.floor(number(each, lazy("“letters”"))) for each in (first, last))
     return "".join(grapheme_clusters(text(of))[max(begin, 1) - 1 : max(end, 0)])
 
 
 def position_in_text(of: object, piece: object) -> int:
-    """Return the position of the first occurrence of a text, or 0."""
+    """Return the number of the character at which a text first occurs in another text; 0 if missing."""
     whole, wanted = text(of), text(piece)
     found = whole.find(wanted) if wanted else -1
     return 0 if found < 0 else len(grapheme_clusters(whole[:found])) + 1
@@ -82,37 +83,37 @@ def ends_with(of: object, piece: object) -> bool:
 
 
 def same_words(one: object, other: object) -> bool:
-    """Return True if both texts are equal, ignoring case and surrounding white space."""
+    """Return True if two texts are equal, ignoring case and surrounding white space."""
     return _normalize(one) == _normalize(other)
 
 
 def is_empty(value: object) -> bool:
-    """Return True if the text is empty or consists of white space only."""
+    """Return True if a text contains nothing but white space."""
     return not text(value).strip()
 
 
 def in_capitals(value: object) -> str:
-    """Return the text in upper case."""
+    """Return a text in upper case."""
     return text(value).upper()
 
 
 def in_small_letters(value: object) -> str:
-    """Return the text in lower case."""
+    """Return a text in lower case."""
     return text(value).lower()
 
 
 def without_spaces_around(value: object) -> str:
-    """Return the text without surrounding white space."""
+    """Return a text without leading and trailing white space."""
     return text(value).strip()
 
 
 def backwards(value: object) -> str:
-    """Return the text reversed."""
+    """Return a text with its characters in reverse order."""
     return "".join(reversed(grapheme_clusters(text(value))))
 
 
 def replaced(of: object, old: object, new: object) -> str:
-    """Return the text with all occurrences of a substring replaced."""
+    """Return a text with all occurrences of a substring replaced."""
     whole, before, after = text(of), text(old), text(new)
     if not before:
         return whole
@@ -124,7 +125,7 @@ def replaced(of: object, old: object, new: object) -> str:
 
 
 def has_number(value: object) -> bool:
-    """Return True if the text contains a number."""
+    """Return True if a text contains a number."""
     return _parse_number(value) is not None
 
 

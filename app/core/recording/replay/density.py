@@ -18,7 +18,12 @@ MAX_MARKS = 2_000
 
 @dataclass(frozen=True, slots=True)
 class Density:
-    """Messages of each topic in each of ``buckets`` equal intervals of [``start_ns``, ``end_ns``)."""
+    """Message counts in equal intervals of the range [``start_ns``, ``end_ns``).
+
+    Attributes:
+        buckets: Number of intervals.
+        counts: Number of messages in each interval, by topic.
+    """
 
     start_ns: int
     end_ns: int
@@ -33,7 +38,12 @@ class Density:
 
 @dataclass(frozen=True, slots=True)
 class LossMark:
-    """Number of messages that were lost or not stored in the second that ends at ``at_ns``."""
+    """Losses of a topic within one second.
+
+    Attributes:
+        at_ns: End of the second.
+        count: Number of messages that were lost or could not be written.
+    """
 
     at_ns: int
     count: int
@@ -47,9 +57,9 @@ class _Result:
 
 
 class Densities:
-    """Message counts of one recording for the timeline, with losses and spans.
+    """Message counts, losses and spans of one recording for the timeline.
 
-    Results arrive some ticks after the request. Not thread-safe: use it from the window's thread.
+    Results are available some ticks after a request. Not thread-safe; use it from the main thread.
     """
 
     def __init__(self, recording: Recording) -> None:
@@ -64,7 +74,13 @@ class Densities:
         self._worker.submit("spans", lambda: _Result(spans=spans_of(recording)))
 
     def request(self, start_ns: int, end_ns: int, buckets: int) -> None:
-        """Request the message counts of the visible range. Repeating a request has no effect."""
+        """Request the message counts of the visible range. A repeated request has no effect.
+
+        Args:
+            start_ns: Start of the range.
+            end_ns: End of the range.
+            buckets: Number of intervals.
+        """
         wanted = (start_ns, end_ns, buckets)
         if wanted == self._wanted or buckets < 1 or end_ns <= start_ns:
             return
@@ -72,7 +88,10 @@ class Densities:
         self._worker.submit("density", lambda: _Result(density=density_of(self._recording, *wanted)))
 
     def collect_results(self) -> bool:
-        """Store finished results; return True if there were any. `problem` is the reason of a failure."""
+        """Store finished results; return True if there were any.
+
+        After a failure, `problem` contains the reason.
+        """
         density, losses, spans = (self._pop(owner) for owner in ("density", "losses", "spans"))
         if density is not None:
             self.newest = density.density
@@ -95,16 +114,23 @@ class Densities:
 
 
 def density_of(recording: Recording, start_ns: int, end_ns: int, buckets: int) -> Density:
-    """Count the messages in each interval, using only the index of the recording."""
+    """Count the messages in each interval, using only the index of the recording.
+
+    Args:
+        recording: Open recording.
+        start_ns: Start of the range.
+        end_ns: End of the range.
+        buckets: Number of intervals.
+    """
     found = recording.densities(start_ns, end_ns, buckets)
     return Density(start_ns, end_ns, buckets, {topic: array("L", counts) for topic, counts in found.items()})
 
 
 def losses_of(recording: Recording) -> dict[str, tuple[LossMark, ...]]:
-    """Return the times at which the recorder's loss count of each topic increased.
+    """Return marks, by topic, for the times at which the recorder's loss counter increased.
 
-    Messages that arrived late were counted as lost before. They are subtracted from the newest earlier marks,
-    so that the sum of all marks is the final number of lost messages.
+    A message that arrived late was first counted as lost. Such messages are subtracted from the newest
+    earlier marks, so that the sum of all marks is the final number of lost messages.
     """
     found: dict[str, list[LossMark]] = {}
     before: dict[str, int] = {}

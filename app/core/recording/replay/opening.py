@@ -1,4 +1,4 @@
-"""Opening of a recording for replay, which reads only the index and writes nothing."""
+"""Opening of a recording for replay. Only the index is read, and nothing is written."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from nep.recordings.reader import Recording
 
 MAX_TOPICS = 10_000
 Progress = Callable[[float], object]
-"""Called with the progress of scanning the file (0 to 1). Raising an exception cancels the opening."""
+"""Callback for the progress of scanning a file (0 to 1). If it raises an exception, opening is cancelled."""
 
 
 @dataclass(frozen=True)
 class OpenedRecording:
-    """Recording that is open for replay."""
+    """Recording that is open for replay, with its bookmarks and statistics."""
 
     recording: Recording
     bookmarks: Bookmarks
@@ -28,7 +28,13 @@ class OpenedRecording:
 
 
 def open_recording(path: Path, progress: Progress, opener: RecordingOpener | None = None) -> OpenedRecording:
-    """Open a recording for replay. Raises `RecordingError` if no message can be read."""
+    """Open a recording for replay. Raises `RecordingError` if no message can be read.
+
+    Args:
+        path: File of the recording.
+        progress: Called with the progress of scanning a file without an index.
+        opener: Opens the file; by default, in this process.
+    """
 
     def report_progress(done: int, whole: int) -> None:
         progress(done / max(1, whole))

@@ -35,18 +35,19 @@ from nep.recordings.reader import RecordedTopic
 FAILED, NOT_CLOSED, DAMAGED = "recording:failed", "recording:not-closed", "recording:damaged"
 """Ids of the alerts of a replay."""
 SHOW_FILE = "recording.folder"
-"""Window command that shows the folder of a file; the path follows the name of the command."""
+"""Prefix of the window command that shows a file in its folder. The path of the file follows."""
 LOG_TOPICS = (LOG_TOPIC, LAST_ERRORS_TOPIC)
 STEP_NS = 1_000_000_000
 
 
 class Replay:
-    """Open recording. Not thread-safe: use it from the window's thread. `close` stops the background threads.
+    """Recording that is shown in the panels. Not thread-safe; use it from the main thread.
+
+    ``topics``, ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph`` correspond to
+    the attributes of a session for the live network. A recording has no nodes and no other networks.
 
     Attributes:
-        topics: As ``nodes``, ``networks``, ``images``, ``series``, ``console`` and ``graph``, the counterpart
-            of the live network's attribute in a session. A recording has no nodes and no other networks.
-        chosen: Topic whose messages `step` steps through.
+        chosen: Topic whose messages `step` steps through; "" for none.
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class Replay:
 
     @property
     def has_ended(self) -> bool:
-        """True if the thread has stopped; then all other resources are closed too."""
+        """True if the replay thread has stopped. All other resources are closed then."""
         if self.source.has_ended:
             self.close()
         return self.source.has_ended
@@ -114,7 +115,7 @@ class Replay:
 
     @property
     def status(self) -> ReplayStatus:
-        """Stage of opening the file, and playback status."""
+        """Status of opening the file and of playback."""
         return self.source.status
 
     @property
@@ -124,17 +125,17 @@ class Replay:
 
     @property
     def name(self) -> str:
-        """File name."""
+        """Name of the file."""
         return self.path.name
 
     @property
     def start_ns(self) -> int:
-        """Time of the first message; 0 while unknown."""
+        """Time of the first message in ns since 1970; 0 while unknown."""
         return self.opened.recording.start_ns if self.opened is not None else 0
 
     @property
     def end_ns(self) -> int:
-        """Time of the last message; 0 while unknown."""
+        """Time of the last message in ns since 1970; 0 while unknown."""
         return self.opened.recording.end_ns if self.opened is not None else 0
 
     @property
@@ -144,17 +145,17 @@ class Replay:
 
     @property
     def stats(self) -> Mapping[str, TopicStats]:
-        """Recording statistics by topic, as far as known."""
+        """Statistics written by the recorder, by topic, for topics with known statistics."""
         return self.opened.stats if self.opened is not None else {}
 
     @property
     def lost(self) -> int:
-        """Number of messages missing in the recording, counted for topics with known statistics."""
+        """Number of messages missing in the recording, for topics with known statistics."""
         return sum((each.lost or 0) + each.unkept for each in self.stats.values())
 
     @property
     def bookmarks(self) -> Sequence[Bookmark]:
-        """Bookmarks in order of time."""
+        """Bookmarks, in order of time."""
         return self.opened.bookmarks.all if self.opened is not None else ()
 
     def _position_ns(self) -> int:
@@ -164,36 +165,36 @@ class Replay:
     # -- commands of the user ----------------------------------------------------------------------
 
     def play(self) -> None:
-        """Play; at the end, restart from the beginning of the loop or recording."""
+        """Start playing. At the end, playback restarts at the beginning of the loop or recording."""
         player = self.player
         if player is not None and player.is_at_end:
             self.seek(player.loop[0] if player.loop is not None else self.start_ns)
         self.source.queue_change("play", lambda playback: playback.play())
 
     def pause(self) -> None:
-        """Pause."""
+        """Pause playback."""
         self.source.queue_change("play", lambda playback: playback.pause())
 
     def toggle(self) -> None:
-        """Play or pause."""
+        """Pause playback, or continue it."""
         if self.player is not None and self.player.is_playing:
             self.pause()
         else:
             self.play()
 
     def seek(self, at_ns: int) -> None:
-        """Seek to a time, limited to the recording."""
+        """Move the playhead to a time, limited to the range of the recording."""
         at_ns = max(self.start_ns, min(at_ns, self.end_ns))
         self.source.queue_change("seek", lambda playback: playback.seek(at_ns))
 
     def move(self, by_ns: int) -> None:
-        """Seek by an offset relative to the playhead."""
+        """Move the playhead by a duration in ns, which may be negative."""
         self.source.queue_change(
             "move", lambda playback: playback.seek(playback.status().position_ns + by_ns)
         )
 
     def step(self, *, forward: bool) -> None:
-        """Seek to the next or previous message of the chosen topic, and pause."""
+        """Pause, and move the playhead to the next or previous message of the chosen topic."""
         topic = self.chosen
         if topic in self.recorded_topics:
             self.source.queue_change("step", lambda playback: playback.step(topic, forward=forward))
@@ -213,7 +214,7 @@ class Replay:
         self.source.queue_change("speed", change)
 
     def loop(self, start_ns: int | None = None, end_ns: int | None = None) -> None:
-        """Loop a range; without arguments, the whole recording. An empty range is ignored."""
+        """Play a range in a loop; without arguments, the whole recording. An empty range is ignored."""
         if start_ns is not None and end_ns is not None:
             start_ns, end_ns = max(start_ns, self.start_ns), min(end_ns, self.end_ns)
             if start_ns >= end_ns:
@@ -221,11 +222,11 @@ class Replay:
         self.source.queue_change("loop", lambda playback: playback.loop(start_ns, end_ns))
 
     def end_loop(self) -> None:
-        """Stop looping; playback continues beyond the end of the range."""
+        """Stop looping. Playback continues after the end of the range."""
         self.source.queue_change("loop", lambda playback: playback.clear_loop())
 
     def toggle_loop(self) -> None:
-        """Start looping the chosen range or the whole recording, or stop looping."""
+        """Stop looping, or start to loop the chosen range or the whole recording."""
         player = self.player
         if player is not None and player.is_looping:
             self.end_loop()
@@ -233,7 +234,7 @@ class Replay:
             self.loop()
 
     def set_loop_edge(self, *, is_start: bool) -> None:
-        """Set the start or end of the loop to the playhead."""
+        """Set the start or the end of the loop to the playhead."""
         player = self.player
         if player is None:
             return
@@ -245,7 +246,10 @@ class Replay:
             self.loop(start_ns if start_ns < at_ns else self.start_ns, at_ns)
 
     def skip(self, *, forward: bool) -> None:
-        """Seek to the next or previous mark (a bookmark, or the start of an alarm or run), or to an end."""
+        """Move the playhead to the next or previous mark, or to an end of the recording.
+
+        Marks are bookmarks and the starts of alarms and runs.
+        """
         if self.opened is None:
             return
         at_ns, marks = self._position_ns(), [mark.at_ns for mark in self.bookmarks]
@@ -261,31 +265,41 @@ class Replay:
         return next((mark for mark in self.bookmarks if mark.at_ns == at_ns), None)
 
     def bookmark(self, name: str = "") -> Bookmark | None:
-        """Add a bookmark at the playhead. Raises `RecordingError` if the bookmark can't be saved."""
+        """Add and return a bookmark at the playhead; return None before the file is open.
+
+        Raises `RecordingError` if the bookmark can't be saved.
+        """
         return self.opened.bookmarks.add(self._position_ns(), name) if self.opened is not None else None
 
     def rename_bookmark(self, bookmark: Bookmark, name: str) -> None:
         """Rename a bookmark.
 
-        Raises `RecordingError`, or `ValueError` for a bookmark that is part of the recording.
+        Raises:
+            RecordingError: The change can't be saved.
+            ValueError: The bookmark is part of the recording.
         """
         if self.opened is not None:
             self.opened.bookmarks.rename(bookmark, name)
 
     def restore_bookmark(self, bookmark: Bookmark) -> None:
-        """Restore a removed bookmark. Raises `RecordingError`."""
+        """Restore a removed bookmark. Raises `RecordingError` if the change can't be saved."""
         if self.opened is not None:
             self.opened.bookmarks.add(bookmark.at_ns, bookmark.name)
 
     def remove_bookmark(self, bookmark: Bookmark) -> None:
-        """Remove a bookmark. Raises the same exceptions as `rename_bookmark`."""
+        """Remove a bookmark.
+
+        Raises:
+            RecordingError: The change can't be saved.
+            ValueError: The bookmark is part of the recording.
+        """
         if self.opened is not None:
             self.opened.bookmarks.remove(bookmark)
 
     # -- tick --------------------------------------------------------------------------------------
 
     def tick(self, now: float) -> None:
-        """Apply the messages read since the last tick; ``now`` is monotonic seconds."""
+        """Apply the messages read since the last tick at ``now`` (monotonic seconds)."""
         if self.opened is None and self.source.opened is not None and self.player is not None:
             self._on_opened(self.source.opened, now)
         self._alert_problems()
@@ -391,7 +405,7 @@ class Replay:
 
 
 def graph_of(topics: Mapping[str, RecordedTopic], figures: Mapping[str, TopicStats]) -> GraphView:
-    """Return the graph of a recording: topics, number of publishers of each, and losses."""
+    """Return a graph that represents a recording: its topics, their publisher counts, and losses."""
     found = {}
     for name, topic in topics.items():
         known = figures.get(name)

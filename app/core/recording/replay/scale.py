@@ -1,4 +1,4 @@
-"""Visible time range of a timeline, and formatting of times. Without side effects."""
+"""Visible time range of a timeline, and formatting of times. The functions have no side effects."""
 
 from __future__ import annotations
 
@@ -16,9 +16,13 @@ STEPS_S = (
 
 @dataclass(frozen=True, slots=True)
 class TimeScale:
-    """Scale of a timeline.
+    """Scale of a timeline. All times are in ns since 1970.
 
-    Shows [``begin_ns``, ``end_ns``] of a recording from ``first_ns`` to ``last_ns``.
+    Attributes:
+        first_ns: Start of the recording.
+        last_ns: End of the recording.
+        begin_ns: Start of the visible range.
+        end_ns: End of the visible range.
     """
 
     first_ns: int
@@ -28,7 +32,7 @@ class TimeScale:
 
     @classmethod
     def full(cls, first_ns: int, last_ns: int) -> TimeScale:
-        """Return the scale that shows a whole recording; at least one millisecond."""
+        """Return the scale that shows a whole recording, or one millisecond if the recording is shorter."""
         last_ns = max(last_ns, first_ns + MIN_SPAN_NS)
         return cls(first_ns, last_ns, first_ns, last_ns)
 
@@ -43,26 +47,31 @@ class TimeScale:
         return (self.begin_ns, self.end_ns) == (self.first_ns, self.last_ns)
 
     def relative_position(self, at_ns: int) -> float:
-        """Return the position of a time: 0 at the left edge, 1 at the right edge."""
+        """Return the position of a time in the visible range: 0 at the left edge, 1 at the right edge."""
         return (at_ns - self.begin_ns) / self.span_ns
 
     def time(self, share: float) -> int:
-        """Return the time at a position, limited to the recording."""
+        """Return the time at a position (0 at the left edge, 1 at the right), limited to the recording."""
         at_ns = self.begin_ns + round(share * self.span_ns)
         return max(self.first_ns, min(self.last_ns, at_ns))
 
     def zoomed(self, factor: float, at_ns: int) -> TimeScale:
-        """Return a zoomed scale (out for a factor above 1), with ``at_ns`` at the same position."""
+        """Return a zoomed scale in which ``at_ns`` stays at the same position.
+
+        Args:
+            factor: Ratio of the new to the current visible range; above 1 zooms out.
+            at_ns: Fixed time.
+        """
         whole = self.last_ns - self.first_ns
         span = max(MIN_SPAN_NS, min(whole, round(self.span_ns * factor)))
         return self._placed(at_ns - round(self.relative_position(at_ns) * span), span)
 
     def moved(self, by_ns: int) -> TimeScale:
-        """Return the scale shifted by a duration."""
+        """Return the scale shifted by a duration in ns."""
         return self._placed(self.begin_ns + by_ns, self.span_ns)
 
     def with_time(self, at_ns: int) -> TimeScale:
-        """Return the scale shifted, if necessary, so that a time is visible."""
+        """Return the scale, shifted as far as necessary to make a time visible."""
         if self.begin_ns <= at_ns <= self.end_ns:
             return self
         return self._placed(at_ns - self.span_ns // 8, self.span_ns)
@@ -72,12 +81,21 @@ class TimeScale:
         return replace(self, begin_ns=begin_ns, end_ns=begin_ns + span)
 
     def step_s(self, most: int) -> float:
-        """Return the interval between ruler marks in seconds, for at most ``most`` marks."""
+        """Return the interval between ruler marks in seconds.
+
+        Args:
+            most: Maximum number of marks.
+        """
         least = self.span_ns / 1e9 / max(1, most)
         return next((step for step in STEPS_S if step >= least), 86_400.0 * ceil(least / 86_400.0))
 
     def marks(self, most: int, *, by_clock: bool = False) -> Iterator[int]:
-        """Yield the times of ruler marks, aligned to the recording's start or to the time of day."""
+        """Yield the times of the ruler marks.
+
+        Args:
+            most: Maximum number of marks.
+            by_clock: True to align the marks to the local time of day, False to the recording's start.
+        """
         step_ns = round(self.step_s(most) * 1e9)
         origin_ns = offset_ns(self.first_ns) if by_clock else self.first_ns
         number = -((origin_ns - self.begin_ns) // step_ns)
@@ -87,12 +105,21 @@ class TimeScale:
 
 
 def offset_ns(at_ns: int) -> int:
-    """Return an offset (ns) near ``at_ns`` that aligns ruler marks to full hours of local time."""
+    """Return a time (ns since 1970) at which a local day starts, from which ruler marks are counted.
+
+    Args:
+        at_ns: Time that determines the UTC offset.
+    """
     return -(time.localtime(at_ns // 1_000_000_000).tm_gmtoff or 0) * 1_000_000_000
 
 
 def duration_text(ns: int, *, digits: int = 3) -> str:
-    """Format a duration: "7:26.412", "0:00", "1:02:03"."""
+    """Format a duration, such as "7:26.412", "0:00" or "1:02:03".
+
+    Args:
+        ns: Duration in ns.
+        digits: Number of decimals of the seconds.
+    """
     sign, ns = ("-", -ns) if ns < 0 else ("", ns)
     unit = 10 ** (9 - digits)
     whole, rest = divmod(ns // unit, 10**digits)
@@ -103,7 +130,12 @@ def duration_text(ns: int, *, digits: int = 3) -> str:
 
 
 def clock_text(at_ns: int, *, digits: int = 3) -> str:
-    """Format a local time of day: "15:09:37.412"."""
+    """Format a local time of day, such as "15:09:37.412".
+
+    Args:
+        at_ns: Time in ns since 1970.
+        digits: Number of decimals of the seconds.
+    """
     seconds, rest = divmod(at_ns, 1_000_000_000)
     then = time.localtime(seconds)
     words = f"{then.tm_hour}:{then.tm_min:02d}:{then.tm_sec:02d}"
@@ -111,5 +143,5 @@ def clock_text(at_ns: int, *, digits: int = 3) -> str:
 
 
 def date_text(at_ns: int) -> str:
-    """Format a local date: "2026-11-17"."""
+    """Format a local date, such as "2026-11-17"."""
     return time.strftime("%Y-%m-%d", time.localtime(at_ns // 1_000_000_000))

@@ -1,7 +1,7 @@
-"""Publishing of recorded topics on the live network, if the user has chosen and armed them.
+"""Publishing of recorded topics on the live network, after the user has chosen and armed them.
 
-Bytes and types are as recorded; the name of the topic may differ. Late messages are dropped and counted,
-never sent in a burst; messages skipped by a seek are not sent.
+Messages are published with their recorded bytes and types; the topic may be renamed. Late messages are
+dropped and counted, never sent in a burst. Messages skipped by a seek are not sent.
 """
 
 from __future__ import annotations
@@ -29,21 +29,26 @@ from nep.recordings.player import latched_topics, moving_topics, published_type
 from nep.recordings.reader import Recording
 
 MAX_DELAY_S = 0.1
-"""Delay beyond which a message is dropped."""
+"""Delay in seconds beyond which a message is dropped."""
 MAX_TYPES = 10
 """Maximum number of message types of a topic in one recording; messages of further types are dropped."""
 Submit = Callable[[str, Job], None]
 
 
 class ReplayRoute(NamedTuple):
-    """Topic of a recording, and the name under which it is published."""
+    """Topic of a recording and the topic on which it is published.
+
+    Attributes:
+        recorded: Name of the topic in the recording.
+        name: Name of the topic on the live network.
+    """
 
     recorded: str
     name: str
 
     @property
     def target(self) -> Target:
-        """Target on which the messages are published."""
+        """Target of the arming: the topic on the live network."""
         return Target("topic", self.name)
 
 
@@ -52,11 +57,11 @@ class SentTopic:
     """Topic of a recording that is being published.
 
     Attributes:
-        publishers: Publishers that are ready, by message type.
+        publishers: Open publishers, by message type.
         is_ready: True if messages can be sent.
         count: Number of sent messages.
         skipped: Number of dropped messages.
-        problem: Why the topic can't be published, or "".
+        problem: Reason why the topic can't be published, or "".
     """
 
     route: ReplayRoute
@@ -78,9 +83,9 @@ class SentTopic:
 
 
 class ReplayOutbox:
-    """Publishes messages of a replay while arming is on.
+    """Publisher of a replay's messages while publishing is armed.
 
-    `offer` is called in the replay's thread; the other methods may be called from any thread.
+    `offer` is called in the replay thread; the other methods are thread-safe.
     """
 
     def __init__(self, arming: Arming, submit: Submit, gate: MotionGate | None = None) -> None:
@@ -97,7 +102,14 @@ class ReplayOutbox:
             return tuple(self._active.values())
 
     def start(self, route: ReplayRoute, turn: int, msg_type: str, *, is_latched: bool) -> None:
-        """Publish a topic as soon as its publisher is ready, while the arming with number ``turn`` lasts."""
+        """Open a publisher for a topic and publish the topic once the publisher is ready.
+
+        Args:
+            route: Topic in the recording and on the live network.
+            turn: Number of the arming, after whose end nothing is published.
+            msg_type: Message type of the publisher.
+            is_latched: True if the topic is latched in the recording.
+        """
         sent = SentTopic(route, turn, is_latched)
         with self._lock:
             old = self._active.get(route.recorded)
@@ -107,7 +119,7 @@ class ReplayOutbox:
         self._create_publisher(sent, msg_type)
 
     def stop(self, recorded: str) -> SentTopic | None:
-        """Stop publishing a topic; return its final state."""
+        """Stop publishing a topic; return its final state, or None if it wasn't published."""
         with self._lock:
             ended = self._active.pop(recorded, None)
         if ended is not None:
@@ -115,7 +127,12 @@ class ReplayOutbox:
         return ended
 
     def offer(self, messages: Sequence[Message], late_s: Sequence[float]) -> None:
-        """Publish messages that were just played; ``late_s`` are their delays in seconds."""
+        """Publish messages that were just played.
+
+        Args:
+            messages: Messages in order of time.
+            late_s: Delay of each message in seconds.
+        """
         with self._lock:
             going = dict(self._active)
         for message, late in zip(messages, late_s, strict=True):
@@ -190,9 +207,9 @@ class ReplayOutbox:
 
 
 class ReplaySending:
-    """Topics of one recording that the user chose to publish.
+    """Selection and publishing of a recording's topics on the live network.
 
-    Not thread-safe: use it from the window's thread.
+    Not thread-safe; use it from the main thread.
     """
 
     def __init__(self, acting: SessionActing) -> None:
@@ -212,12 +229,12 @@ class ReplaySending:
         """Called when the set of published topics changes."""
 
     def open(self, opened: OpenedRecording) -> None:
-        """Set the recording when it has been opened."""
+        """Set the recording after it has been opened."""
         self._opened = opened
 
     @property
     def is_analyzed(self) -> bool:
-        """True if `learn` has determined which topics move robots."""
+        """True after `analyze` has determined which topics move robots."""
         return self._moving is not None
 
     def analyze(self) -> None:
@@ -229,17 +246,26 @@ class ReplaySending:
         self._worker.submit("topics", lambda: _moving_and_latched_topics(recording))
 
     def moves_robot(self, recorded: str, name: str) -> bool:
-        """Return True if messages of a topic move a robot, under the recorded or the given name."""
+        """Return True if messages of a topic move a robot.
+
+        Args:
+            recorded: Name of the topic in the recording.
+            name: Name of the topic on the live network.
+        """
         known = self._moving
         if known is not None and (known.robots_moved_by(recorded) or known.robots_moved_by(name)):
             return True
         return bool(self._acting.gate.moved_by(name))
 
     def select(self, recorded: str, name: str | None) -> str:
-        """Choose a topic for publishing under a name ("" for the recorded one); None deselects the topic.
+        """Choose a topic for publishing. Chosen topics are published once they are armed.
 
-        Chosen topics are published once they are armed. Returns the reason why the topic can't be chosen, or
-        "".
+        Args:
+            recorded: Name of the topic in the recording.
+            name: Name on the live network; "" for the recorded name, None to deselect the topic.
+
+        Returns:
+            Reason why the topic can't be chosen, or "".
         """
         if self._opened is None or recorded not in self._opened.recording.topics:
             return ""
@@ -260,9 +286,12 @@ class ReplaySending:
     # ---- switch
 
     def arm(self) -> str:
-        """Arm the chosen topics and publish them as they are played; return why that isn't possible, or "".
+        """Arm the chosen topics, which are then published as they are played.
 
-        The user is asked about each topic that moves robots, one after the other: `SessionActing.question`.
+        For each topic that moves robots, the user is asked first (`SessionActing.question`).
+
+        Returns:
+            Reason why publishing isn't possible, or "".
         """
         opened = self._opened
         if opened is None or not self.routes:
@@ -313,7 +342,7 @@ class ReplaySending:
         self._changed()
 
     def stop(self) -> None:
-        """Stop publishing, because the recording is closed."""
+        """Stop publishing all topics when the recording is closed."""
         if self.outbox.active_topics or self._pending_routes:
             self._acting.disarm()
         self._stop_all()
@@ -341,7 +370,7 @@ class ReplaySending:
         self._acting.log("warn" if is_bad else "info", route.target, words, sent)
 
     def tick(self) -> None:
-        """Stop publishing topics that are no longer allowed, or that now move another robot.
+        """Stop publishing topics that are no longer allowed, or that now move a different robot.
 
         Called at each tick.
         """
@@ -378,13 +407,13 @@ def _moving_and_latched_topics(recording: Recording) -> tuple[MovingTopics, froz
 
 
 def sent_text(sent: SentTopic) -> str:
-    """Format the message counts of a topic: "412 sent, 3 left out, being late"."""
+    """Format the message counts of a topic, such as "412 sent, 3 left out, being late"."""
     words = ngettext("{count} sent", "{count} sent", sent.count).format(count=sent.count)
     return f"{words}, {late_text(sent.skipped)}" if sent.skipped else words
 
 
 def late_text(count: int) -> str:
-    """Format the number of skipped messages: "3 late messages skipped"."""
+    """Format the number of dropped messages, such as "3 late messages skipped"."""
     template = ngettext("{count} late message skipped", "{count} late messages skipped", count)
     return template.format(count=count)
 

@@ -1,7 +1,7 @@
-"""Replay thread, which reads a recording and delivers the messages of watched topics at their times.
+"""Replay thread: reads a recording and delivers the messages of watched topics at their times.
 
-The window queues commands and collects results; neither blocks on the disk. This module uses no node:
-messages are delivered to the panels only.
+The window queues commands and collects results; neither blocks on the disk. Messages are delivered to
+panels only, so this module needs no node.
 """
 
 from __future__ import annotations
@@ -29,39 +29,44 @@ RATE_WINDOW_S = 2.0
 STATISTICS_INTERVAL_S = 0.5
 TOPICS_AT_ONCE = 100
 STATS_PAUSE_FACTOR = 10.0
-"""Minimum pause between two readings of statistics, as a multiple of their duration."""
+"""Minimum pause between two readings of statistics, as a multiple of the duration of the last reading."""
 HISTORY_S = (5.0, 20.0, 60.0, 180.0)
-"""Ranges before the playhead (s) that are read for topics with history, in this order."""
+"""Durations in seconds before the playhead that are read for topics with history, tried in this order."""
 HISTORY_TIMEOUT_S = 0.25
-"""Time limit for reading history."""
+"""Time limit in seconds for reading history."""
 MAX_HISTORY_MESSAGES = 8192
 MAX_COPIED_BYTES = 65_536
-"""Maximum size up to which messages are copied, so that a small message doesn't hold a whole block in memory.
+"""Maximum size in bytes of messages that are copied.
+
+A reference to a small message would keep a whole chunk of the file in memory.
 """
 
 ReplayStage = Literal["reading", "there", "failed"]
 PlaybackChange = Callable[[Playback], object]
 Forward = Callable[[Sequence[Message], Sequence[float]], object]
-"""Called in the replay's thread with played messages and their delays in seconds."""
+"""Callback for played messages and their delays in seconds. Called in the replay thread."""
 
 
 class PictureSink(Protocol):
-    """Receiver of images. Called in the replay's thread; decodes in another thread."""
+    """Receiver of images, which decodes them in another thread.
+
+    Its methods are called in the replay thread.
+    """
 
     def offer(self, messages: Sequence[Message]) -> None:
         """Add images, oldest first."""
 
     def rewind(self, topics: Sequence[str]) -> None:
-        """Discard the images of all topics except ``topics``, after a seek."""
+        """Discard the images of all topics except ``topics``. Called after a seek."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReplayStatus:
-    """State of the replay.
+    """Status of a replay.
 
     Attributes:
         progress: Progress of opening the file, 0 to 1.
-        sentence: Reason of a failure.
+        message: Reason for a failure, or "".
         player: Playback status; None before the file is open.
     """
 
@@ -77,8 +82,8 @@ class ReplayStats:
     """Statistics of a topic at the playhead; None if unknown.
 
     Attributes:
-        rate_hz: Rate in the time before the playhead.
-        newest_ns: Time of the newest message; None without a message.
+        rate_hz: Message rate in the time before the playhead.
+        newest_ns: Time of the newest message before the playhead; None if there is none.
     """
 
     rate_hz: float | None
@@ -87,12 +92,13 @@ class ReplayStats:
 
 @dataclass(slots=True)
 class ReplayResults:
-    """Messages returned by one call of `ReplaySource.pop_results`, to be applied in the order of the fields.
+    """Result of one call of `ReplaySource.pop_results`. The fields must be applied in their order.
 
     Attributes:
-        jump: Newest messages after a seek; None if there was no seek.
-        history: Earlier messages of topics with history.
-        drained: Messages played since.
+        seek_messages: Newest message of each topic after a seek; None if there was no seek.
+        history: Earlier messages of topics with history, by topic.
+        drained: Messages played after that.
+        figures: Statistics by topic.
     """
 
     seek_messages: Sequence[Message] | None = None
@@ -102,9 +108,9 @@ class ReplayResults:
 
 
 class ReplaySource:
-    """Source of one recording. `start` and `close` start and stop its thread.
+    """Source of messages from one recording, which a thread reads.
 
-    All other methods don't block.
+    No method blocks, except `close`.
     """
 
     def __init__(
@@ -141,7 +147,7 @@ class ReplaySource:
 
     @property
     def status(self) -> ReplayStatus:
-        """State after the last cycle of the thread."""
+        """Status after the last cycle of the replay thread."""
         return self._status
 
     def start(self) -> None:
@@ -149,10 +155,14 @@ class ReplaySource:
         self._thread.start()
 
     def queue_change(self, kind: str, change: PlaybackChange) -> None:
-        """Queue a change of the playback.
+        """Queue a change of playback.
 
-        A pending change of the same kind at the end of the queue is replaced, so that dragging the playhead
+        If the last queued change is of the same kind, it is replaced, so that dragging the playhead
         seeks only to the newest position.
+
+        Args:
+            kind: Kind of the change.
+            change: Function that the replay thread calls to apply the change.
         """
         with self._changed:
             if self._changes and self._changes[-1][0] == kind:
@@ -174,7 +184,12 @@ class ReplaySource:
         self.queue_change("choose", self._update_selection)
 
     def set_history_capacity(self, topic: str, room: int | None) -> None:
-        """Request history of a topic, and room for ``room`` messages per tick; None ends that."""
+        """Request the history of a topic in addition to its newest messages.
+
+        Args:
+            topic: Name of the topic.
+            room: Maximum number of messages per tick; None ends the request.
+        """
         with self._changed:
             if room is None:
                 self._deep.pop(topic, None)
@@ -186,13 +201,20 @@ class ReplaySource:
             self.queue_change(f"history {topic}", lambda playback: self._read_history(playback, [topic]))
 
     def forward(self, topics: Collection[str], to: Forward | None) -> None:
-        """Pass played messages of these topics also to ``to``, except the messages delivered by a seek."""
+        """Also pass the played messages of some topics to a callback.
+
+        Messages delivered by a seek are not passed.
+
+        Args:
+            topics: Names of the topics.
+            to: Callback; None ends the forwarding.
+        """
         with self._changed:
             self._sent, self._forward = frozenset(topics), to
         self.queue_change("choose", self._update_selection)
 
     def pop_results(self) -> ReplayResults:
-        """Return and clear the results since the last call."""
+        """Return and clear the results collected since the last call."""
         with self._changed:
             handed, self._results = self._results, ReplayResults()
             handed.drained = self._mailbox.drain()
@@ -244,7 +266,7 @@ class ReplaySource:
                 self.opened.recording.close()
 
     def open(self) -> None:
-        """Read the index and seek to the first message. Raises `RecordingError`."""
+        """Read the index of the file and seek to the first message. Raises `RecordingError`."""
         self.opened = opened = open_recording(self.path, self._report_progress, self._opener)
         self._playback = playback = Playback(opened.recording, clock=self._clock, topics=frozenset())
         playback.seek(opened.recording.start_ns)
@@ -407,11 +429,11 @@ class ReplaySource:
 
 
 class _ClosingError(Exception):
-    """The replay was closed while opening."""
+    """Raised in the replay thread when the replay is closed while the file is being opened."""
 
 
 def delays_of(due: DueMessages, status: PlayerStatus) -> list[float]:
-    """Return the delay of each message, in seconds of real time."""
+    """Return the delay of each due message in seconds of real time."""
     return [(status.position_ns - at_ns) / 1e9 / status.speed for at_ns in due.log_ns]
 
 

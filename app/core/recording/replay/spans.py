@@ -1,8 +1,8 @@
-"""Spans in a recording: runs of behaviours, and alarms. Read-only.
+"""Spans of time in a recording: runs of behaviours, and alarms.
 
-The spans are stored in the recorder's channels, where Studio writes them (`app.core.recording.events`;
-repeatedly in the flight recorder), and in the changes of the graph's alerts. Files of other programs and
-damaged files may contain anything there.
+Spans are read from the recorder's channels, to which Studio writes them (`app.core.recording.events`;
+in the flight recorder repeatedly), and from the graph's alerts. Files of other programs and damaged
+files may contain any data there.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from dataclasses import dataclass, replace
 from nep.recordings.reader import Recording
 
 MAX_SPANS = 2_000
-"""Maximum number of spans in each lane; further ones are only counted."""
+"""Maximum number of spans in each lane; further spans are only counted."""
 _MAX_NAME_LENGTH = 200
 RESULTS = ("ended", "stopped", "failed")
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedSpan:
-    """Run or alarm from ``start_ns`` to ``end_ns``, limited to the recording.
+    """Run or alarm from ``start_ns`` to ``end_ns``, clipped to the recording.
 
     Attributes:
         name: Name of the behaviour, or the sentence of the alarm.
         is_over: True if the run or alarm ended within the recording.
         result: Result of a run, one of `RESULTS`; "" while unknown.
-        words: Details of the result.
-        topic: Topic that the alarm is about, or "".
+        details: Details of the result.
+        topic: Topic of the alarm, or "".
     """
 
     start_ns: int
@@ -42,9 +42,10 @@ class RecordedSpan:
 
 @dataclass(frozen=True, slots=True)
 class RecordedSpans:
-    """Spans of a recording in order of time.
+    """Spans of a recording, in order of time.
 
-    ``left_out`` is the number of further spans that are not included.
+    Attributes:
+        omitted_count: Number of spans beyond the limit, which are not included.
     """
 
     runs: Sequence[RecordedSpan] = ()
@@ -57,7 +58,7 @@ class RecordedSpans:
 
 
 class _Lane:
-    """Spans of one kind by id. A later record of the same id replaces an earlier one."""
+    """Spans of one kind, by id. Records with the same id describe the same span."""
 
     def __init__(self, first_ns: int, last_ns: int) -> None:
         self._first_ns, self._last_ns = first_ns, last_ns

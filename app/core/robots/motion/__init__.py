@@ -1,4 +1,4 @@
 """Motion of real robots: the question to the user, the gate for messages, and commands of bridges.
 
-Proving that robots have stopped is the task of `app.core.robots.stop`.
+`app.core.robots.stop` stops robots and proves that they stand still.
 """

@@ -1,4 +1,4 @@
-"""Detection of commands that bridges publish to robots, by means of the graph."""
+"""Detection of commands that bridges publish to robots, based on the graph."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from nep.protocol.graph_view import BRIDGES_TOPIC, GraphView
 
 
 class BridgedCommands:
-    """Reports robots that received commands from bridges. Not thread-safe: use it from the window's thread.
+    """Detector of robots that receive commands from bridges. Not thread-safe; use it from the main thread.
 
-    A bridge announces itself on `BRIDGES_TOPIC`. The master counts its messages on the command topic of a
-    robot, so that it isn't necessary to subscribe to that topic.
+    A bridge announces itself on `BRIDGES_TOPIC`. The graph contains the number of messages that the
+    bridge published on a robot's command topic, so that no subscription is needed.
     """
 
     def __init__(self, on_moved: OnMoved) -> None:
@@ -21,7 +21,7 @@ class BridgedCommands:
         self._counts: dict[int, int] = {}
 
     def update(self, view: GraphView, robots: Iterable[Robot]) -> None:
-        """Apply a new graph; report robots that received commands from a bridge since the last one."""
+        """Apply a new graph; report robots that received commands from a bridge since the previous graph."""
         known = view.topics.get(BRIDGES_TOPIC)
         bridges = {publisher.node_id for publisher in known.publishers} if known is not None else set()
         counts: dict[int, int] = {}

@@ -1,8 +1,8 @@
-"""Gate for all messages that move robots: alarms, shelf, replays, clicks.
+"""Motion gate: check of all messages that may move robots, from alarms, the shelf, replays and clicks.
 
-The window's thread asks the user (`MotionGate.permits`). Any thread checks immediately before each message
-(`MotionGate.refusal`), so that a robot that connects in the meantime is not moved. `nep.programs.robots`
-decides which topics move robots.
+The main thread asks the user (`MotionGate.request_permission`). Any thread checks immediately before each
+message (`MotionGate.rejection_reason`), so that a robot that connects in the meantime is not moved.
+`nep.programs.robots` determines which topics move robots.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _GRAPH_TIMEOUT_S = 0.5
 
 
 class GatedRobots(Protocol):
-    """Information about robots that the gate needs."""
+    """Information about robots that `MotionGate` needs."""
 
     @property
     def moving_topics(self) -> MovingTopics:
-        """Topics whose messages move robots; a new object whenever they change."""
+        """Topics whose messages move robots. Replaced by a new object when they change."""
 
     @property
     def movable(self) -> Iterable[Robot]:
@@ -36,11 +36,11 @@ class GatedRobots(Protocol):
 
     @property
     def described_topics(self) -> frozenset[str]:
-        """Topics of the descriptions of `movable` robots that were parsed."""
+        """Description topics of the `movable` robots whose descriptions are valid."""
 
 
 class MovableRobots:
-    """Movable robots of the fleet for `MotionGate`. Not thread-safe: use it from the window's thread."""
+    """Movable robots of the fleet, for `MotionGate`. Not thread-safe; use it from the main thread."""
 
     def __init__(self, links: Mapping[str, RobotLink], names: Mapping[str, str]) -> None:
         self._links, self._names = links, names
@@ -51,7 +51,7 @@ class MovableRobots:
 
     @property
     def movable(self) -> tuple[Robot, ...]:
-        """Robots that can be moved, including real ones that lost their connection."""
+        """Robots that can be moved, including real robots whose connection is lost."""
         return tuple(link.robot for link in self._movable)
 
     @property
@@ -66,7 +66,7 @@ class MovableRobots:
 
     @property
     def moving_topics(self) -> MovingTopics:
-        """Topics whose messages move robots; a new object whenever they change."""
+        """Topics whose messages move robots. Replaced by a new object when they change."""
         links = self._movable
         now = [(link.robot, link.topics_before, link.identity) for link in links]
         described = self.described_topics
@@ -86,10 +86,10 @@ class _Snapshot(NamedTuple):
 
 
 class MotionGate:
-    """Decides which messages may be published on topics that move robots.
+    """Gate that decides which messages may be published on topics that move robots.
 
-    Use it from the window's thread. Only `refusal` and `refusal_now` are thread-safe; they use the state at
-    the time of the last `follow`.
+    Use it from the main thread. Only `refusal` and `current_rejection_reason` are thread-safe; they use the
+    state at the last call of `update`.
     """
 
     def __init__(self, permission: MotionPermission, robots: GatedRobots) -> None:
@@ -98,21 +98,29 @@ class MotionGate:
         self._snapshot = _Snapshot()
 
     def moved_by(self, topic: str, msg_type: str = "") -> tuple[str, ...]:
-        """Return the names of the robots that a message moves; the topic if the robot is unknown."""
+        """Return the names of the robots that a message moves; the topic's name if the robot is unknown."""
         return self._robots.moving_topics.robots_moved_by(topic, msg_type)
 
     def is_permitted(self, topic: str, msg_type: str = "") -> bool:
-        """Return True if a message may be published without asking the user."""
+        """Return True if a message may be published without asking the user.
+
+        Args:
+            topic: Topic of the message.
+            msg_type: Message type; "" if unknown.
+        """
         self.update()
         return not self.rejection_reason(topic, msg_type)
 
     def request_permission(
         self, topic: str, go_on: Callable[[], object], msg_type: str = "", *, reason: str = ""
     ) -> bool:
-        """Return True if a message may be published now.
+        """Return True if a message may be published now; otherwise ask the user and return False.
 
-        If not, the user is asked, and ``go_on`` is called if the answer is yes. ``reason`` tells the user
-        which part of Studio wants to publish.
+        Args:
+            topic: Topic of the message.
+            go_on: Called if the user allows the motion.
+            msg_type: Message type; "" if unknown.
+            reason: Sentence for the user about the part of Studio that wants to publish.
         """
         known = {robot.name: robot for robot in self._robots.movable}
         names = self.moved_by(topic, msg_type)
@@ -139,7 +147,10 @@ class MotionGate:
         self._followed_state = now
 
     def rejection_reason(self, topic: str, msg_type: str = "") -> str:
-        """Return why a message may not be published now; "" if it may. Thread-safe."""
+        """Return the reason why a message may not be published now; "" if it may be published.
+
+        Thread-safe.
+        """
         known = self._snapshot
         return _rejection_text(
             topic,
@@ -151,11 +162,9 @@ class MotionGate:
         )
 
     def current_rejection_reason(self, node: Node, topic: str, msg_type: str = "") -> str:
-        """Check like `refusal`, but get the graph from the master first.
+        """Check like `refusal`, but query the graph from the master first, which takes at most 0.5 s.
 
-        For the first message to new subscribers.
-
-        Thread-safe. Waits at most 0.5 s for the master.
+        Thread-safe. Use it for the first message to subscribers that have just connected.
         """
         refusal = self.rejection_reason(topic, msg_type)
         if refusal:

@@ -1,9 +1,9 @@
-"""Motion permission: the user is asked once for each real robot before it first moves.
+"""Motion permission: the user is asked once for each real robot before its first motion.
 
-Virtual robots need no permission if Studio knows their programs (`app.core.robots.launcher`). All ways to
-make a robot act are checked here: forms, palette, keys and programs, including programs that publish on a
-robot's topics. Stop is not. A permission is valid for the robot's current program; *always* for its name,
-model, program and computer.
+Virtual robots need no permission if Studio knows their programs (`app.core.robots.launcher`). All ways
+to make a robot act are checked here: forms, palette, keys and programs, including programs that publish
+on a robot's topics. Only Stop is not checked. A permission is valid for the robot's current program; if
+the user chooses *always*, it is valid for the robot's name, model, program and computer.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MAX_NAMED = 4
 
 
 class MayNotMoveError(AppError):
-    """Raised when robots have no permission to move yet and the user is being asked."""
+    """Raised when robots have no permission to move and the user is being asked."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self.names = tuple(names)
@@ -37,12 +37,13 @@ class MayNotMoveError(AppError):
 
 @dataclass(frozen=True)
 class Question:
-    """Question to the user whether robots may move.
+    """Question to the user about the motion of robots.
 
     Attributes:
         moves: Titles of the actions that move a robot, by robot.
         go_on: Called if the user allows the motion.
-        strangers: Robots without a readable description, or topics of unknown robots, that would move too.
+        strangers: Robots without a readable description, or topics of unknown robots, that would move
+            too.
         reason: Sentence about the origin of the command, or "" for a command of the user.
     """
 
@@ -58,12 +59,12 @@ class Question:
 
     @property
     def title(self) -> str:
-        """Title, such as "Allow Rover to move?"."""
+        """Title of the question, such as "Allow Rover to move?"."""
         return _("Allow {robots} to move?").format(robots=format_list(list(self.names)))
 
     @property
     def message(self) -> str:
-        """Sentences about the motion and how to stop it."""
+        """Text about the motion and how to stop it."""
         sentences = [self.reason] if self.reason else []
         sentences += [
             ngettext("{actions} moves {robot}.", "{actions} move {robot}.", len(actions)).format(
@@ -81,7 +82,7 @@ class Question:
 
 
 class MotionPermission:
-    """Permissions of robots to move. Not thread-safe: use it from the window's thread."""
+    """Permissions of robots to move. Not thread-safe; use it from the main thread."""
 
     def __init__(
         self,
@@ -113,9 +114,14 @@ class MotionPermission:
         strangers: Iterable[str] = (),
         reason: str = "",
     ) -> bool:
-        """Return True if these robots may perform these actions now, and ``strangers`` any action.
+        """Return True if the robots may move now; otherwise ask the user and return False.
 
-        If not, the question is opened, and ``go_on`` is called if the user allows the motion. See `Question`.
+        Args:
+            wanted: Robots and the actions that they should execute.
+            go_on: Called if the user allows the motion.
+            strangers: Robots without a readable description, or topics of unknown robots, that would
+                move too.
+            reason: Sentence about the origin of the command, or "" for a command of the user.
         """
         asked = [
             (robot, risky_actions(robot, actions)) for robot, actions in wanted if not self.is_allowed(robot)
@@ -130,9 +136,14 @@ class MotionPermission:
         return False
 
     def answer(self, *, let: bool, always: bool = False) -> None:
-        """Apply the user's answer; if it is yes, call ``go_on``.
+        """Apply the user's answer to the question.
 
-        Raises SettingsError if *always* can't be saved.
+        Args:
+            let: True to allow the motion and call ``go_on``.
+            always: True to save the permission.
+
+        Raises:
+            SettingsError: The permission can't be saved.
         """
         question, self.question = self.question, None
         self.revision += 1
@@ -150,7 +161,7 @@ class MotionPermission:
             question.on_allow()
 
     def withdraw(self) -> None:
-        """Close the question without an answer, because Stop was pressed or the robot disconnected."""
+        """Close the question without an answer, after Stop was pressed or the robot disconnected."""
         if self.question is not None:
             self.question = None
             self.revision += 1
@@ -185,7 +196,7 @@ def _stranger_label(name: str) -> str:
 
 
 def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
-    """Return the titles of the actions that move the robot, without duplicates; at most the first few."""
+    """Return the titles of the actions that move the robot, without duplicates, limited to the first few."""
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
     return (
@@ -194,9 +205,9 @@ def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
 
 
 def actions_by_robot(program: Program, robots: Iterable[Robot]) -> list[tuple[Robot, Sequence[str]]]:
-    """Return the actions that a program invokes on each robot.
+    """Return the robots that a program uses and the actions that it invokes.
 
-    Includes all actions of a robot if the program publishes on its topics directly.
+    If the program publishes on the topics of a robot directly, all actions of that robot are included.
     """
     asked, moved = program.actions, program.moves
     return [

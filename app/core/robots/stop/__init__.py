@@ -1,4 +1,4 @@
-"""Stop: recipients, required confirmations, proof, and robots that may still move.
+"""Stop: robots to stop, required confirmations, proof, and robots that may still move.
 
-Asking the user before a robot moves is the task of `app.core.robots.motion`.
+`app.core.robots.motion` asks the user before a robot moves.
 """

@@ -13,11 +13,11 @@ from nep.messages.message import Message
 from nep.protocol.graph_view import GraphView
 
 MAX_TOPICS = 32
-"""Maximum number of command topics of one robot: current ones first, then those of earlier descriptions."""
+"""Maximum number of command topics of one robot. Current topics take precedence over earlier ones."""
 
 
 class StopPublisher(Protocol):
-    """Part of the interface of nep's publisher that is used here."""
+    """Part of the interface of nep's publisher that Stop uses."""
 
     @property
     def subscribers(self) -> int:
@@ -26,7 +26,7 @@ class StopPublisher(Protocol):
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """Names of subscribed nodes that are not connected."""
+        """Names of nodes that subscribe but are not connected."""
         ...
 
     def publish(self, payload: object) -> None:
@@ -39,7 +39,7 @@ class StopPublisher(Protocol):
 
 
 class StopSubscriber(Protocol):
-    """Part of the interface of nep's subscriber that is used here."""
+    """Part of the interface of nep's subscriber that Stop uses."""
 
     def close(self) -> None:
         """Close the subscriber."""
@@ -47,18 +47,30 @@ class StopSubscriber(Protocol):
 
 
 class StopNode(Protocol):
-    """Part of the interface of nep's node that is used here."""
+    """Part of the interface of nep's node that Stop uses."""
 
     id: str
 
     def new_pub(self, topic: str, msg_type: str = "json", *, batch: bool) -> StopPublisher:
-        """Open a publisher. Without ``batch``, each message is sent immediately."""
+        """Open a publisher.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            batch: False to send each message immediately.
+        """
         ...
 
     def new_sub(
         self, topic: str, msg_type: str = "json", *, sink: Callable[[Sequence[Message]], None]
     ) -> StopSubscriber:
-        """Open a subscriber that passes messages to ``sink`` in the node's thread."""
+        """Open a subscriber.
+
+        Args:
+            topic: Name of the topic.
+            msg_type: Message type.
+            sink: Callback for received messages, called in the node's thread.
+        """
         ...
 
     def graph(self, timeout_s: float = 2.0) -> GraphView:
@@ -71,11 +83,11 @@ class StopTarget:
     """Robot to be stopped.
 
     Attributes:
-        identity: Program of the robot; None means the first program that announced it.
-        earlier: Earlier programs with the robot's name that may still be running and move it.
+        identity: Program of the robot; None for the first program that announced the robot.
+        earlier_programs: Earlier programs with the robot's name that may still be running and move the robot.
         topics: Topics of earlier descriptions.
-        is_expected: False if the reply is not awaited; the Stop is sent in case the robot is still
-            subscribed.
+        is_expected: False if the reply is not awaited. The Stop is then sent in case the robot still
+            receives commands.
     """
 
     robot: Robot
@@ -86,13 +98,18 @@ class StopTarget:
 
     @property
     def topic_sets(self) -> tuple[RobotTopics, ...]:
-        """Topics for the Stop: those of the current description, then those of earlier ones."""
+        """Topics for the Stop: topics of the current description, then topics of earlier descriptions."""
         return tuple(dict.fromkeys((self.robot.topics, *self.earlier_topics)))[:MAX_TOPICS]
 
 
 @dataclass
 class StopChannel:
-    """Publisher for one command topic of a robot, and the subscriber to the replies."""
+    """Publisher on one command topic of a robot, and subscriber to the replies.
+
+    Attributes:
+        subscriber: Subscriber to the replies; None if the robot can't confirm a Stop.
+        was_connected: True if the robot was connected at any time.
+    """
 
     topic: str
     publisher: StopPublisher
@@ -100,9 +117,13 @@ class StopChannel:
     was_connected: bool = False
 
     def is_connected(self, target: StopTarget, hearers: Collection[str]) -> bool:
-        """Return True if a message published now would reach the robot; ``hearers`` are the subscribed nodes.
+        """Return True if a message published now would reach the robot.
 
-        Robots of RIZE share one topic and can't be distinguished; they count as connected.
+        Robots of RIZE share one topic and can't be distinguished, so they count as connected.
+
+        Args:
+            target: Robot to be stopped.
+            hearers: Nodes that subscribe to the topic.
         """
         program = target.identity
         if self.subscriber is None or program is None:
@@ -125,7 +146,11 @@ class StopChannel:
 
 @dataclass
 class StopLine:
-    """Connections to one robot; ``error`` is the reason why one of them could not be opened."""
+    """Connections for stopping one robot.
+
+    Attributes:
+        error: Reason why a connection could not be opened, or "".
+    """
 
     target: StopTarget
     channels: dict[RobotTopics, StopChannel] = field(default_factory=dict)
@@ -148,13 +173,13 @@ class StopLine:
 
     @property
     def connection_problem(self) -> str:
-        """Why the robot can't have received anything; "" once a connection was established."""
+        """Reason why the robot can't have received a message; "" if it was connected at any time."""
         if any(way.was_connected for way in self.channels.values()):
             return ""
         return _("{robot} is not connected yet").format(robot=self.name)
 
     @property
     def send_problem(self) -> str:
-        """Why the Stop can't be sent to the robot."""
+        """Error message stating why the Stop can't be sent to the robot."""
         why = self.error or _("not connected yet; press Stop again")
         return _("Stop can't be sent to {robot}: {why}").format(robot=self.name, why=why)

@@ -1,9 +1,9 @@
-"""Robots that received a command and have not been proven to stand still since.
+"""Robots that have received a command and are not proven to stand still since then.
 
-`MovedRobots` decides which robots a Stop must report. A robot is recorded before any message that moves it is
-sent. It is removed when its own program confirms a Stop, when its own final reply ends the motion, or when
-the user confirms that it has stopped. Being suspended, crashing, leaving the graph and returning as another
-program do not remove it (docs/adr/0030-moved-robots.md).
+`MovedRobots` decides which robots a Stop must report. A robot is recorded before any message that moves
+it is sent. It is removed when its own program confirms a Stop, when its own final reply ends the
+motion, or when the user confirms that it has stopped. Being suspended, crashing, leaving the graph and
+returning as another program do not remove a robot (docs/adr/0030-moved-robots.md).
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from app.robots.identity import Identity
 from nep.i18n import _, lazy
 
 OnMoved: TypeAlias = Callable[[Sequence[str], str], object]
-"""Called before a message is sent, with the robots that it moves and the kind of the sender."""
+"""Callback before a message is sent, with the names of the robots that it moves and the kind of sender."""
 UNKNOWN_SENDERS: tuple[str, str] = ("action", "stop")
-"""Kinds of motions without a known sender: an action that the robot could not end, and an unproven Stop."""
+"""Values of `UnprovenMotion.sender` for an action that didn't end and for an unproven Stop."""
 MAX_MOTIONS = 64
-"""Maximum number of motions of one robot that are tracked by id; further ones end only with a Stop."""
+"""Maximum number of motions of one robot that are tracked by id. Further motions end only with a Stop."""
 
 _MESSAGES = {
     "form": lazy("{robot} received a command from a form and has not responded since"),
@@ -37,7 +37,7 @@ _MESSAGES = {
     "action": lazy("{robot} could not stop an action and has not responded since"),
     "stop": lazy("{robot} has not confirmed Stop"),
 }
-"""Reason for each kind of sender; `_OTHER` is used for unknown kinds."""
+"""Reason for each kind of sender. `_OTHER_MESSAGE` is used for other kinds."""
 _OTHER_MESSAGE = lazy("{robot} received a command and has not responded since")
 
 
@@ -50,7 +50,7 @@ class UnprovenMotion:
     """Command to a robot whose end has not been observed.
 
     Attributes:
-        number: Running number of all motions.
+        number: Serial number of the motion among all robots.
         by: Kind of sender.
         since_s: Time of the command (monotonic seconds).
         program: Program of the robot at that time.
@@ -76,7 +76,7 @@ class UnprovenMotion:
 
 
 class MovedRobots:
-    """Record of the robots that may move. Not thread-safe: use it from the window's thread."""
+    """Record of the robots that may be moving. Not thread-safe; use it from the main thread."""
 
     def __init__(
         self,
@@ -102,17 +102,17 @@ class MovedRobots:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the robots that may move, in the order of their commands."""
+        """Names of the robots that may be moving, in the order of their commands."""
         return tuple(self._motions)
 
     @property
     def mark(self) -> int:
-        """Number of the newest motion. A Stop that starts now does not apply to later motions."""
+        """Number of the newest motion. A Stop that starts now does not end motions with greater numbers."""
         return self._count
 
     @property
     def recently_commanded(self) -> tuple[str, ...]:
-        """Robots that received a command since the last but one graph."""
+        """Names of the robots that received a command after the second newest graph."""
         return tuple(self._sent)
 
     def motion(self, name: str) -> UnprovenMotion | None:
@@ -127,7 +127,9 @@ class MovedRobots:
     def other_programs(self, name: str, current: Identity | None) -> tuple[Identity, ...]:
         """Return other programs that received commands of a robot and may still be running.
 
-        ``current`` is the robot's own program.
+        Args:
+            name: Name of the robot.
+            current: Robot's own program.
         """
         others = {
             motion.program.node_id: motion.program
@@ -141,13 +143,13 @@ class MovedRobots:
     def record_command(
         self, names: Iterable[str], by: str, *, id: str = "", program: Identity | None = None
     ) -> None:
-        """Record that robots are about to receive a command that may move them; call this before sending it.
+        """Record that robots are about to receive a command that may move them. Call this before sending.
 
         Args:
             names: Names of the robots.
             by: Kind of sender: "form", "behaviour", "shelf", "key", "alarm", "replay", "bridge", ...
             id: Id of the invocation whose final reply ends the motion; "" if there is none.
-            program: Program of the robot; by default the current one.
+            program: Program of the robot; default: the current one.
         """
         for name in names:
             self._count += 1
@@ -173,13 +175,13 @@ class MovedRobots:
                 found.append(UnprovenMotion(self._count, name, by, self._clock(), other))
 
     def record_new_programs(self, newcomers: Mapping[str, Iterable[Identity]]) -> None:
-        """Record commands that newly listed programs may have received.
+        """Record commands that newly listed programs may have received before the graph listed them.
 
-        A program can receive a command before the graph lists it. Call this once for each graph. A graph is
-        older than the call, so commands since the last but one graph count.
+        Call this once for each graph. A graph is older than the call, so all commands after the second
+        newest graph count.
 
         Args:
-            newcomers: New programs of each robot in `sent_to`.
+            newcomers: New programs of each robot in `recently_commanded`.
         """
         for name, programs in newcomers.items():
             sent, found = self._sent[name], self._motions.get(name, [])
@@ -195,7 +197,13 @@ class MovedRobots:
         self._proven = {node: mark for node, mark in self._proven.items() if mark > last}
 
     def end_motion(self, name: str, id: str, program: Identity | None = None) -> None:
-        """End a motion of one program of the robot, because that program sent the final reply."""
+        """End a motion after the program that executed it has sent the final reply.
+
+        Args:
+            name: Name of the robot.
+            id: Id of the invocation.
+            program: Program that replied.
+        """
 
         def remains(motion: UnprovenMotion) -> bool:
             if motion.id != id or program is None or motion.program is None:
@@ -206,10 +214,10 @@ class MovedRobots:
             self._retain(name, remains)
 
     def record_stopped(self, name: str, programs: Collection[str], mark: int) -> None:
-        """End the motions of programs that confirmed a Stop; motions of other programs remain.
+        """End the motions of programs that confirmed a Stop. Motions of other programs remain.
 
         Args:
-            name: Robot.
+            name: Name of the robot.
             programs: Node ids of the programs.
             mark: Value of `mark` when the Stop started.
         """
@@ -227,7 +235,12 @@ class MovedRobots:
         )
 
     def apply_report(self, report: StopReport, mark: int) -> None:
-        """Apply the report of a Stop that started at ``mark``, for both proven and unproven robots."""
+        """Apply the report of a Stop, for robots that are proven to have stopped and for all others.
+
+        Args:
+            report: Result of the Stop.
+            mark: Value of `mark` when the Stop started.
+        """
         self.record_command((name for name in report.unconfirmed_names if name not in self), "stop")
         for name in report.stopped_names:
             self.record_stopped(name, report.programs(name), mark)
@@ -235,7 +248,12 @@ class MovedRobots:
             self.record_stop_received(name, mark)
 
     def record_stop_received(self, name: str, mark: int) -> None:
-        """End the motions of a robot that can't confirm (RIZE) and to which a Stop was sent at ``mark``."""
+        """End the motions of a robot that received a Stop but can't confirm it (RIZE).
+
+        Args:
+            name: Name of the robot.
+            mark: Value of `mark` when the Stop started.
+        """
         self._retain(name, lambda motion: motion.number > mark)
         if name in self._sent and self._sent[name].number <= mark:
             del self._sent[name]
@@ -247,9 +265,9 @@ class MovedRobots:
             self._sent.pop(name, None)
 
     def drop_ended(self, name: str) -> None:
-        """End the motions whose programs have exited.
+        """End the motions of a virtual robot whose program has exited.
 
-        Use this for virtual robots, which stop when their program exits.
+        A virtual robot stops with its program.
         """
         self._retain(name, lambda motion: motion.program is None or not self._has_ended(motion.program))
 

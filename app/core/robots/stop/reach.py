@@ -1,7 +1,8 @@
-"""Targets of a Stop: robots that are connected, may move, were connected, or are not listed. No sockets.
+"""Selection of the targets of a Stop. Performs no I/O.
 
-Unlisted are robots beyond the limit of the list and robots with an invalid description. They are reached on
-the command topics that the graph lists.
+Targets are robots that are connected, that may be moving, or that were connected, and robots that
+Studio does not list because of the limit of the list or an invalid description. Unlisted robots are
+reached on the command topics in the graph.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from app.robots.identity import identity_of, publisher_nodes, subscriber_nodes
 from nep.protocol.graph_view import GraphView
 
 MAX_UNLISTED = 256
-"""Maximum number of unlisted robots with connections for Stop; further ones are reported as not reached."""
+"""Maximum number of unlisted robots that a Stop is sent to; further robots are reported as not reached."""
 MAX_ABSENT = 64
-"""Maximum number of disconnected robots that have replied before; a Stop is sent to them as well."""
+"""Maximum number of disconnected robots that a Stop is sent to because they replied earlier."""
 _COMMAND, _ANSWER = "robot/command", "robot/answer"
 _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, confirmed=True)
 
@@ -26,7 +27,13 @@ _STOP = SafeStop("stop", None, 0.0, on_program_end=True, on_disconnect=True, con
 def targets_of(
     links: Iterable[RobotLink], moved: MovedRobots, unlisted: Sequence[StopTarget]
 ) -> tuple[StopTarget, ...]:
-    """Return the targets of a Stop. Replies of disconnected robots that are not moving are not awaited."""
+    """Return the targets of a Stop. Replies of disconnected robots that are not moving are not awaited.
+
+    Args:
+        links: Listed robots.
+        moved: Record of the robots that may be moving.
+        unlisted: Targets for robots that are not listed.
+    """
     here, absent = [], []
     for link in links:
         is_expected = link.is_connected or link.name in moved
@@ -55,9 +62,14 @@ def _placeholder_robot(name: str, topics: RobotTopics) -> Robot:
 def unlisted_targets(
     view: GraphView, topics: Iterable[str], *, is_expected: bool = True
 ) -> tuple[StopTarget, ...]:
-    """Return the targets for the robots with these description topics.
+    """Return the targets for robots with these description topics.
 
     Robots whose command topic has no subscriber are omitted, because there is nothing to stop.
+
+    Args:
+        view: Current graph.
+        topics: Topics of descriptions.
+        is_expected: True if the replies are awaited.
     """
     wanted = [topic for topic in topics if topic_of(_name_of(topic), "description") == topic]
     if not wanted:

@@ -1,4 +1,4 @@
-"""Result of a Stop for each robot, and its description for the user."""
+"""Results of a Stop for each robot, and their description for the user."""
 
 from __future__ import annotations
 
@@ -10,24 +10,26 @@ from nep.i18n import _
 
 STOPPING_DISPLAY_DELAY_S = 0.1
 StopStatus = Literal["ok", "off", "error"]
-"""Status of a Stop in the window; only ``ok`` is shown with a green check mark."""
+"""Status of a Stop as shown in the window. Only ``ok`` has a green check mark."""
 
 
 @dataclass(frozen=True)
 class RobotStop:
-    """Result of a Stop for one robot.
+    """Result of a Stop for one program of a robot.
 
     Attributes:
-        answered: True if the robot's own program confirmed that the robot has stopped.
-        can_confirm: False for robots that never reply to a Stop (RIZE), and for programs that only subscribe
-            to a robot's commands.
-        error: Why the robot has not stopped (with `refused`) or why the Stop could not be sent.
-        refused: True if the robot's program reported that the robot has not stopped.
-        program: Name of another program that serves the robot's commands.
-        waits: True if replies of other programs of the robot are pending.
+        is_confirmed: True if the program confirmed that the robot has stopped.
+        elapsed_ms: Time until the reply; None without a reply.
+        can_confirm: False for robots that never reply to a Stop (RIZE), and for programs that only
+            subscribe to a robot's commands.
+        error: Reason why the robot has not stopped (if `is_refused`) or why the Stop could not be sent, or
+            "".
+        is_refused: True if the program reported that the robot has not stopped.
+        program: Name of the program if it is not the robot's own, else "".
+        is_waiting: True if replies of other programs of the robot are pending.
         node: Id of the node that replied.
         waited_ms: Time until the robot was connected.
-        is_pending: True if the Stop is sent as soon as the robot is connected.
+        is_pending: True if the Stop is sent once the robot is connected.
     """
 
     name: str
@@ -49,7 +51,7 @@ class RobotStop:
 
     @property
     def problem(self) -> str:
-        """Problem, without a full stop: "Pepper did not answer"; "" if the robot stopped."""
+        """Problem without a full stop, such as "Pepper did not answer"; "" if the robot stopped."""
         if self.is_confirmed or not self.can_confirm:
             return ""
         if self.program and self.is_refused:
@@ -58,7 +60,7 @@ class RobotStop:
 
     @property
     def message(self) -> str:
-        """Result as a sentence: "Pepper stopped (41 ms)"."""
+        """Result as a sentence, such as "Pepper stopped (41 ms)"."""
         if self.is_confirmed and self.waited_ms:
             words = _("{robot} stopped ({elapsed} ms, including {waited} ms without a connection)")
             return words.format(
@@ -76,17 +78,17 @@ class RobotStop:
 
     @property
     def status(self) -> StopStatus:
-        """``ok`` if confirmed, ``off`` if the robot can't confirm, else ``error``."""
+        """Status: ``ok`` if confirmed, ``off`` if the robot can't confirm, else ``error``."""
         return "off" if not self.can_confirm else "ok" if self.is_confirmed else "error"
 
 
 @dataclass(frozen=True)
 class StopReport:
-    """Results of all robots.
+    """Results of a Stop for all robots.
 
     Attributes:
         elapsed_ms: Time from the call to the last reply.
-        strangers: Other programs that replied in the name of a robot, as (robot, program).
+        strangers: Programs that replied in the name of a robot without serving it, as (robot, program).
     """
 
     robots: tuple[RobotStop, ...]
@@ -95,14 +97,15 @@ class StopReport:
 
     @property
     def is_proven(self) -> bool:
-        """True if there was a robot to stop and every robot that can confirm has confirmed."""
+        """True if there was a robot to stop, and every robot that can confirm a Stop has done so."""
         return bool(self.robots) and not self.unproven
 
     @property
     def status(self) -> StopStatus:
         """Overall status: ``ok`` only if every robot has confirmed.
 
-        ``off`` if no robot refused or failed to reply, but one can't confirm or there was no robot.
+        ``error`` if a robot refused or failed to reply; ``off`` if a robot can't confirm or there was
+        no robot.
         """
         if self.unproven:
             return "error"
@@ -110,7 +113,7 @@ class StopReport:
 
     @property
     def unproven(self) -> tuple[RobotStop, ...]:
-        """Results of the robots that should have confirmed and did not."""
+        """Results of the robots that can confirm a Stop but did not."""
         return tuple(robot for robot in self.robots if robot.can_confirm and not robot.is_confirmed)
 
     @property
@@ -120,7 +123,7 @@ class StopReport:
 
     @property
     def by_name(self) -> Mapping[str, RobotStop]:
-        """Worst result of each robot, among its own program and others."""
+        """Worst result of each robot among all its programs, by the robot's name."""
         worst: dict[str, RobotStop] = {}
         for robot in self.robots:
             before = worst.get(robot.name)
@@ -129,7 +132,7 @@ class StopReport:
         return worst
 
     def programs(self, name: str) -> frozenset[str]:
-        """Return the node ids of the programs of a robot that confirmed."""
+        """Return the node ids of the programs of a robot that confirmed the Stop."""
         return frozenset(robot.node for robot in self.robots if robot.name == name and robot.is_confirmed)
 
     @property
@@ -139,19 +142,24 @@ class StopReport:
 
     @property
     def stopped_names(self) -> tuple[str, ...]:
-        """Names of robots that are proven to have stopped: all their programs confirmed."""
+        """Names of the robots that are proven to have stopped, because all their programs confirmed."""
         silent = self.unconfirmed_names
         confirmed = (robot.name for robot in self.robots if robot.can_confirm and robot.is_confirmed)
         return tuple(dict.fromkeys(name for name in confirmed if name not in silent))
 
     def with_unreached(self, names: Iterable[str], why: str = "") -> StopReport:
-        """Return a report extended by a line for each of these robots that was not reached."""
+        """Return the report with a result added for each of these robots that is missing in it.
+
+        Args:
+            names: Names of the robots that should have been stopped.
+            why: Reason why the missing robots were not reached.
+        """
         there = {robot.name for robot in self.robots}
         missing = [not_reached(name, why) for name in dict.fromkeys(names) if name not in there]
         return replace(self, robots=(*self.robots, *missing)) if missing else self
 
     def with_late(self, late: RobotStop) -> StopReport:
-        """Return a report updated by a late reply."""
+        """Return the report with a late reply applied."""
         lines = ((robot.name, robot.program) for robot in self.robots)
         if (late.name, late.program) not in lines:
             return self
@@ -161,14 +169,19 @@ class StopReport:
 
 
 def not_reached(name: str, why: str = "") -> RobotStop:
-    """Return the result for a robot to which the Stop could not be sent, with the reason."""
+    """Return the result for a robot to which the Stop could not be sent.
+
+    Args:
+        name: Name of the robot.
+        why: Reason.
+    """
     words = _("Stop was not sent to {robot}: {why}") if why else _("Stop was not sent to {robot}")
     return RobotStop(name, False, None, error=words.format(robot=name, why=why))
 
 
 @dataclass(frozen=True, slots=True)
 class StopDone:
-    """Event: the Stop ended, because all robots replied or timed out."""
+    """Event: a Stop is complete, because all robots have replied or timed out."""
 
     number: int
     report: StopReport
@@ -176,7 +189,7 @@ class StopDone:
 
 @dataclass(frozen=True, slots=True)
 class RobotReplied:
-    """Event: one robot replied while replies of others are pending."""
+    """Event: a robot has replied to a Stop while other replies are pending."""
 
     number: int
     robot: RobotStop
@@ -184,9 +197,11 @@ class RobotReplied:
 
 @dataclass(frozen=True, slots=True)
 class RobotStopped:
-    """Event: one robot was stopped while no behaviour was running.
+    """Event: the Stop of a single robot is complete. Sent while no behaviour is running.
 
-    ``mark`` is the value of `MovedRobots.mark` when the Stop started.
+    Attributes:
+        report: Result of the Stop.
+        mark: Value of `MovedRobots.mark` when the Stop started.
     """
 
     report: StopReport
@@ -195,9 +210,12 @@ class RobotStopped:
 
 @dataclass(frozen=True, slots=True)
 class LateReply:
-    """Event: a robot replied after the timeout, or confirmed after having refused.
+    """Event: a robot replied after the timeout, or confirmed the Stop after refusing it.
 
-    ``number`` is the number of the Stop; None for the Stop of one robot, which started at ``mark``.
+    Attributes:
+        number: Number of the Stop; None for the Stop of a single robot.
+        robot: Result for the robot.
+        mark: Value of `MovedRobots.mark` when the Stop of a single robot started.
     """
 
     number: int | None

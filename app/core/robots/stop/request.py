@@ -1,4 +1,4 @@
-"""Pending Stop of one robot: programs that must reply, and their replies. No sockets."""
+"""Pending Stop of one robot: the programs that must reply, and their replies. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -13,23 +13,22 @@ from nep.errors import NepError
 from nep.messages.message import Message
 
 MAX_REPLY_BYTES = 65_536
-"""Maximum size of a reply to a Stop; larger messages are ignored."""
+"""Maximum size in bytes of a reply to a Stop; larger messages are ignored."""
 MIN_DISPLAYED_WAIT_MS = 20.0
-"""Minimum time until a robot was connected that is reported."""
+"""Minimum time until the robot was connected that is mentioned in the result, in milliseconds."""
 
 
 @dataclass
 class StopRequest:
-    """State of a Stop of one robot.
+    """State of the Stop of one robot.
 
     Attributes:
-        serving: Reply of each program that serves the robot, by node; None while pending. Empty until the
-            programs are known.
-        unknown: Replies of publishers that the graph does not list yet.
-        foreign: Replies of programs that do not serve the robot. As those in `unknown`, they are decoded only
-            once their sender is known.
-        delivered: Topics on which the command was sent while the robot was connected.
-        delivered_s: Time of the first of these.
+        serving: Reply of each program that serves the robot, by node; None while pending. Empty until
+            the programs are known.
+        unknown_replies: Undecoded replies of publishers that the graph does not list yet.
+        foreign_replies: Undecoded replies of programs that do not serve the robot.
+        delivered_topics: Topics on which the command was sent while the robot was connected.
+        delivered_s: Time of the first of these messages (monotonic seconds).
     """
 
     line: StopLine
@@ -62,19 +61,23 @@ class StopRequest:
         return bool(self.serving) and all(each and each.is_confirmed for each in self.serving.values())
 
     def record_sent(self, way: RobotTopics, now: float) -> None:
-        """Record that the command was sent on a connected topic."""
+        """Record that the command was sent on a topic while the robot was connected."""
         self.delivered_topics.add(way)
         if self.delivered_s is None:
             self.delivered_s = now
 
     def new_replies(self, told: set[tuple[str, str]]) -> list[tuple[str, RobotStop]]:
-        """Return the replies by node that are not in ``told``."""
+        """Return new replies as pairs of node and result.
+
+        Args:
+            told: Pairs of Stop id and node whose replies have already been reported.
+        """
         found, waits = self.serving.items(), None in self.serving.values()
         said = [(node, each) for node, each in found if each is not None and (self.id, node) not in told]
         return [(node, replace(each, is_waiting=waits)) for node, each in said]
 
     def results(self) -> list[RobotStop]:
-        """Return a result for each program; programs without a reply are unproven."""
+        """Return the result of each program. Programs without a reply are unproven."""
         unconnected = self.line.connection_problem
         silent = RobotStop(
             self.line.name, False, None, error=self.error or unconnected, is_pending=bool(unconnected)
@@ -87,10 +90,15 @@ class StopRequest:
         ]
 
     def accept(self, node: str, message: Message, now: float, words: Callable[[object], str]) -> bool:
-        """Apply a message of a program that must reply; return True if it changed the result.
+        """Apply a message of a program that must reply; return True if the result has changed.
 
-        A refusal may be followed by a confirmation; any other reply is final. ``words`` formats the robot's
-        error as a sentence.
+        A refusal may be followed by a confirmation; any other reply is final.
+
+        Args:
+            node: Id of the node that sent the message.
+            message: Message on a reply topic.
+            now: Monotonic seconds.
+            words: Formats the robot's error as a sentence.
         """
         reply = reply_in(message)
         state = None if reply is None else reply.get("state")
@@ -124,7 +132,7 @@ class StopRequest:
 
 
 def reply_in(message: Message) -> Mapping[str, object] | None:
-    """Return the reply to a Stop contained in a message; None if there is none."""
+    """Return the content of a message that is a reply to a Stop; None for other messages."""
     if message.size_bytes > MAX_REPLY_BYTES:
         return None
     try:

@@ -1,7 +1,7 @@
-"""Proven Stop: each robot receives the command, and its own program confirms it or the robot is reported.
+"""Proven Stop: each robot receives the command, and its own program confirms or the robot is reported.
 
-Publishers are opened in advance, because connecting at the moment of a Stop may take too long. A connection
-that failed is retried, and its robot is reported until then.
+Publishers are opened in advance, because connecting at the moment of a Stop may take too long. A failed
+connection is retried; until it succeeds, the robot is reported.
 """
 
 from __future__ import annotations
@@ -38,34 +38,39 @@ _log = logging.getLogger("studio")
 RIZE = "rize"
 NO_NETWORK = lazy("there is no connection to the network yet")
 LATE_REPLY_S = 120.0
-"""Time after a Stop during which late replies are accepted."""
+"""Time in seconds after a Stop during which late replies are accepted."""
 MAX_LATE_REQUESTS = 64
 MAX_SERVING = 32
 """Maximum number of programs of one robot whose replies are awaited."""
 MAX_NAMED_LISTENERS = 4
-"""Maximum number of reported programs that only subscribe to a robot's commands."""
+"""Maximum number of programs that only subscribe to a robot's commands and are included in a report."""
 POLL_S = 0.02
-"""Interval at which the state of a connection is checked."""
+"""Interval in seconds at which the state of a connection is checked."""
 GRAPH_POLL_S = 0.1
-"""Minimum interval of graph queries while the publisher of a reply is unknown."""
+"""Minimum interval in seconds between graph queries while the publisher of a reply is unknown."""
 GRAPH_TIMEOUT_S = 0.3
 _UNKNOWN_PROGRAM = "nobody"
-"""Placeholder for the program of a robot that no graph lists yet."""
+"""Placeholder for the program of a robot that the graph does not list yet."""
 
 STOP_TIMEOUT_S = 1.0
-"""Time limit of a Stop, unless the robot's description requires a longer one."""
+"""Default time limit of a Stop in seconds. A robot's description may require a longer time."""
 MARGIN_S = 0.5
 MAX_STOP_S = 10.0
 
 
 def stop_timeout_s(robots: Iterable[Robot], longest_s: float = MAX_STOP_S) -> float:
-    """Return the time limit for these robots, which is longer than that of their drivers."""
+    """Return the time limit in seconds for a Stop, which exceeds the time limits of the robots' drivers.
+
+    Args:
+        robots: Robots to stop.
+        longest_s: Maximum of the result.
+    """
     needed_s = max((robot.safe_stop.within_s + MARGIN_S for robot in robots), default=0.0)
     return min(longest_s, max(STOP_TIMEOUT_S, needed_s))
 
 
 class RobotStopper:
-    """Maintains connections to all robots and stops them. Thread-safe."""
+    """Connections to all robots, used to stop them. Thread-safe."""
 
     def __init__(
         self,
@@ -89,7 +94,7 @@ class RobotStopper:
         self._senders = Senders()
 
     def update_graph(self, view: GraphView) -> None:
-        """Apply a new graph, which determines whose replies count and which programs serve a robot."""
+        """Apply a new graph, which determines the programs that serve each robot and must confirm a Stop."""
         with self._changed:
             self._view, self._hearers = view, {}
             targets = [line.target for line in self._lines.values()]
@@ -102,18 +107,18 @@ class RobotStopper:
             tell(reply)
 
     def set_expected(self, targets: Iterable[StopTarget]) -> None:
-        """Set the current robots without connecting to them yet; `set_robots` connects.
+        """Set the robots to stop without connecting to new ones, so that this doesn't block.
 
-        A Stop waits for the connections.
+        `set_robots` connects; a Stop waits for that.
         """
         with self._changed:
             for target in targets:
                 self._lines.setdefault(target.robot.name, StopLine(target)).target = target
 
     def set_robots(self, robots: Iterable[Robot | StopTarget]) -> None:
-        """Connect to exactly these robots; disconnect from others.
+        """Connect to these robots and disconnect from all others.
 
-        Failures are listed in `problems` and retried by the next call.
+        Failed connections are listed in `problems` and retried at the next call.
         """
         targets = (each if isinstance(each, StopTarget) else StopTarget(each) for each in robots)
         wanted = {target.robot.name: target for target in targets}
@@ -140,22 +145,22 @@ class RobotStopper:
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """Names of the robots with a connection."""
+        """Names of the robots to which a connection is open."""
         with self._changed:
             lines = [line for line in self._lines.values() if line.target.is_expected and line.is_complete]
             return tuple(line.name for line in lines)
 
     def is_reachable(self, name: str) -> bool:
-        """Return True if the robot's program is connected, so that a Stop would arrive now."""
+        """Return True if the robot's program is connected, so that a Stop sent now would arrive."""
         with self._changed:
             line = self._lines.get(name)
             way = None if line is None else line.channels.get(line.target.robot.topics)
             return line is not None and way is not None and self._is_connected_locked(line, way)
 
     def deliver(self) -> None:
-        """Send pending Stops to robots that have connected since. Call this at each tick.
+        """Send pending Stops to robots that have been connected since. Called at each tick.
 
-        Stops remain pending for `LATE_REPLY_S`.
+        A Stop is pending for at most `LATE_REPLY_S` seconds.
         """
         with self._changed:
             now = self._clock()
@@ -174,7 +179,7 @@ class RobotStopper:
 
     @property
     def problems(self) -> Mapping[str, str]:
-        """Reason for each robot that can't be stopped."""
+        """Reason why a robot can't be stopped, by the robot's name."""
         with self._changed:
             lines = [line for line in self._lines.values() if line.error and line.target.is_expected]
             return {line.name: line.error for line in lines}
@@ -182,8 +187,11 @@ class RobotStopper:
     def send_stop(self, names: Iterable[str] | None = None, ends: str | None = None) -> None:
         """Send a Stop without waiting for replies.
 
-        ``ends`` is the key of a program (`app.robots.identity`) whose further commands robots reject. Robots
-        that don't support that (RIZE) need another Stop after the program has ended.
+        Robots that don't support ``ends`` (RIZE) need another Stop after the program has ended.
+
+        Args:
+            names: Names of the robots; None for all robots.
+            ends: Key of a program (`app.robots.identity`) whose further commands the robots reject.
         """
         for line in self._select_lines(names):
             self._send(line, _new_id(), ends)
@@ -197,19 +205,22 @@ class RobotStopper:
         on_late: Callable[[RobotStop], object] | None = None,
         is_for_all: bool = False,
     ) -> StopReport:
-        """Stop the robots (``names``, or all) and wait until each has replied.
+        """Stop robots and wait until each has replied or timed out.
 
         Args:
-            names: Robots to stop. The report has a line for each, including those that can't be reached.
-            timeout_s: Maximum wait; by default as long as the descriptions require, at least one second.
-            on_answer: Called in this thread with each reply, and at the end for each robot without one.
-            ends: As in `send_stop`.
-            on_late: Called in the node's thread or in that of `see` when a robot replies after the timeout,
-                or confirms only then that it has stopped.
-            is_for_all: True to send the Stop also to robots whose reply is not awaited.
+            names: Names of the robots; None for all. Robots that can't be reached are included in the
+                report.
+            timeout_s: Maximum time to wait. Default: the time that the descriptions require, at least
+                one second.
+            on_answer: Called in this thread for each reply, and at the end for each robot without a
+                reply.
+            ends: Key of a program whose further commands the robots reject (see `send_stop`).
+            on_late: Called in another thread (of the node or of `update_graph`) when a robot replies after
+                the timeout, or confirms the Stop after that.
+            is_for_all: True to send the Stop to robots whose reply is not awaited as well.
 
         Returns:
-            One result for each robot.
+            Results of all robots.
         """
         names = None if names is None else tuple(names)
         began = self._clock()
@@ -557,7 +568,18 @@ def stop_and_report(
     ends: str | None = None,
     is_for_all: bool = False,
 ) -> StopReport:
-    """Stop these robots and return a report in any case; without one, the run would remain "stopping"."""
+    """Stop robots and return a report, even after an unexpected error.
+
+    Without a report, the run would remain in the state "stopping".
+
+    Args:
+        stopper: Connections to the robots; None if there are none.
+        names: Names of the robots.
+        on_late: See `RobotStopper.stop_all`.
+        on_answer: See `RobotStopper.stop_all`.
+        ends: See `RobotStopper.stop_all`.
+        is_for_all: See `RobotStopper.stop_all`.
+    """
     why = _(NO_NETWORK)
     if stopper is not None:
         try:

@@ -1,4 +1,4 @@
-"""Manual publishing and calling: stored messages, services to call, and the switch that arms both.
+"""Manual publishing and calling: saved messages, service calls, and the switch that arms both.
 
 Independent of the window.
 """

@@ -1,7 +1,7 @@
-"""Manual publishing and calling in a session: the shelf, the switch, and sending in progress.
+"""Manual publishing and calling in a session: the shelf, the switch, and messages in progress.
 
-All messages go to the live network. While a recording is shown, messages can't be written or services called
-manually, but recorded messages can be sent (`app.core.recording.replay.sending`).
+All messages go to the live network. While a recording is shown, manual messages and calls are disabled,
+but recorded messages can be published (`app.core.recording.replay.sending`).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ _MOVED_BY: Mapping[SendOrigin, str] = {"publish": "shelf"}
 
 
 class ActingSession(Protocol):
-    """Parts of the session that manual acting uses."""
+    """Parts of the session that `SessionActing` uses."""
 
     settings: Settings
     alerts: Alerts
@@ -61,7 +61,13 @@ class ActingSession(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ArmQuestion:
-    """Question to the user before messages are sent on a topic that moves these robots."""
+    """Question to the user before messages are sent on a topic that moves robots.
+
+    Attributes:
+        topic: Name of the topic.
+        robots: Names of the robots; empty if unknown.
+        go_on: Called if the user allows the motion.
+    """
 
     topic: str
     robots: tuple[str, ...]
@@ -69,7 +75,7 @@ class ArmQuestion:
 
     @property
     def message(self) -> str:
-        """Sentence about the motion; robots that Studio doesn't know are not named."""
+        """Text about the motion, which names the robots if they are known."""
         template = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
         if not self.robots:
             template = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")
@@ -78,7 +84,7 @@ class ArmQuestion:
 
 
 class SessionActing:
-    """Manual publishing and calling. Not thread-safe, except `disarm`: use it from the window's thread."""
+    """Manual publishing and calling. Not thread-safe, except `disarm`; use it from the main thread."""
 
     def __init__(
         self,
@@ -119,9 +125,13 @@ class SessionActing:
     # ---- switch
 
     def arm(self, *, for_replay: bool = False) -> str:
-        """Switch on for `armed_s`; return the reason why that isn't possible, or "".
+        """Switch sending on for `armed_s` seconds.
 
-        While a recording is shown, this is only possible with ``for_replay``.
+        Args:
+            for_replay: True to arm the publishing of a recording; necessary while a recording is shown.
+
+        Returns:
+            Reason why this isn't possible, or "".
         """
         if self._session.is_replaying and not for_replay:
             return _("A recording is open. Return to live to send.")
@@ -135,7 +145,10 @@ class SessionActing:
         return ""
 
     def disarm(self) -> None:
-        """Switch off and stop all sending; nothing is sent after this returns. Thread-safe."""
+        """Switch sending off and stop all messages in progress.
+
+        Nothing is sent after this returns. Thread-safe.
+        """
         was_on = self.arming.disarm()
         self.question, self.recorded_commands = None, frozenset()
         self.outbox.stop_all()
@@ -147,9 +160,17 @@ class SessionActing:
     def allow(
         self, target: Target, then: Callable[[], object] | None = None, *, is_sure: bool = False
     ) -> str:
-        """Allow sending to a target and call ``then``; return the reason why that isn't possible, or "".
+        """Allow sending to a target.
 
-        For a topic that moves robots, `question` is opened first, unless ``is_sure`` is True.
+        For a topic that moves robots, the user is asked first (`question`).
+
+        Args:
+            target: Topic or service.
+            then: Called when the target has been allowed.
+            is_sure: True to skip the question.
+
+        Returns:
+            Reason why this isn't possible, or "".
         """
         if not is_sure and self.needs_confirmation(target):
             names = tuple(name for name in self._moved_robots(target) if name != target.name)
@@ -177,7 +198,7 @@ class SessionActing:
             question.on_allow()
 
     def forbid(self, target: Target) -> None:
-        """Disallow sending to a target."""
+        """Deny sending to a target."""
         self.arming.forbid(target)
         for each in self.outbox.all_repeated:
             if each.order.target == target:
@@ -185,29 +206,34 @@ class SessionActing:
         self.revision += 1
 
     def needs_confirmation(self, target: Target) -> bool:
-        """Return True if the user must be asked before sending to a target, because that moves a robot."""
+        """Return True if the user must be asked before sending to a target, because that moves robots."""
         if target.kind != "topic" or self.arming.is_confirmed(target.name):
             return False
         return target.name in self.recorded_commands or bool(self._moved_robots(target))
 
     @property
     def is_asking(self) -> bool:
-        """True if a question is open: `question`, or the one before a real robot moves for the first time."""
+        """True while the user is asked: `question`, or the question before a real robot's first motion."""
         return self.question is not None or self._session.fleet.permission.question is not None
 
     def _moved_robots(self, target: Target) -> tuple[str, ...]:
         return self.gate.moved_by(target.name) if target.kind == "topic" else ()
 
     def may_continue(self, target: Target) -> bool:
-        """Return True if repeated sending may continue.
+        """Return True if repeated sending to a target may continue.
 
-        False if the topic now moves a robot, because one has connected.
+        False if the topic now moves a robot that has connected in the meantime.
         """
         is_permitted = target.kind != "topic" or self.gate.is_permitted(target.name)
         return is_permitted and not self.needs_confirmation(target)
 
     def notify_moved(self, target: Target, asker: SendOrigin) -> None:
-        """Report the robots that a message moves to `on_moved`. Call this before sending."""
+        """Call `on_moved` with the robots that a message to a target moves. Use this before sending.
+
+        Args:
+            target: Topic or service.
+            asker: Origin of the message.
+        """
         moved = self._moved_robots(target)
         if moved:
             self.on_moved(moved, _MOVED_BY.get(asker, asker))
@@ -215,13 +241,13 @@ class SessionActing:
     # ---- messages
 
     def new_message(self, topic: str, msg_type: str, text: str) -> SavedMessage | None:
-        """Add a message to the shelf; return None if the shelf is full."""
+        """Add a message to the shelf and return it; return None if the shelf is full."""
         name = self.shelf.free_name(topic.rpartition("/")[2] or _("Message"))
         message = SavedMessage(new_message_id(), name, topic, msg_type or "json", text)
         return message if self.shelf.set_message(message) else None
 
     def problem_of(self, message: SavedMessage) -> str:
-        """Return why a message can't be sent, or "" if it can be sent once armed."""
+        """Return the reason why a message can't be sent, or "" if it can be sent once armed."""
         if not is_editable(message.msg_type):
             template = _("Messages of type {type} can't be edited by hand.")
             return template.format(type=message.msg_type)
@@ -237,10 +263,17 @@ class SessionActing:
         return _("Fill in “{name}” first.").format(name=missing[0]) if missing else ""
 
     def send(self, message: SavedMessage, *, rate_hz: float = 0.0) -> str:
-        """Send a message once or at a rate; return the reason why that isn't possible, or "".
+        """Send a message once or repeatedly.
 
-        If sending is switched off, it is switched on for this topic alone; for a robot's topic the user is
-        asked.
+        If sending is switched off, it is switched on for this topic only. For a topic that moves
+        robots, the user is asked first.
+
+        Args:
+            message: Message of the shelf.
+            rate_hz: Messages per second; 0 to send once.
+
+        Returns:
+            Reason why this isn't possible, or "".
         """
         problem = self.problem_of(message)
         if problem:
@@ -251,7 +284,15 @@ class SessionActing:
         return self.send_order(order, rate_hz=rate_hz)
 
     def send_order(self, order: SendOrder, *, rate_hz: float = 0.0) -> str:
-        """Send an order in the same way as `send`; return the reason why that isn't possible, or ""."""
+        """Send the message of an order in the same way as `send`.
+
+        Args:
+            order: Message to send.
+            rate_hz: Messages per second; 0 to send once.
+
+        Returns:
+            Reason why this isn't possible, or "".
+        """
         not_now = self._replay_problem()
         if not_now:
             return not_now
@@ -270,9 +311,16 @@ class SessionActing:
         return _("A recording is open. Return to live to send.") if self._session.is_replaying else ""
 
     def ready(self, target: Target, go_on: Callable[[], object]) -> str | None:
-        """Return None if messages may be sent to a target now; otherwise the reason.
+        """Prepare sending to a target, asking the user if necessary.
 
-        The reason is "" if a question is open or ``go_on`` was already called.
+        Args:
+            target: Topic or service.
+            go_on: Called if the user allows sending.
+
+        Returns:
+            None if sending is allowed now; otherwise the reason why not, which is "" if the user is
+                being asked or
+            ``go_on`` was already called.
         """
         if not self.arming.is_on:
             why_not = self.arm()
@@ -291,7 +339,14 @@ class SessionActing:
         return None if self.gate.request_permission(target.name, resume_if_unchanged) else ""
 
     def repeat(self, number: int) -> str:
-        """Repeat an entry of `sent` while its target is armed; return why that isn't possible, or ""."""
+        """Send the message or call of an entry of `sent` again, if its target is armed.
+
+        Args:
+            number: Number of the entry.
+
+        Returns:
+            Reason why this isn't possible, or "".
+        """
         record = self.sent.get(number)
         if record is None or record.repeat is None:
             return _("This can't be sent again.")
@@ -300,16 +355,22 @@ class SessionActing:
         return record.repeat()
 
     def stop_sending(self, message_id: str) -> None:
-        """Stop sending a message."""
+        """Stop sending a message repeatedly."""
         self.outbox.stop(message_id)
         self.revision += 1
 
     # ---- services
 
     def call(self, service: str, text: str, timeout_s: float) -> str:
-        """Call a service with a JSON request; return the reason why that isn't possible, or "".
+        """Call a service. Sending is switched on for this service if necessary.
 
-        Sending is switched on for this service if necessary.
+        Args:
+            service: Name of the service.
+            text: Request as JSON text.
+            timeout_s: Timeout in seconds.
+
+        Returns:
+            Reason why this isn't possible, or "".
         """
         try:
             request = parse_json_text(text).fill({})
@@ -332,7 +393,7 @@ class SessionActing:
     # ---- interface of the session
 
     def tick(self) -> None:
-        """Process results. Switch off when the time has elapsed or another source is shown."""
+        """Process results. Switches sending off when the time has elapsed or another source is shown."""
         if self._session.source_revision != self._source_seen:
             self._source_seen = self._session.source_revision
             self.disarm()
@@ -382,7 +443,14 @@ class SessionActing:
         )  # fmt: skip
 
     def log(self, level: str, target: Target, words: str, sent: int = 0) -> None:
-        """Log a result of sending a recording; ``sent`` is the number of messages that were sent."""
+        """Log a result of publishing a recording, in the Console and in `sent`.
+
+        Args:
+            level: Log level; "warn" for an error.
+            target: Topic.
+            words: Result as text.
+            sent: Number of messages that were sent.
+        """
         self.revision += 1
         self._log_to_console(level, f"{target.name}: {words}")
         self._add_record("replay", target.name, words, sent=sent, is_bad=level == "warn")
@@ -398,7 +466,7 @@ class SessionActing:
         self._session.console.add(level, "studio", words)
 
     def check(self) -> None:
-        """Save the shelf if it changed. Called once a second."""
+        """Save the shelf if it has changed. Called once a second."""
         self._write()
         try:
             if self._worker.pop_result(FILE):
@@ -451,7 +519,7 @@ def _ignore() -> None: ...
 
 
 def result_text(result: SendResult) -> str:
-    """Format a result: "received by 2", "412 sent, 3 left out, being late"."""
+    """Format the result of sending, such as "received by 2" or "412 sent, 3 left out, being late"."""
     if result.kind == "sent":
         return subscribers_text(result.subscriber_count)
     if result.kind == "began":
@@ -465,7 +533,7 @@ def result_text(result: SendResult) -> str:
 
 
 def subscribers_text(count: int) -> str:
-    """Format the number of subscribers: "received by 2", "no subscribers"."""
+    """Format the number of subscribers, such as "received by 2" or "no subscribers"."""
     return (
         ngettext("received by {count}", "received by {count}", count).format(count=count)
         if count
@@ -474,14 +542,14 @@ def subscribers_text(count: int) -> str:
 
 
 def call_text(record: CallRecord) -> str:
-    """Format the result of a call, such as the time until the reply."""
+    """Format the result of a call: the time until the reply, or the reason for the failure."""
     if record.state == "answered":
         return _("replied in {time}").format(time=duration_text(record.duration_s))
     return record.error
 
 
 def duration_text(seconds: float) -> str:
-    """Format a measured duration: "412 ms", "1.42 s"."""
+    """Format a measured duration, such as "412 ms" or "1.42 s"."""
     if seconds < 1:
         return _("{count} ms").format(count=max(1, round(seconds * 1000)))
     return _("{count} s").format(count=f"{seconds:.2f}")

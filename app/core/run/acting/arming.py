@@ -1,4 +1,4 @@
-"""Switch that allows sending, for some minutes and to selected topics and services."""
+"""Switch that allows sending for some minutes, to selected topics and services."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ MAX_TARGETS = 20
 
 
 class Target(NamedTuple):
-    """Topic or service to which something is sent."""
+    """Topic to which messages are sent, or service that is called."""
 
     kind: Literal["topic", "service"]
     name: str
 
 
 class Arming:
-    """Switch for sending, initially off. Thread-safe: `if_armed` does nothing once `disarm` has returned."""
+    """Switch for sending, initially off.
+
+    Thread-safe: after `disarm` has returned, `run_if_armed` calls nothing.
+    """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -41,7 +44,7 @@ class Arming:
 
     @property
     def is_over(self) -> bool:
-        """True if the time has elapsed and `disarm` was not called since."""
+        """True if the time has elapsed and `disarm` has not been called since then."""
         return self._is_on and self._clock() >= self._until_s
 
     @property
@@ -51,7 +54,7 @@ class Arming:
 
     @property
     def targets(self) -> tuple[Target, ...]:
-        """Allowed targets in the order in which they were added."""
+        """Allowed targets, in the order in which they were allowed."""
         return self._targets
 
     def allows(self, target: Target) -> bool:
@@ -59,7 +62,11 @@ class Arming:
         return self.is_on and target in self._targets
 
     def arm(self, seconds: float = ARMED_S) -> None:
-        """Switch on, or extend the time, for ``seconds`` from now (limited to `MIN_S` ... `MAX_S`)."""
+        """Switch sending on, or extend the time.
+
+        Args:
+            seconds: Time from now, limited to `MIN_S` to `MAX_S`.
+        """
         with self._lock:
             if not self.is_on:
                 self._targets, self._confirmed = (), frozenset()
@@ -69,9 +76,11 @@ class Arming:
             self.revision += 1
 
     def allow(self, target: Target, *, is_confirmed: bool = False) -> bool:
-        """Allow a target; return False while switched off or if there are `MAX_NAMES` targets already.
+        """Allow a target; return False if sending is off or `MAX_TARGETS` targets are already allowed.
 
-        ``is_confirmed`` is True if the user has confirmed that this moves a robot.
+        Args:
+            target: Topic or service.
+            is_confirmed: True if the user has confirmed that the topic moves robots.
         """
         with self._lock:
             if not self.is_on or (target not in self._targets and len(self._targets) >= MAX_TARGETS):
@@ -84,18 +93,18 @@ class Arming:
             return True
 
     def is_confirmed(self, topic: str) -> bool:
-        """Return True if the user has confirmed that this topic moves a robot."""
+        """Return True if the user has confirmed that the topic moves robots."""
         return topic in self._confirmed
 
     def forbid(self, target: Target) -> None:
-        """Disallow a target."""
+        """Deny a target."""
         with self._lock:
             self._targets = tuple(each for each in self._targets if each != target)
             self._confirmed -= {target.name}
             self.revision += 1
 
     def disarm(self) -> bool:
-        """Switch off; return True if it was on. Nothing is sent after this returns."""
+        """Switch sending off; return True if it was on. Nothing is sent after this returns."""
         with self._lock:
             was_on, self._is_on = self._is_on, False
             self._targets, self._confirmed = (), frozenset()
@@ -105,9 +114,15 @@ class Arming:
             return was_on
 
     def run_if_armed(self, turn: int, target: Target, do: Callable[[], object]) -> bool:
-        """Call ``do`` if the target is allowed and the turn is still ``turn``; return True if it was called.
+        """Call ``do`` if a target is allowed; return True if it was called.
 
-        The lock is held meanwhile, so ``do`` must not block.
+        A lock is held during the call, so ``do`` must not block.
+
+        Args:
+            turn: Number of the arming. If sending was switched off or on again since, ``do`` is not
+                called.
+            target: Topic or service.
+            do: Function that sends.
         """
         with self._lock:
             if turn != self.turn or not self.allows(target):

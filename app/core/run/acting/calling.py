@@ -1,4 +1,4 @@
-"""Manual service calls, one at a time, each with its reply or the reason of its failure."""
+"""Manual service calls, one at a time, each with its reply or the reason for its failure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIMEOUT_S = 2.0
 MIN_S, MAX_S = 0.1, 120.0
 MAX_RECORDS = 200
 MAX_REPLIES = 20
-"""Number of newest calls whose replies are stored."""
+"""Number of the newest calls whose replies are stored."""
 MAX_REPLY_LENGTH = 1_000_000
 MAX_CLIENTS = 20
 
@@ -36,12 +36,12 @@ class CallRecord:
     """One call of a service.
 
     Attributes:
-        at_s: Start in seconds since 1970.
-        took_s: Duration.
-        sentence: Reason of a failure.
+        at_s: Time of the start in seconds since 1970.
+        took_s: Duration in seconds.
+        sentence: Reason for a failure, or "".
         answer: Value of the reply.
-        text: Reply as JSON; truncated if `is_cut` is True.
-        is_kept: False once `answer` and `text` were discarded in favour of newer calls.
+        text: Reply as JSON; shortened if `is_cut` is True.
+        is_retained: False if `answer` and `text` were discarded in favour of newer calls.
     """
 
     number: int
@@ -62,7 +62,7 @@ class CallRecord:
 
 @dataclass(slots=True, eq=False)
 class _CallInFlight:
-    """Call in flight. Any thread may set the result; only the first one counts."""
+    """Call in flight. Any thread may set the result; only the first result counts."""
 
     number: int
     turn: int
@@ -83,9 +83,9 @@ class _CallResult:
 
 
 class ServiceCalls:
-    """Service calls while sending is switched on, one at a time.
+    """Manual service calls, one at a time, while sending is switched on.
 
-    Not thread-safe: use it from the window's thread.
+    Not thread-safe; use it from the main thread.
     """
 
     def __init__(
@@ -123,9 +123,13 @@ class ServiceCalls:
         return self._clock() - self._in_flight.requested_s if self._in_flight is not None else 0.0
 
     def call(self, service: str, request: object, words: str, timeout_s: float) -> CallRecord:
-        """Call a service; ``words`` is the request as shown to the user.
+        """Call a service. Raises `NepError` while another call is in flight.
 
-        Raises `NepError` while another call is in flight.
+        Args:
+            service: Name of the service.
+            request: Request as a value.
+            words: Request as shown to the user.
+            timeout_s: Timeout in seconds.
         """
         if self.in_flight is not None:
             raise NepError(_("Wait for the reply of {service} first.").format(service=self.in_flight.service))
@@ -138,11 +142,11 @@ class ServiceCalls:
         return record
 
     def cancel(self) -> None:
-        """Stop waiting for the reply; the server may still execute the call."""
+        """Stop waiting for the reply. The server may still execute the call."""
         self._cancel("canceled", _("cancelled; the server may still execute the call"))
 
     def tick(self) -> list[CallRecord]:
-        """Apply finished calls; return those that ended since the last tick, including cancelled ones."""
+        """Apply results; return the calls that ended since the last tick, including cancelled ones."""
         while self._ended:
             ended = self._ended.popleft()
             place = next((i for i, each in enumerate(self._records) if each.number == ended.number), None)
@@ -166,7 +170,7 @@ class ServiceCalls:
         self.revision += 1
 
     def close(self) -> None:
-        """Cancel the call in flight; the node closes the clients."""
+        """Cancel the call in flight. The node closes the clients."""
         self._cancel("canceled", _("cancelled; the server may still execute the call"))
         self._clients.clear()
 
@@ -264,7 +268,12 @@ class ServiceCalls:
 
 
 def failure_reason(error: Exception, timeout_s: float) -> str:
-    """Return why there is no reply, such as a timeout or the reason given by the server."""
+    """Return the reason why a call has no reply, such as a timeout or an error reported by the server.
+
+    Args:
+        error: Exception of the call.
+        timeout_s: Timeout of the call in seconds.
+    """
     if isinstance(error, NoServerError):
         return _("no server")
     if isinstance(error, WaitTimeoutError):

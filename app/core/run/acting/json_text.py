@@ -1,7 +1,8 @@
-"""Message text that the user edits: JSON with placeholders, checked while typing.
+"""Text of a message that the user edits: JSON with placeholders, parsed while typing.
 
-A placeholder is a name in braces in place of a value, outside of strings: ``{"yaw": {yaw}}``. Two are filled
-in automatically for each message: ``{new id}`` is a unique string, ``{now}`` the time in seconds since 1970.
+A placeholder is a name in braces in place of a value, outside of strings: ``{"yaw": {yaw}}``. Two
+placeholders are filled in automatically for each message: ``{new id}`` is a unique string, ``{now}``
+the time in seconds since 1970.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from nep.i18n import _
 from nep.messages.json_fault import JsonFault, find_json_fault
 
 MAX_LENGTH = 256 * 1024
-"""Maximum length of an editable text; a longer text is not parsed while typing."""
+"""Maximum length of an editable text in characters; a longer text is not parsed while typing."""
 NEW_ID, NOW = "new id", "now"
 AUTOMATIC: Mapping[str, Callable[[], object]] = {
     NEW_ID: lambda: uuid.uuid4().hex,
@@ -34,7 +35,7 @@ class JsonText:
 
     Attributes:
         fault: Syntax error; None for valid JSON.
-        places: Names of the placeholders in order.
+        places: Names of the placeholders, in order of appearance.
     """
 
     def __init__(self, text: str) -> None:
@@ -59,16 +60,22 @@ class JsonText:
 
     @property
     def manual_placeholders(self) -> tuple[str, ...]:
-        """Placeholders that the user must fill in."""
+        """Names of the placeholders that the user must fill in."""
         return tuple(name for name in self.places if name not in AUTOMATIC)
 
     @property
     def has_automatic(self) -> bool:
-        """True if the text contains automatic placeholders, so that each message differs."""
+        """True if the text contains automatic placeholders, so that each message has different values."""
         return any(name in AUTOMATIC for name in self.places)
 
     def fill(self, values: Mapping[str, object]) -> object:
-        """Return the value with its placeholders filled in. Raises `NepError` if that isn't possible."""
+        """Return the value with all placeholders filled in.
+
+        Raises `NepError` for invalid JSON or a missing value.
+
+        Args:
+            values: Values of the placeholders, by name.
+        """
         if self.fault is not None:
             raise NepError(self.fault.message)
         missing = [name for name in self.manual_placeholders if name not in values]
@@ -94,7 +101,7 @@ def parse_json_text(text: str) -> JsonText:
 
 
 def parse_typed_value(text: str) -> object:
-    """Parse a typed value: JSON, a number with a decimal comma, or otherwise the text itself."""
+    """Parse a value that the user typed: JSON, a number with a decimal comma, or else a string."""
     stripped = text.strip()
     if stripped and find_json_fault(stripped) is None:
         return json.loads(stripped)
@@ -105,7 +112,7 @@ def parse_typed_value(text: str) -> object:
 
 
 def format_json(value: object) -> str:
-    """Format a value as editable JSON. Values that JSON lacks become strings."""
+    """Format a value as indented JSON. Values that JSON doesn't support become strings."""
     return json.dumps(value, indent=2, ensure_ascii=False, default=_to_json_value)
 
 

@@ -1,4 +1,4 @@
-"""Pixel of an image that the user clicked, as a message."""
+"""Message about the pixel of an image that the user clicked."""
 
 from __future__ import annotations
 
@@ -8,23 +8,27 @@ from typing import Literal
 from nep.geometry import Header, Point, Time
 
 TYPES = ("json", Point.MSG_TYPE, "geometry_msgs/PointStamped")
-"""Message types for a point; "json" contains all fields."""
+"""Supported message types for a point. "json" contains all fields."""
 Button = Literal["left", "middle"]
 
 
 def default_topic(pictures: str) -> str:
-    """Return the default topic for points in the images of topic ``pictures``."""
+    """Return the default topic for clicked points.
+
+    Args:
+        pictures: Topic of the images.
+    """
     return f"{pictures.rstrip('/')}/point"
 
 
 @dataclass(frozen=True, slots=True)
 class PicturePoint:
-    """Pixel of an image of ``width`` x ``height``, independent of zoom, rotation and mirroring.
+    """Pixel of an image of ``width`` x ``height`` pixels, independent of zoom, rotation and mirroring.
 
     Attributes:
-        x: Column from the left edge of the received image, from 0.
-        y: Row from the top edge, from 0.
-        stamp_ns: Time stamp of the image; None if its publisher sends none.
+        x: Column in the received image, from 0 at the left edge.
+        y: Row in the received image, from 0 at the top edge.
+        stamp_ns: Time stamp of the image in ns since 1970; None if the image has none.
     """
 
     x: int
@@ -40,7 +44,12 @@ class PicturePoint:
         return (self.x + 0.5) / max(1, self.width), (self.y + 0.5) / max(1, self.height)
 
     def payload(self, pictures: str, msg_type: str) -> dict[str, object]:
-        """Return the message of one of `TYPES`; ``pictures`` is the topic of the image."""
+        """Return the payload of the message about the point.
+
+        Args:
+            pictures: Topic of the images.
+            msg_type: One of `TYPES`.
+        """
         stamp = Time.from_ns(self.stamp_ns) if self.stamp_ns is not None else None
         place = asdict(Point(float(self.x), float(self.y), 0.0))
         if msg_type == Point.MSG_TYPE:

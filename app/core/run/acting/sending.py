@@ -1,6 +1,6 @@
-"""Sending of messages, once or at a rate, with even spacing and without bursts.
+"""Sending of messages, once or at a fixed rate. Late messages are dropped, not sent in a burst.
 
-Publishers are created in the network thread; one thread sends all repeated messages.
+Publishers are opened in the network thread; one thread sends all repeated messages.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from nep.nodes.publisher import Publisher
 
 MIN_HZ, MAX_HZ = 0.1, 50.0
 MAX_AGE_S = 10.0
-"""Maximum age of a message that waits for a master; older ones are discarded."""
+"""Maximum age in seconds of a message that waits for a master; older messages are discarded."""
 MAX_CONCURRENT = 10
-"""Maximum number of messages sent repeatedly at the same time."""
+"""Maximum number of messages that are sent repeatedly at the same time."""
 MAX_PUBLISHERS = 20
 MAX_RESULTS = 200
 
 
 @dataclass(frozen=True, slots=True)
 class SendOrder:
-    """Message to send.
+    """Order to send a message, once or repeatedly.
 
     Attributes:
-        make: Returns a new payload each time, or raises `NepError`.
+        make_payload: Returns a new payload for each message, or raises `NepError`.
         source: Text that the user wrote.
-        asker: Origin of the request.
-        told: Called with the result by the code that collects results.
+        origin: Origin of the order.
+        on_result: Callback for the result, or None.
     """
 
     id: str
@@ -54,19 +54,20 @@ class SendOrder:
 
     @property
     def target(self) -> Target:
-        """Topic to send to."""
+        """Topic to which the message is sent."""
         return Target("topic", self.topic)
 
 
 @dataclass(frozen=True, slots=True)
 class SendResult:
-    """Result of sending.
+    """Result of sending a message.
 
     Attributes:
         kind: "sent", "began", "ended" or "failed".
+        sentence: Reason for a failure, or "".
         heard: Number of subscribers.
-        count: Number of messages sent at a rate.
-        skipped: Number of messages that were dropped because they were late.
+        count: Number of repeated messages that were sent.
+        skipped: Number of repeated messages that were dropped because they were late.
         text: Message that was sent once; "" if it is too large to be stored.
     """
 
@@ -81,7 +82,7 @@ class SendResult:
 
 @dataclass(slots=True, eq=False)
 class RepeatedMessage:
-    """Message that is sent repeatedly. Only the sending thread changes it."""
+    """Message that is sent repeatedly. Changed in the sending thread only."""
 
     order: SendOrder
     rate_hz: float
@@ -103,9 +104,9 @@ class RepeatedMessage:
 
 
 class Outbox:
-    """Sends messages while sending is switched on. `pop_results` returns the results.
+    """Sender of messages while sending is switched on. `pop_results` returns the results.
 
-    Not thread-safe: use it from the window's thread.
+    Not thread-safe; use it from the main thread.
     """
 
     def __init__(
@@ -135,18 +136,18 @@ class Outbox:
         return taken
 
     def repeated(self, order_id: str) -> RepeatedMessage | None:
-        """Return the state of a repeated message; None if it isn't being sent."""
+        """Return the state of a message that is sent repeatedly; None if the message isn't being sent."""
         with self._changed:
             return self._repeated.get(order_id)
 
     @property
     def all_repeated(self) -> tuple[RepeatedMessage, ...]:
-        """All repeated messages."""
+        """Messages that are being sent repeatedly."""
         with self._changed:
             return tuple(self._repeated.values())
 
     def is_sending(self, order_id: str) -> bool:
-        """Return True if a message is being sent repeatedly or is about to be."""
+        """Return True if a message is being sent repeatedly, or will be once its publisher is open."""
         with self._changed:
             return order_id in self._repeated or order_id in self._starting
 
@@ -170,7 +171,12 @@ class Outbox:
         self._submit("", self._guard(order, asked_s, send_it))
 
     def start(self, order: SendOrder, rate_hz: float) -> bool:
-        """Send a message repeatedly; return False if `MAX_CONCURRENT` is reached."""
+        """Start sending a message repeatedly; return False if the limit `MAX_CONCURRENT` is reached.
+
+        Args:
+            order: Message to send.
+            rate_hz: Messages per second.
+        """
         rate_hz = min(MAX_HZ, max(MIN_HZ, rate_hz))
         turn, asked_s, token = self._arming.turn, self._clock(), object()
         with self._changed:

@@ -1,4 +1,4 @@
-"""Log of messages and calls sent manually or from a recording: time, target, origin and result."""
+"""Log of messages and calls sent manually or from a recording, with time, target, origin and result."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from app.core.run.acting.arming import Target
 
 MAX_ENTRIES = 200
 MAX_TEXT_BYTES = 16 * 1024
-"""Maximum size of stored messages. Larger ones are listed but can't be copied or repeated."""
+"""Maximum size in bytes of stored messages. Larger messages are listed but can't be copied or sent again."""
 
 SendOrigin = Literal["publish", "service", "replay", "image", "switch"]
 
 
 @dataclass(frozen=True, slots=True)
 class SentRecord:
-    """Log entry.
+    """Entry of the log.
 
     Attributes:
         at_s: Time of the last occurrence in seconds since 1970.
-        name: Topic or service; "" for the switch.
-        words: Result.
-        is_bad: True if the result is an error.
-        text: Message or request; "" if too large or if there is none.
+        name: Topic or service; "" for an operation of the switch.
+        result_text: Result as text.
+        is_error: True if the result is an error.
+        text: Message or request; "" if there is none or it is too large.
         source: Message or request as the user wrote it.
-        again: Repeats the operation and returns why it can't be repeated; None where repeating makes no
-            sense.
+        repeat: Sends the message or call again and returns the reason if that isn't possible; None for
+            other entries.
         count: Number of consecutive occurrences.
     """
 
@@ -45,19 +45,19 @@ class SentRecord:
 
     @property
     def target(self) -> Target:
-        """Topic or service."""
+        """Topic or service of the entry."""
         return Target("service" if self.origin == "service" else "topic", self.name)
 
     def is_like(self, other: SentRecord) -> bool:
-        """Return True if both entries describe the same operation and result."""
+        """Return True if both entries describe the same operation with the same result."""
         facts = (self.origin, self.name, self.result_text, self.is_error, self.source)
         return facts == (other.origin, other.name, other.result_text, other.is_error, other.source)
 
 
 class SentLog:
-    """Newest `MAX_ENTRIES` entries, oldest first, and the total number.
+    """Newest `MAX_ENTRIES` entries, oldest first, and the total number of entries.
 
-    Not thread-safe: use it from the window's thread.
+    Not thread-safe; use it from the main thread.
     """
 
     def __init__(self) -> None:
@@ -79,10 +79,14 @@ class SentLog:
         return next((each for each in self._records if each.number == number), None)
 
     def add(self, record: SentRecord, sent: int) -> None:
-        """Add and number an entry; ``sent`` is the number of messages or calls that were sent.
+        """Add an entry and give it a number.
 
-        If the entry repeats the newest one, only its count increases. Large texts and the means to repeat
-        them are not stored.
+        If the entry equals the newest one, only the count of that one increases. Large texts are not
+        stored, and such entries can't be sent again.
+
+        Args:
+            record: New entry.
+            sent: Number of messages or calls that were sent.
         """
         self.revision += 1
         if sent > 0:
@@ -98,11 +102,11 @@ class SentLog:
             self._records.append(replace(record, number=self._last))
 
     def clear(self) -> None:
-        """Remove all entries, but not the total number."""
+        """Remove all entries. The total number is not reset."""
         self._records.clear()
         self.revision += 1
 
 
 def is_large(text: str) -> bool:
-    """Return True if a text exceeds `KEPT_BYTES`."""
+    """Return True if a text exceeds `MAX_TEXT_BYTES`."""
     return len(text) > MAX_TEXT_BYTES or len(text.encode("utf-8", "replace")) > MAX_TEXT_BYTES

@@ -1,4 +1,4 @@
-"""Shelf: messages saved for repeated use, stored in one file next to the settings."""
+"""Shelf: messages that the user saved for repeated use, stored in a file next to the settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_VALUES = 50
 MAX_NAME_LENGTH = 80
 MAX_VALUE_LENGTH = 2000
 MAX_BYTES = 64 * 2**20
-"""Maximum file size; larger files are not read."""
+"""Maximum size of the file in bytes; a larger file is not read."""
 
 
 class NewerShelfError(NepError):
@@ -35,7 +35,11 @@ def new_message_id() -> str:
 
 @dataclass(frozen=True, slots=True)
 class SavedMessage:
-    """Saved message. ``values`` are the names of its placeholders with the values that the user entered."""
+    """Message that the user saved.
+
+    Attributes:
+        values: Name and value of each placeholder, as entered by the user.
+    """
 
     id: str
     name: str
@@ -46,7 +50,10 @@ class SavedMessage:
     rate_hz: float = 1.0
 
     def payload(self) -> object:
-        """Return a new payload with automatic ids and times. Raises `NepError` if that isn't possible."""
+        """Return a new payload, in which automatic placeholders have new values.
+
+        Raises `NepError` for invalid JSON or a missing value.
+        """
         if is_plain(self.msg_type):
             return self.text
         typed = {name: parse_typed_value(value) for name, value in self.values if value.strip()}
@@ -64,7 +71,7 @@ class SavedMessage:
 
 
 class Shelf:
-    """Saved messages in order, and the last request of each service; both limited in number."""
+    """Saved messages in order, and the last request of each service. Both are limited in number."""
 
     def __init__(
         self, messages: Iterable[SavedMessage] = (), requests: Mapping[str, str] | None = None
@@ -76,7 +83,7 @@ class Shelf:
 
     @property
     def messages(self) -> tuple[SavedMessage, ...]:
-        """All messages."""
+        """All saved messages."""
         return tuple(self._messages)
 
     @property
@@ -89,7 +96,7 @@ class Shelf:
         return next((each for each in self._messages if each.id == id), None)
 
     def set_message(self, message: SavedMessage) -> bool:
-        """Add a message or replace the one with the same id; return False if the shelf is full."""
+        """Add a message, or replace the message with the same id; return False if the shelf is full."""
         place = self._index(message.id)
         if place is None:
             if len(self._messages) >= MAX_MESSAGES:
@@ -103,7 +110,7 @@ class Shelf:
         return True
 
     def copy(self, id: str) -> SavedMessage | None:
-        """Insert a copy after a message; return None if that doesn't exist or the shelf is full."""
+        """Insert and return a copy of a message after it; None if there is no such message or no room."""
         place = self._index(id)
         if place is None or len(self._messages) >= MAX_MESSAGES:
             return None
@@ -114,7 +121,7 @@ class Shelf:
         return copied
 
     def free_name(self, wanted: str) -> str:
-        """Return the name, with a number appended if another message has it: "Stand still 2"."""
+        """Return an unused name: ``wanted``, or ``wanted`` with a number, as in "Stand still 2"."""
         taken = {each.name for each in self._messages}
         number, name = 2, wanted[:MAX_NAME_LENGTH]
         while name in taken:
@@ -123,7 +130,7 @@ class Shelf:
         return name
 
     def remove(self, id: str) -> SavedMessage | None:
-        """Remove and return a message; `put_back` undoes it."""
+        """Remove a message and return it; None if the id is unknown. Undo with `restore`."""
         place = self._index(id)
         if place is None:
             return None
@@ -133,7 +140,7 @@ class Shelf:
         return removed
 
     def restore(self) -> SavedMessage | None:
-        """Restore the last removed message at its position."""
+        """Restore the last removed message at its previous position and return it; None if there is none."""
         if self._removed is None or len(self._messages) >= MAX_MESSAGES:
             return None
         (message, place), self._removed = self._removed, None
@@ -142,7 +149,7 @@ class Shelf:
         return message
 
     def set_request(self, service: str, request: str) -> None:
-        """Store the last request of a service."""
+        """Store the JSON text of a request as the last request of a service."""
         if self._requests.get(service) != request and len(request) <= MAX_LENGTH:
             self._requests.pop(service, None)
             self._requests[service] = request
@@ -158,7 +165,7 @@ class Shelf:
 
 
 def encode_shelf(shelf: Shelf) -> bytes:
-    """Return the file content of a shelf."""
+    """Return a shelf in the file format."""
     value = {
         "format": FORMAT,
         "messages": [
@@ -179,9 +186,14 @@ def encode_shelf(shelf: Shelf) -> bytes:
 
 
 def parse_shelf(data: bytes) -> tuple[Shelf, int]:
-    """Parse a file; return the shelf and the number of unreadable messages.
+    """Parse the content of a file.
 
-    Raises `NewerShelfError`, or `NepError` if the file isn't a shelf.
+    Returns:
+        Shelf, and number of unreadable messages.
+
+    Raises:
+        NewerShelfError: A newer version of Studio wrote the file.
+        NepError: The file isn't a shelf.
     """
     try:
         value = json.loads(data.decode("utf-8-sig"))

@@ -1,4 +1,4 @@
-"""Templates for messages: the last one on a topic, or an empty one of a type."""
+"""Templates for new messages: the newest message of a topic, or an empty message of a type."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from nep.messages.message import Message
 from nep.recordings.formats.schemas import schema_of
 
 TEXT_CODECS = frozenset({"json", "msgpack", "string"})
-"""Codecs of messages that can be written as text."""
+"""Codecs whose messages can be written as text."""
 _SCALARS: Mapping[str, object] = {"string": "", "boolean": False, "integer": 0, "number": 0.0, "array": []}
 _MAX_DEPTH = 10
 
 
 def is_editable(msg_type: str) -> bool:
-    """Return True if messages of this type can be written as text, which excludes images and bytes."""
+    """Return True if messages of this type can be written as text, unlike images and bytes."""
     return codec_for(msg_type).name in TEXT_CODECS
 
 
 def is_plain(msg_type: str) -> bool:
-    """Return True if messages of this type are plain text, not JSON."""
+    """Return True if messages of this type are plain text instead of JSON."""
     return codec_for(msg_type).name == "string"
 
 
@@ -40,7 +40,7 @@ def text_of_message(message: Message) -> str:
 
 
 def text_of_type(msg_type: str) -> str:
-    """Return an empty message of a type as text; an empty object if the type has no known fields."""
+    """Return an empty message of a type as editable text; an empty object if the type has no known fields."""
     if is_plain(msg_type):
         return ""
     return format_json(_example(orjson.loads(schema_of(msg_type)), 0))

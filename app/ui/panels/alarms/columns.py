@@ -30,9 +30,15 @@ def local_datetime(seconds: float) -> dt.datetime:
 
 
 def state_chip(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, str, str | None]:
-    """Return text, status and icon of an alarm's state chip.
+    """Return the contents of an alarm's state chip.
 
-    An icon of None stands for the default icon of the status.
+    Args:
+        rule: Rule of the alarm.
+        state: Current state of the alarm.
+        now_s: Current time in seconds since 1970.
+
+    Returns:
+        Text, status and icon. An icon of None stands for the default icon of the status.
     """
     seen = current_value_text(rule.condition, state.value)
     match state.phase:
@@ -60,9 +66,10 @@ def state_chip(rule: AlarmRule, state: AlarmState, now_s: float) -> tuple[str, s
 
 
 def note_text(rule: AlarmRule, state: AlarmState, alarms: SessionAlarms, now: dt.datetime) -> str:
-    """Return the text next to the state chip.
+    """Return the note next to the state chip.
 
-    It is the result of the actions, the trigger count or the time of the last trigger.
+    The note consists of the failed action that will be retried, the reason why the condition can't be
+    evaluated, and how often the alarm was triggered today or when it was triggered last.
     """
     parts = []
     retry_s = alarms.alarms.retry_in_s(rule.id)
@@ -98,8 +105,8 @@ def history_columns(
     """Return the columns of the history table.
 
     Args:
-        condition: Returns the severity of a record's alarm.
-        now: Returns the current time.
+        condition: Returns the severity of a record's alarm, "error" or "warn".
+        now: Returns the current local time.
     """
 
     def when_cell(record: AlarmRecord) -> Cell:
@@ -133,14 +140,14 @@ def history_columns(
 
 
 def actions_text(record: AlarmRecord) -> str:
-    """Format the executed actions of a record, such as "restart_lidar did not answer, sound"."""
+    """Format the results of a record's actions, such as "restart_lidar did not answer, sound"."""
     if record.was_snoozed and not record.action_results:
         return _("none, snoozed")
     return ", ".join(deed.text for deed in record.action_results)
 
 
 def csv_text(records: Iterable[AlarmRecord]) -> str:
-    """Return the history as CSV (RFC 4180), oldest first, with ISO 8601 times."""
+    """Format records as CSV (RFC 4180) with a header row and ISO 8601 times, in the given order."""
     out = io.StringIO()
     rows = csv.writer(out)
     rows.writerow(("at", "alarm", "lasted_s", "times", "did"))

@@ -64,7 +64,7 @@ MAX_COMPLETIONS = 500
 
 
 class AlarmsPanel(PanelWidget):
-    """List of alarms with their history below."""
+    """Panel with the list of alarms and, below it, the history."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Alarms"))
@@ -252,11 +252,16 @@ class AlarmsPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def add_alarm(self) -> None:
-        """Add an alarm and open the field for its topic."""
+        """Create an alarm and start editing its topic."""
         self.edit(self.alarms.create(AlarmCondition("silent", for_s=2.0)).id, "subject")
 
     def edit(self, rule_id: str, slot: str) -> None:
-        """Scroll to an alarm and open one of its slots; with an empty slot only focus the alarm."""
+        """Scroll to an alarm and start editing one of its slots.
+
+        Args:
+            rule_id: Id of the alarm's rule.
+            slot: Key of the slot, such as "limit"; "" only gives the alarm the focus.
+        """
         self._show_rules()
         self._seen = ()
         self._fresh = rule_id if slot == "limit" else ""

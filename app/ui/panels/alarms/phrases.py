@@ -1,4 +1,7 @@
-"""Conversion of alarm rules to sentences with slots, and parsers for typed slot values. Independent of Qt."""
+"""Conversion of alarm rules to sentences with slots, and parsers for typed slot values.
+
+This module does not depend on Qt.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +68,7 @@ KIND_MENU: Sequence[Sequence[tuple[str, str]]] = (
     ),
     (("leaves", lazy("A node leaves")), ("comes", lazy("A node joins"))),
 )
-"""Alarm kinds with their labels, in the groups of the menu."""
+"""Alarm kinds and their labels, grouped as in the menu."""
 SLOT_NAMES: Mapping[str, str] = {
     "subject": lazy("Subject"),
     "value": lazy("Value"),
@@ -124,7 +127,13 @@ _DEFAULTS: Mapping[str, tuple[Scalar, float]] = {
 class PhrasePart:
     """Word or slot of an alarm's sentence.
 
-    `key` identifies a slot, such as "subject" or "action:0".
+    Attributes:
+        key: Unique key within the sentence. The key of a slot is its role, followed by the index of the
+            action for slots of actions, such as "subject" or "action:0".
+        text: Displayed text.
+        kind: "word", "slot", or "dashed" for a slot without a value.
+        icon: Name of the icon before the text, or None.
+        mono: True for text in the monospaced font.
     """
 
     key: str
@@ -140,12 +149,17 @@ class PhrasePart:
 
     @property
     def action_index(self) -> int:
-        """Index of the action that the slot belongs to."""
+        """Index of the action that the slot belongs to; 0 for slots of the condition."""
         return int(self.key.partition(":")[2] or 0)
 
 
 def parts_of(rule: AlarmRule, icon: str = "braces") -> list[PhrasePart]:
-    """Return the words and slots of a rule's sentence; `icon` is the icon of the topic's type."""
+    """Split the sentence of a rule into words and slots.
+
+    Args:
+        rule: Rule to describe.
+        icon: Name of the icon for the message type of the rule's topic.
+    """
     condition = rule.condition
     parts: list[PhrasePart] = []
     for words, hole, _spec, _conversion in Formatter().parse(_(_TEMPLATES[condition.kind])):
@@ -217,7 +231,7 @@ def payload_text(payload: object) -> str:
 
 
 def initial_text(rule: AlarmRule, part: PhrasePart) -> str:
-    """Return the initial text of the field for a slot."""
+    """Return the current value of a slot in the form in which it is typed; "" if there is none."""
     condition = rule.condition
     match part.role:
         case "subject":
@@ -237,7 +251,13 @@ def initial_text(rule: AlarmRule, part: PhrasePart) -> str:
 
 
 def with_slot_text(rule: AlarmRule, part: PhrasePart, text: str) -> AlarmRule | None:
-    """Return a copy of the rule with `text` as the value of a slot, or None if the text is invalid."""
+    """Return a copy of the rule in which a slot has a new value, or None if the value is invalid.
+
+    Args:
+        rule: Rule to copy.
+        part: Slot to change.
+        text: Typed value.
+    """
     condition, text = rule.condition, text.strip()
     match part.role:
         case "subject":
@@ -268,7 +288,14 @@ _INVALID = object()
 
 
 def parse_limit(condition: AlarmCondition, text: str) -> object:
-    """Parse a limit: a number for conditions that need one, else JSON, else the text itself."""
+    """Parse the limit of a condition.
+
+    Conditions on numbers require a number; a "%" or a unit after the number is ignored. Other conditions
+    accept scalars in JSON, and use any other text as a string.
+
+    Returns:
+        The limit, or `_INVALID` if a number is required and the text is not a number.
+    """
     if condition.kind in NUMBER_KINDS:
         figures, *words = text.replace("%", " ").split() or [""]
         if any(each[0].isdigit() for each in words):
@@ -286,7 +313,11 @@ def parse_limit(condition: AlarmCondition, text: str) -> object:
 
 
 def parse_time(text: str) -> float | None:
-    """Parse "2", "2 s", "1.5 min" or "3 h" to seconds; empty text is 0, invalid text None."""
+    """Parse a duration such as "2", "250 ms", "1.5 min" or "3 h".
+
+    Returns:
+        The duration in s; 0 for empty text, and None if the text is invalid or the duration exceeds a day.
+    """
     typed = text.strip()
     if not typed:
         return 0.0
@@ -301,9 +332,12 @@ def parse_time(text: str) -> float | None:
 
 
 def with_action(rule: AlarmRule, place: int, action: AlarmAction | None) -> AlarmRule:
-    """Return a copy of the rule with another action at an index.
+    """Return a copy of the rule in which one action is replaced, added or removed.
 
-    An `action` of None removes the one at the index; an index after the last one appends.
+    Args:
+        rule: Rule to copy.
+        place: Index of the action; the index after the last action adds an action.
+        action: New action; None removes the action.
     """
     actions = [*rule.actions]
     actions[place : place + 1] = [] if action is None else [action]
@@ -311,7 +345,11 @@ def with_action(rule: AlarmRule, place: int, action: AlarmAction | None) -> Alar
 
 
 def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
-    """Return a copy of the rule with another kind; limit, duration and name are kept where they apply."""
+    """Return a copy of the rule with another kind of condition.
+
+    Name, field path, limit and duration are copied if they apply to the new kind too; otherwise they get
+    default values.
+    """
     condition = rule.condition
     if kind == condition.kind:
         return rule
@@ -330,7 +368,10 @@ def with_kind(rule: AlarmRule, kind: str) -> AlarmRule:
 
 
 def rejection_text(part: PhrasePart, rule: AlarmRule) -> str:
-    """Return a sentence with the values that a slot accepts, to show after an invalid text."""
+    """Return the message for an invalid value of a slot, which explains the valid values.
+
+    Return "" for slots that accept any text.
+    """
     match part.role:
         case "limit" if rule.condition.kind in NUMBER_KINDS:
             return _(AMBIGUOUS_SEPARATORS)
@@ -343,7 +384,7 @@ def rejection_text(part: PhrasePart, rule: AlarmRule) -> str:
 
 
 def placeholder_of(part: PhrasePart, rule: AlarmRule) -> str:
-    """Return the placeholder of a slot's field."""
+    """Return the placeholder text for the field of a slot, such as "pose.x"; "" for none."""
     match part.role:
         case "subject":
             return _("a node") if rule.condition.is_about_node else _("a topic")

@@ -16,7 +16,15 @@ from nep.programs.alarms.sentences import condition_text
 
 
 class AlarmRow(QWidget):
-    """Row of one alarm. Signals that concern a slot carry its `PhrasePart`."""
+    """Row of one alarm.
+
+    Signals:
+        switched: True if the user enabled the alarm, False if the user disabled it.
+        slot_pressed: `PhrasePart` of a slot that was clicked.
+        action_removed: `PhrasePart` of an action to remove.
+        snooze_pressed: The snooze button was clicked.
+        more_pressed: The menu button was clicked.
+    """
 
     switched = Signal(bool)
     slot_pressed = Signal(object)
@@ -70,7 +78,13 @@ class AlarmRow(QWidget):
         column.addWidget(Separator(self._theme))
 
     def show_rule(self, rule: AlarmRule, icon: str, *, snoozed: bool) -> None:
-        """Show a rule. Widgets of unchanged slots are kept, so that they don't lose the focus."""
+        """Show a rule. Widgets of unchanged slots are reused, so that they don't lose the focus.
+
+        Args:
+            rule: Rule to show.
+            icon: Name of the icon for the message type of the rule's topic.
+            snoozed: True while the alarm is snoozed.
+        """
         said = condition_text(rule.condition)
         self.setAccessibleName(said)
         self.switch.setAccessibleName(_("Enable: {condition}").format(condition=said))
@@ -124,7 +138,14 @@ class AlarmRow(QWidget):
         return slot
 
     def show_state(self, words: str, status: str, icon: str | None, note: str) -> None:
-        """Show the state chip and the note next to it."""
+        """Update the state chip and the note next to it.
+
+        Args:
+            words: Text of the chip.
+            status: Status of the chip, such as "ok", "warn" or "error".
+            icon: Name of the chip's icon; None for the default icon of the status.
+            note: Text of the note.
+        """
         self.chip.set(words, status, icon)
         if self.note.text() != note:
             self.note.setText(note)

@@ -22,7 +22,10 @@ FIELD_WIDTH = 240
 
 
 class AlarmSlot(PaintedButton):
-    """Button that represents a word of the sentence; Delete and Backspace remove an action."""
+    """Button for a slot of an alarm's sentence.
+
+    `removed` is emitted when Delete or Backspace is pressed on an action.
+    """
 
     elides_text = True
     removed = Signal()
@@ -33,7 +36,7 @@ class AlarmSlot(PaintedButton):
         self._update_text(part)
 
     def show_part(self, part: PhrasePart) -> None:
-        """Show a part of the sentence."""
+        """Update the button after the value of its slot changed."""
         if part != self.part:
             self.part = part
             self._update_text(part)
@@ -91,12 +94,18 @@ class AlarmSlot(PaintedButton):
 
 
 class SlotField(QLineEdit):
-    """Text field over a slot, with completion. Enter and Tab accept the text, Esc cancels.
+    """Text field over a slot, for editing its value with completion.
+
+    Enter and Tab accept the text, Esc cancels. `closed` is emitted when the field closes.
 
     Args:
-        take: Receives the text and returns False if it is invalid. The field then stays open, outlined in
-            red, with the sentence `rejection`.
-        row: Parent widget, because the field is taller than the `slot`.
+        row: Parent widget, because the field is taller than the slot.
+        slot: Slot to edit.
+        text: Initial text.
+        example: Placeholder text.
+        take: Receives the text and returns False if it is invalid. The field then stays open with a red
+            outline and shows `rejection`.
+        rejection: Message that explains the valid values.
     """
 
     closed = Signal()
@@ -209,7 +218,7 @@ class SlotField(QLineEdit):
                 QToolTip.hideText()
 
     def dismiss(self, *, keeps_focus: bool = True) -> None:
-        """Close the field and return the focus to its slot."""
+        """Close the field and, if `keeps_focus` is True, return the focus to its slot."""
         if self._is_over:
             return
         self._is_over = True

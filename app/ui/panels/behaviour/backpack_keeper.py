@@ -18,7 +18,7 @@ POLL_TICKS = 30  # refreshes at 30 Hz: changes of another Studio appear within a
 
 
 class BackpackView(Protocol):
-    """Part of the block editor that displays the backpack."""
+    """Interface of the block editor for displaying the backpack."""
 
     backpack_requested: SignalInstance
 
@@ -26,10 +26,11 @@ class BackpackView(Protocol):
 
 
 class BackpackController:
-    """Executes the page's requests about the backpack.
+    """Handler of the block editor's requests about the backpack.
 
-    A request is a JSON object with the operation in ``do``: put (with ``blocks``, ``count``, ``notes``),
-    remove (with ``id``), empty or look. Every change can be undone from its toast.
+    A request is a JSON object with the operation in ``do``: "put" (with ``blocks``, ``count`` and
+    ``notes``), "remove" (with ``id``), "empty", or "look" to reload the file. The toast of each change
+    offers to undo it.
     """
 
     def __init__(self, context: PanelContext, backpack: Backpack, editor: BackpackView) -> None:
@@ -40,7 +41,7 @@ class BackpackController:
         self.reload_if_changed()
 
     def tick(self) -> None:
-        """Check for changes by another Studio; call on every refresh."""
+        """Poll for changes made by another Studio; call on every refresh."""
         self._ticks += 1
         if self._ticks % POLL_TICKS == 0:
             self.reload_if_changed()

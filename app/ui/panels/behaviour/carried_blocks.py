@@ -21,7 +21,7 @@ OPACITY = 0.85
 
 
 class DragSource(Protocol):
-    """Part of the block editor from which blocks are dragged."""
+    """Interface of the block editor for dragging blocks out of its page."""
 
     blocks_dragged_outside: SignalInstance
     drag_picture_rendered: SignalInstance
@@ -33,9 +33,13 @@ class DragSource(Protocol):
 
 
 class DragImage(QWidget):
-    """Picture of the dragged blocks at the mouse pointer. The page can't paint outside itself.
+    """Image of the dragged blocks, which follows the mouse pointer outside the page.
 
-    An overlay of `window` that is transparent for mouse events; hidden until it has a position and a picture.
+    The widget is an overlay of the window, because the page can't paint outside its own area. It is
+    transparent for mouse events, and hidden until it has a position and an image.
+
+    Args:
+        window: Window to cover.
     """
 
     def __init__(self, window: QWidget) -> None:
@@ -47,9 +51,11 @@ class DragImage(QWidget):
         self.hide()
 
     def set_picture(self, data: bytes, ratio: float) -> None:
-        """Set the picture: PNG data with `ratio` device pixels per page pixel.
+        """Set the image; ignored after the drag has ended.
 
-        Ignored after the drag ended.
+        Args:
+            data: Image as PNG.
+            ratio: Device pixels per pixel of the page.
         """
         picture = QPixmap()
         if self._place is None or not picture.loadFromData(data):
@@ -60,7 +66,7 @@ class DragImage(QWidget):
         self.move_to(self._place)
 
     def move_to(self, place: QPoint | None) -> None:
-        """Move the picture to a position on the screen; None ends the drag."""
+        """Move the image to a position on the screen; None ends the drag."""
         self._place = place
         if place is None:
             self._picture = QPixmap()
@@ -81,14 +87,15 @@ class DragImage(QWidget):
 
 
 class BlockDrag:
-    """Highlights the tab under blocks that are dragged out of the page, and drops the blocks there.
+    """Drag and drop of blocks from the page onto tabs.
 
-    A tab opens after the mouse has hovered over it for a while, and the drag continues on its page. A drop on
-    "+" creates a behaviour; a drop elsewhere returns the blocks. Near an end of the tab bar the tabs scroll.
+    The tab under the mouse pointer is highlighted. A tab opens after the pointer has hovered over it for a
+    while, and the drag continues on its page. A drop on "+" creates a behaviour; a drop outside the tab bar
+    returns the blocks. Near an end of the tab bar, the tabs scroll.
 
     Args:
-        flush: Fetches pending edits, then calls back.
-        show: Shows the current behaviour at once.
+        flush: Fetches pending edits, then calls its argument.
+        show: Shows the active behaviour at once.
     """
 
     def __init__(
@@ -201,7 +208,13 @@ class BlockDrag:
 
 
 def transfer_text(count: int, how: str, name: str) -> str:
-    """Return the toast text after blocks were "moved", "copied" or "added"; `count` 0 stands for a note."""
+    """Format the text of the toast after blocks were dropped on a tab.
+
+    Args:
+        count: Number of blocks; 0 if a note was dropped.
+        how: "moved", "copied" or "added".
+        name: Name of the target behaviour.
+    """
     if not count:
         words = _("Moved the note to {name}") if how == "moved" else _("Copied the note to {name}")
     elif how == "moved":

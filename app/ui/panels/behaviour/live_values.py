@@ -1,4 +1,4 @@
-"""Live values on sensor blocks, such as "84 %" on the battery."""
+"""Live values on sensor blocks, such as "84 %" on a block for the battery level."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SILENT = "silent"
 
 
 class SensorValues(Protocol):
-    """Sensor values of a robot, as provided by `app.core.robots.robot_link.RobotLink`."""
+    """Sensor values of a robot; implemented by `app.core.robots.robot_link.RobotLink`."""
 
     @property
     def robot(self) -> Robot: ...
@@ -31,10 +31,16 @@ class RobotLookup(Protocol):
 
 
 def sensor_texts(fleet: RobotLookup, sensors: Iterable[tuple[str, str]]) -> tuple[dict[str, str], set[str]]:
-    """Return the texts for sensor blocks, and the keys of stale ones.
+    """Format the current values for sensor blocks.
 
-    Keys are ``<robot>/<sensor>`` or ``<robot>/<sensor>/<field>``. Values are stale while the robot is silent;
-    a disconnected robot has none.
+    Args:
+        fleet: Lookup of robots by name.
+        sensors: Names of robot and sensor for each block.
+
+    Returns:
+        Texts by key, and the keys of stale values. A key is ``<robot>/<sensor>`` or
+        ``<robot>/<sensor>/<field>``. Values are stale while the robot is silent; a disconnected robot has
+        no values.
     """
     words: dict[str, str] = {}
     old: set[str] = set()

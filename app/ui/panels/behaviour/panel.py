@@ -44,7 +44,7 @@ ALARM_STATES = frozenset({NOT_STOPPED, STOPPING, "silent"})
 LOADING_TEXT = lazy("Loading blocks.")
 LOADING_TEXT_DELAY_S = 0.5
 START_COMMANDS = {"robot": "robots.virtual", "examples": "help.examples"}
-"""Window commands of the buttons on an empty canvas."""
+"""Commands of the window that the buttons on an empty canvas run."""
 _PLACEHOLDER = re.compile(r"\([^()]*\)")  # placeholders in the help, such as "(robot) say (text)"
 Json = Mapping[str, object]
 
@@ -109,7 +109,7 @@ class Editor(Protocol):
 
 
 def make_blockly_editor(parent: QWidget) -> Editor:
-    """Create the real block editor; called when the panel is first shown."""
+    """Create the block editor; called when the panel is first shown."""
     # Importing Qt WebEngine takes about 200 ms.
     from app.ui.blockly.view import BlocklyView  # noqa: PLC0415
 
@@ -310,7 +310,12 @@ class BehaviourPanel(PanelWidget):
         self._watched = ids
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Create, rename, delete or show a variable in the blocks view."""
+        """Run an operation on a variable in the blocks view.
+
+        Args:
+            edit: JSON object with the operation in ``do``: "new", "rename", "delete", "watch", "show" or
+                "undo".
+        """
         self.set_mode("blocks")
         if self.editor is not None:
             if edit.get("do") == "undo":
@@ -343,7 +348,7 @@ class BehaviourPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def set_mode(self, mode: str) -> None:
-        """Switch to "blocks" or "python"."""
+        """Switch to the view "blocks" or "python"."""
         self.mode = mode
         self._bar.show_mode(mode)
         self.pages.setCurrentIndex(1 if mode == "python" else 0)
@@ -386,28 +391,45 @@ class BehaviourPanel(PanelWidget):
             self.editor.edit_from_menu(what)
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Render all blocks as "png" or "svg" and pass the data to `done`; b"" if there are none."""
+        """Render all blocks of the active behaviour as an image.
+
+        Args:
+            kind: "png" or "svg".
+            white: True for a white background, False for a transparent one.
+            done: Receives the image data; b"" if there are no blocks.
+        """
         if self.editor is None:
             done(b"")
         else:
             self.editor.picture(kind, white, done)
 
     def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
-        """Render all blocks as a PDF with this page layout and pass it to `done`; b"" without blocks."""
+        """Render all blocks of the active behaviour as a PDF document.
+
+        Args:
+            title: Title on the page.
+            date: Date on the page.
+            layout: Size, orientation and margins of the page.
+            done: Receives the PDF data; b"" if there are no blocks.
+        """
         if self.editor is None:
             done(b"")
         else:
             self.editor.render_pdf(title, date, layout, done)
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Open the search in the toolbox (if `to_add`) or in the behaviour."""
+        """Open the search in the toolbox if `to_add` is True, else the search in the behaviour."""
         self.set_mode("blocks")
         if self.editor is not None:
             self.setFocus(Qt.FocusReason.ShortcutFocusReason)
             (self.editor.open_search if to_add else self.editor.open_find)()
 
     def point_at(self, block: str) -> None:
-        """Highlight the block of this type in the toolbox and the place where it belongs; "" ends that."""
+        """Highlight a block in the toolbox and the place where it belongs.
+
+        Args:
+            block: Type of the block; "" removes the highlight.
+        """
         if self.editor is None:
             return
         if not block:
@@ -423,7 +445,11 @@ class BehaviourPanel(PanelWidget):
         self.editor.point_at(block, name, then)
 
     def show_block(self, block: str) -> None:
-        """Switch to the blocks view and centre this block."""
+        """Switch to the blocks view and scroll to a block.
+
+        Args:
+            block: Id of the block.
+        """
         self.set_mode("blocks")
         if self.editor is not None:
             self.editor.show_block(block)
@@ -465,9 +491,13 @@ class BehaviourPanel(PanelWidget):
 
 
 class LoadingMessage:
-    """Loading message in the middle of `place`.
+    """Message that the block editor is loading, shown after half a second.
 
-    Shown only after half a second, so that fast loading doesn't flicker. `clock` returns seconds.
+    The delay prevents flicker when loading is fast.
+
+    Args:
+        place: Widget to cover.
+        clock: Returns the time in s.
     """
 
     def __init__(self, place: QWidget, clock: Callable[[], float] = time.monotonic) -> None:
@@ -480,7 +510,11 @@ class LoadingMessage:
         self.words.hide()
 
     def set_ready(self, *, ready: bool) -> None:
-        """Show or hide the message, depending on whether the page is ready; call on every refresh."""
+        """Show or hide the message; call on every refresh.
+
+        Args:
+            ready: True if the block editor has loaded.
+        """
         now = self._clock()
         if ready:
             self._since = None
@@ -495,7 +529,14 @@ class LoadingMessage:
 
 
 def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
-    """Return toolbox icon and text, by name, for robots that may be moving or don't reply."""
+    """Return the warnings to show at robots in the toolbox.
+
+    Args:
+        links: Known robots.
+
+    Returns:
+        Status and text by robot name, for robots that may be moving or don't respond.
+    """
     return {
         link.name: (ROBOT_STATUS[link.state], link.state_label)
         for link in links
@@ -504,7 +545,7 @@ def alarms_of(links: Iterable[RobotLink]) -> dict[str, tuple[str, str]]:
 
 
 def tab_facts(documents: Iterable[Document], runs: Runs) -> list[TabFacts]:
-    """Return the data of each tab."""
+    """Return the data of the tabs of all open behaviours."""
     shown = list(documents)
     found = []
     for document, title in zip(shown, unique_titles([(each.name, each.path) for each in shown]), strict=True):

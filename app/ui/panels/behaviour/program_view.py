@@ -40,7 +40,7 @@ class _Highlighter(QSyntaxHighlighter):
 
 
 class ProgramView(QPlainTextEdit):
-    """Read-only Python text in the colours of the theme."""
+    """Read-only view of a Python program with syntax highlighting in the colours of the theme."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -71,6 +71,6 @@ class ProgramView(QPlainTextEdit):
             bar.setValue(place)
 
     def line_containing(self, words: str) -> int:
-        """Return the 1-based number of the first line that contains `words`, or 0."""
+        """Return the number (from 1) of the first line that contains `words`, or 0 if there is none."""
         found = self.document().find(QRegularExpression(QRegularExpression.escape(words)))
         return found.blockNumber() + 1 if not found.isNull() else 0

@@ -33,7 +33,16 @@ SLOT_WIDTH = 18  # place of the unsaved dot or, on hover, the close button
 
 @dataclass(frozen=True)
 class TabFacts:
-    """Data that a tab displays."""
+    """Data that a tab displays.
+
+    Attributes:
+        key: Key of the behaviour.
+        name: Displayed name.
+        is_dirty: True if there are unsaved changes.
+        is_running: True while the behaviour is running.
+        tip: Tooltip.
+        has_file: True if the behaviour has been saved to a file.
+    """
 
     key: str
     name: str
@@ -48,7 +57,7 @@ class TabFacts:
 class BehaviourTab(PaintedButton):
     """Tab of one behaviour.
 
-    An amber dot in place of the icon means running, a small dot means unsaved changes.
+    An amber dot in place of the icon indicates a running behaviour; a small dot indicates unsaved changes.
     """
 
     selected = Signal()
@@ -211,10 +220,17 @@ class BehaviourTab(PaintedButton):
 
 
 class NameField(QLineEdit):
-    """Field to rename a tab in place: Enter accepts, Esc cancels.
+    """Field for renaming a tab in place: Enter accepts, Esc cancels.
 
-    A click elsewhere accepts a valid name and cancels otherwise. `why_not` returns the reason why a name is
-    invalid, or "".
+    When the field loses the focus, it accepts a valid name and cancels otherwise.
+
+    Args:
+        name: Current name.
+        why_not: Returns the reason why a name is invalid, or "".
+
+    Signals:
+        taken: New name.
+        left: The field should be closed.
     """
 
     committed = Signal(str)

@@ -20,7 +20,7 @@ GAP = 4
 NAME_WIDTH = 180  # width of the name field
 SCROLL_MARGIN, SCROLL_STEP = 32, 8  # px
 NEW_TAB = "+"
-"""Value that represents the "+" button where a tab's key is expected."""
+"""Key of the "+" button, used in place of a tab's key."""
 
 
 class BehaviourTabs(QWidget):
@@ -57,7 +57,12 @@ class BehaviourTabs(QWidget):
         theme.changed.connect(self._restyle)
 
     def show_tabs(self, facts: Sequence[TabFacts], current: str) -> None:
-        """Show exactly these tabs in this order."""
+        """Replace the tabs.
+
+        Args:
+            facts: Data of the tabs, from left to right.
+            current: Key of the active tab.
+        """
         wanted = tuple(facts)
         if (wanted, current) == (self._facts, self._current):
             return
@@ -102,7 +107,7 @@ class BehaviourTabs(QWidget):
     # -- drops of blocks ----------------------------------------------------------------------------------
 
     def target_at(self, place: QPoint) -> str:
-        """Return the drop target at a screen position: the key of a tab, `NEW` for "+", or ""."""
+        """Return the drop target at a screen position: the key of a tab, `NEW_TAB` for "+", or ""."""
         if not self.isVisible():
             return ""
         here = self.mapFromGlobal(place)
@@ -113,7 +118,11 @@ class BehaviourTabs(QWidget):
         return next((key for key, tab in self.tabs.items() if tab.geometry().contains(here)), "")
 
     def scroll_at(self, place: QPoint) -> bool:
-        """Scroll if a drag is near an end of the bar. Return True if the tabs moved."""
+        """Scroll the tabs if a position is near an end of the bar. Return True if the tabs moved.
+
+        Args:
+            place: Screen position of the drag.
+        """
         here, room = self.mapFromGlobal(place), self._room.geometry()
         if not self.isVisible() or not room.contains(here):
             return False
@@ -127,7 +136,7 @@ class BehaviourTabs(QWidget):
         return self._left != before
 
     def highlight_target(self, key: str) -> None:
-        """Highlight a drop target: the key of a tab, `NEW` for "+", or "" for none."""
+        """Highlight a drop target: the key of a tab, `NEW_TAB` for "+", or "" for none."""
         for each, tab in self.tabs.items():
             tab.set_drop_target(each == key)
         self.add.set_drop_target(key == NEW_TAB)
@@ -304,7 +313,7 @@ class BehaviourTabs(QWidget):
 
 
 class BehaviourTitle(QWidget):
-    """Tabs and buttons that replace the panel's title."""
+    """Widget that replaces the panel's title: tabs and buttons."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

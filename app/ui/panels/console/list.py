@@ -46,7 +46,7 @@ LEVEL_NAMES = {
     "error": lazy("error"),
     "critical": lazy("fatal"),
 }
-"""Names of the levels, short enough for their column."""
+"""Names of the levels, which must fit into a narrow column."""
 ROW_HEIGHTS = {"compact": 22, "comfortable": 30}
 ICON_SIZE = 14
 MIN_TEXT_CHARS = 24  # characters of the text that should stay visible
@@ -54,7 +54,12 @@ _ROOT = QModelIndex()
 
 
 def line_of(record: ConsoleRecord, level: str = "") -> str:
-    """Format a record as a log line for the clipboard; a given `level` replaces the record's own."""
+    """Format a record as a line of text for the clipboard.
+
+    Args:
+        record: Record to format.
+        level: Displayed name of the level; by default the level's id.
+    """
     moment = time.localtime(record.stamp_s)
     clock = f"{time.strftime('%H:%M:%S', moment)}.{int(record.stamp_s % 1 * 1000):03d}"
     logger = f" [{record.logger}]" if record.logger else ""
@@ -62,7 +67,7 @@ def line_of(record: ConsoleRecord, level: str = "") -> str:
 
 
 def tip_of(record: ConsoleRecord) -> str:
-    """Return the tooltip of a record: full text, time, level, and source location of the log call."""
+    """Return the tooltip of a record: the full text, time, level, origin, and location of the log call."""
     where = "  ".join(part for part in (record.logger, record.location) if part)
     clock = time.strftime("%H:%M:%S", time.localtime(record.stamp_s))
     said = f"{record.text}\n{clock} {_level_name(record)}"
@@ -70,7 +75,7 @@ def tip_of(record: ConsoleRecord) -> str:
 
 
 def first_line(text: str) -> str:
-    """Return the first line of a text, followed by the number of omitted lines."""
+    """Return the first line of a text, followed by the number of further lines, if any."""
     first, _end, rest = text.partition("\n")
     if not rest:
         return first
@@ -84,7 +89,13 @@ def _level_name(record: ConsoleRecord) -> str:
 
 
 class RecordFilter:
-    """Filter for records by level, node ("" for all) and words."""
+    """Filter that matches records by level, node and words.
+
+    Args:
+        levels: Accepted levels.
+        node: Accepted origin; "" for all nodes.
+        words: Words that a record must contain, separated by spaces; case is ignored.
+    """
 
     def __init__(self, levels: frozenset[str], node: str, words: str) -> None:
         self._levels, self._node, self._words = levels, node, words.casefold().split()
@@ -122,7 +133,12 @@ class ConsoleModel(QAbstractListModel):
     def reset_records(
         self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]
     ) -> None:
-        """Reset the model; `records` are sorted oldest first, and `wanted` is the filter."""
+        """Replace all rows.
+
+        Args:
+            records: Records, oldest first.
+            wanted: Returns True for records to show.
+        """
         self.beginResetModel()
         self._records = deque(record for record in records if wanted(record))
         self._newest = records[-1].number if records else 0
@@ -131,7 +147,15 @@ class ConsoleModel(QAbstractListModel):
     def update_records(
         self, records: Sequence[ConsoleRecord], wanted: Callable[[ConsoleRecord], bool]
     ) -> int:
-        """Add new matching records and remove evicted ones. Return the number of rows added."""
+        """Add rows for new records and remove the rows of evicted ones.
+
+        Args:
+            records: Stored records, oldest first.
+            wanted: Returns True for records to show.
+
+        Returns:
+            The number of rows added.
+        """
         if not records or records[-1].number < self._newest or records[0].number > self._newest + 1:
             self.reset_records(records, wanted)
             return len(self._records)
@@ -210,10 +234,10 @@ class LineDelegate(QStyledItemDelegate):
             rect.setLeft(part.right() + 7)
 
     def columns(self, record: ConsoleRecord, width: float) -> dict[str, float]:
-        """Return the widths of the parts before the text, for a row of the given width.
+        """Return the width in px of each part before the text, for a row of the given width.
 
-        When space is short, the logger is left out first, then the level's name (the icon stays), then the
-        time. The tooltip contains everything.
+        When space is short, the logger is omitted first, then the name of the level (its icon stays), then
+        the time. The tooltip contains all parts.
         """
         font = self._font()
         text = MIN_TEXT_CHARS * paint.width_of(font, "n")
@@ -242,7 +266,9 @@ class LineDelegate(QStyledItemDelegate):
 class LineList(QListView):
     """List view of the records.
 
-    The key ``/`` emits `find_wanted`; `resized` is emitted on a change of geometry.
+    Signals:
+        find_wanted: The key ``/`` was pressed.
+        resized: The size of the view changed.
     """
 
     find_requested = Signal()

@@ -46,7 +46,7 @@ MAX_NODES = 20
 
 
 class ConsolePanel(PanelWidget):
-    """List of log records with filters by level, node and words."""
+    """Panel with the list of log records, and filters by level, node and text."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Console"))
@@ -185,7 +185,7 @@ class ConsolePanel(PanelWidget):
     # filters
 
     def set_level(self, level: str) -> None:
-        """Set the minimum level: "debug", "all" (everything but debug), "warn" or "error"."""
+        """Set which levels are shown: "debug" (all), "all" (all but debug), "warn" (and above) or "error"."""
         if level in VISIBLE_LEVELS:
             self.level = level
             self._update_filter_button()

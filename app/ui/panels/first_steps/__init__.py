@@ -1,3 +1,3 @@
-"""First steps panel: a tutorial of six steps, which are checked off by observing blocks and runs."""
+"""First steps panel: tutorial of six steps. Completed steps are detected from the blocks and the runs."""
 
 from app.ui.panels.first_steps.panel import PANEL as PANEL

@@ -1,4 +1,4 @@
-"""First steps panel, which shows the next step of the tutorial and checks off completed ones."""
+"""First steps panel: list of the tutorial's steps, with a hint for the next one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ WHAT_NEXT = lazy("You can now build, run and stop a behaviour. Open an example t
 
 
 class _Mark(QWidget):
-    """Check mark, or the number of the step in a ring; filled for the next step."""
+    """Check mark of a completed step, or the step's number in a circle, filled for the next step."""
 
     def __init__(self, theme: Theme, number: int) -> None:
         super().__init__()
@@ -65,7 +65,13 @@ class _Mark(QWidget):
 
 
 class StepRow(QWidget):
-    """Row of one step; the next step is tinted and has hint and button."""
+    """Row of one step. The next step is tinted, and shows a hint and a button.
+
+    Args:
+        number: Number of the step, counted from 1.
+        step: Step to show.
+        show_me: Called with the step when the button is clicked.
+    """
 
     def __init__(
         self, theme: Theme, number: int, step: TutorialStep, show_me: Callable[[TutorialStep], None]
@@ -106,7 +112,7 @@ class StepRow(QWidget):
         self.mark.update()
 
     def show_hint(self, *, loose: bool) -> None:
-        """Show where to find the block. If `loose`, say that it must be attached to the script."""
+        """Show where to find the block; if `loose` is True, that it must be attached to the script."""
         self.hint.setText(with_block_names(LOOSE_HINT if loose else self.step.hint))
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -119,16 +125,19 @@ class StepRow(QWidget):
 
 
 def with_block_names(text: str) -> str:
-    """Return the text of a step with the names of its blocks filled in."""
+    """Translate a text of a step and insert the names of its blocks."""
     return _(text).format(
         start=pgettext("block", "when started"), say=pgettext("robot", "say"), turn=pgettext("robot", "turn")
     )
 
 
 class FirstStepsPanel(PanelWidget):
-    """Tutorial of six steps to a robot that speaks, turns and stops. Progress is saved in the settings.
+    """Panel with the six steps to a robot that speaks, turns and stops. Progress is saved in the settings.
 
-    `clock` returns seconds; the hint appears automatically after 20 s without progress.
+    The hint appears by itself after 20 s without progress.
+
+    Args:
+        clock: Returns the time in s.
     """
 
     def __init__(self, context: PanelContext, clock: Callable[[], float] = time.monotonic) -> None:
@@ -245,7 +254,7 @@ class FirstStepsPanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def show_me(self, step: TutorialStep) -> None:
-        """Highlight the block or button of a step."""
+        """Highlight the block or button of a step; for the first step, start the virtual robot."""
         self._pointed_for = step.id
         if step.id == "robot":
             self.context.run("robots.virtual")

@@ -10,7 +10,7 @@ from nep.i18n import lazy
 START_BLOCK = "events_started"
 SAY, TURN = "_do_say", "_do_turn"
 Script = tuple[tuple[str, str], ...]
-"""Type and id of each block of a script."""
+"""Blocks of a script, as pairs of type and id."""
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,11 @@ class TutorialStep:
     """Step of the tutorial.
 
     Attributes:
-        text: Sentence with ``{names}`` of blocks.
-        hint: Where to find the block or button.
-        takes: Suffix of the type of the block to drag.
-        button: Command of the button to press.
+        id: Id of the step in the settings.
+        text: Sentence with the names of blocks in braces, such as ``{start}``.
+        hint: Sentence that explains where to find the block or button.
+        block_suffix: Suffix of the type of the block to drag, or "".
+        button: Command of the button to press, or "".
     """
 
     id: str
@@ -67,9 +68,13 @@ STEPS: tuple[TutorialStep, ...] = (
 
 @dataclass(frozen=True)
 class TutorialBlocks:
-    """Result of `built_in`: ids of "say" blocks below "when started", and True if there is a "turn" block.
+    """Blocks of the tutorial that a behaviour contains, as returned by `find_tutorial_blocks`.
 
-    `loose` has the type suffixes of blocks that occur only in scripts without an event.
+    Attributes:
+        started: True if there is a "when started" block.
+        say_ids: Ids of the "say" blocks below "when started".
+        has_turn: True if there is a "turn" block below "when started".
+        loose: Type suffixes of blocks that occur only in scripts without "when started".
     """
 
     started: bool = False
@@ -80,9 +85,13 @@ class TutorialBlocks:
 
 @dataclass(frozen=True)
 class TutorialState:
-    """Current state of blocks and run.
+    """Current state of the behaviour and its run.
 
-    `ran` has the ids of blocks that have run; `stopped` is True after Stop.
+    Attributes:
+        can_speak: True if a robot that can speak is connected.
+        blocks: Blocks of the tutorial that the behaviour contains.
+        executed_ids: Ids of the blocks that have run.
+        was_stopped: True after the run was stopped.
     """
 
     can_speak: bool = False
@@ -92,11 +101,11 @@ class TutorialState:
 
 
 def find_tutorial_blocks(workspace: Mapping[str, object], others: Collection[str] = ()) -> TutorialBlocks:
-    """Return the tutorial's blocks that a workspace contains.
+    """Return the blocks of the tutorial that a workspace contains.
 
     Args:
-        workspace: Program of the behaviour.
-        others: Ids of blocks to ignore because they came with an example.
+        workspace: Workspace of the behaviour.
+        others: Ids of blocks to ignore because they belong to an example.
     """
     started: list[Script] = []
     loose: list[Script] = []
@@ -119,9 +128,13 @@ def _contains_type(scripts: Sequence[Script], end: str) -> bool:
 
 
 def completed_steps(now: TutorialState, done: Collection[str]) -> frozenset[str]:
-    """Return the ids of completed steps; steps in `done` stay completed.
+    """Return the ids of the completed steps.
 
-    Stop counts only after a run with a turn, so that the step can't be completed by chance.
+    The last step, Stop, counts only after a run with a turn, so that it can't be completed by chance.
+
+    Args:
+        now: Current state of the behaviour and its run.
+        done: Ids of steps completed before, which stay completed.
     """
     found = set(done)
     if now.can_speak:

@@ -33,11 +33,11 @@ ZOOM_STEP = 1.2
 MARGIN = 20.0
 PAN_STEP = 60.0
 CLICK_TOLERANCE = 4.0
-"""Mouse movement in px up to which a press counts as a click."""
+"""Maximum mouse movement in px for which a press still counts as a click."""
 MAX_UPDATES_PER_TICK = 250
 """Maximum number of nodes and lines updated per tick."""
 MAX_DIRTY_RECTS = 60
-"""Number of changed areas above which their bounding rectangle is repainted instead."""
+"""Number of changed areas above which the whole canvas is repainted instead."""
 _ARROWS: dict[int, Arrow] = {
     Qt.Key.Key_Left: "left",
     Qt.Key.Key_Right: "right",
@@ -49,17 +49,19 @@ PANEL_KEYS = {Qt.Key.Key_G: "g", Qt.Key.Key_H: "h", Qt.Key.Key_S: "s", Qt.Key.Ke
 
 
 class GraphCanvas(QWidget):
-    """Canvas of one scene. The viewport is kept when the scene changes, unless the whole graph is fitted.
+    """Canvas that shows a scene and handles pan, zoom and selection.
+
+    The viewport stays the same when the scene changes, unless the whole graph is fitted.
 
     Signals:
-        chosen: Selection, or None.
+        chosen: New selection, or None.
         opened: Key of a topic to inspect.
-        entered: The card should get the focus.
-        toggled: Group to expand or collapse.
-        quiet_wanted: Group whose quiet nodes should be shown.
-        letter: Key press for the panel.
+        entered: The card of the selected node should get the focus.
+        toggled: Key of a group to expand or collapse.
+        quiet_wanted: Key of a group whose quiet nodes should be shown.
+        letter: Key for the panel to handle, such as "g".
         moved: The viewport changed.
-        menu_wanted: Selection and screen position of a context menu.
+        menu_wanted: Item and screen position for a context menu.
 
     Args:
         describe: Returns the selection as text for screen readers.
@@ -107,7 +109,10 @@ class GraphCanvas(QWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_scene(self, scene: GraphScene | None) -> None:
-        """Show another graph, or the same graph in another layout."""
+        """Replace the scene; None shows an empty canvas.
+
+        The selection is cleared if the new scene does not contain the selected item.
+        """
         self.scene = scene
         if self.choice is not None and not self._exists(self.choice):
             self.select(None)
@@ -125,17 +130,21 @@ class GraphCanvas(QWidget):
         return (graph.node(choice.key) if choice.kind == "node" else graph.line_of(choice.key)) is not None
 
     def schedule_update(self) -> None:
-        """Schedule a refresh of the rates and counts on visible items; `renew` performs it."""
+        """Schedule a refresh of the rates and counts on visible items; `update_stats` performs it."""
         if self.scene is not None:
             self._waiting = self.scene.items_in(self.visible_rect())
 
     def update_stats(self, figures: StatsOf) -> int:
-        """Update the rates and counts of the next `MAX_UPDATES_PER_TICK` visible items.
+        """Update the rates and counts of the next visible items, at most `MAX_UPDATES_PER_TICK`.
 
-        Only changed areas are repainted. Called on every tick, therefore each call is short.
+        This is called on every tick; the work is divided, because each call must be short. Only changed
+        areas are repainted.
+
+        Args:
+            figures: Returns label, width and losses of a line.
 
         Returns:
-            The number of repainted areas.
+            The number of changed areas.
         """
         scene = self.scene
         if scene is None or not self._waiting:
@@ -156,7 +165,13 @@ class GraphCanvas(QWidget):
         return len(areas)
 
     def select(self, choice: GraphSelection | None, *, by_key: bool = False) -> None:
-        """Select an item, or None for nothing. A selection by key is scrolled into view and announced."""
+        """Select an item.
+
+        Args:
+            choice: Item to select; None clears the selection.
+            by_key: True if the user pressed a key: the item is scrolled into view and announced to screen
+                readers.
+        """
         if choice == self.choice:
             return
         self.choice = choice
@@ -176,7 +191,10 @@ class GraphCanvas(QWidget):
         return QRectF(left_top.x(), left_top.y(), self.width() / self.scale, self.height() / self.scale)
 
     def show_all(self) -> None:
-        """Fit the whole graph into the view (at most 100 %). It stays fitted until the next pan or zoom."""
+        """Fit the whole graph into the view, at a scale of at most 100 %.
+
+        The graph stays fitted when the canvas is resized, until the next pan or zoom.
+        """
         self._shows_all = True
         if self.scene is None or self.scene.bounds.isEmpty():
             return
@@ -378,7 +396,14 @@ class GraphCanvas(QWidget):
         return (group[0].key, group[1]) if group is not None else None
 
     def expand_group(self, key: str) -> bool:
-        """Expand a group that is collapsed to one box; return False for other nodes."""
+        """Expand a collapsed group.
+
+        Args:
+            key: Key of a node.
+
+        Returns:
+            False if the node is not a collapsed group.
+        """
         node = self.scene.graph.node(key) if self.scene is not None else None
         if node is None or node.kind != "group":
             return False
@@ -438,7 +463,7 @@ class GraphCanvas(QWidget):
 
 
 class GraphOverview(QWidget):
-    """Overview map with a frame around the visible part; a click centres the view there."""
+    """Small map of the whole graph with a frame around the visible part; a click centres the view there."""
 
     def __init__(self, theme: Theme, canvas: GraphCanvas) -> None:
         super().__init__(canvas)

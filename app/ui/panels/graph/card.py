@@ -1,4 +1,4 @@
-"""Card with details and next steps of the topic, service or node selected in the graph."""
+"""Card with details of the topic, service or node selected in the graph, and with actions on it."""
 
 from __future__ import annotations
 
@@ -35,15 +35,22 @@ if TYPE_CHECKING:
 
 WIDTH = 316
 MAX_ROWS = 40
-"""Maximum number of listed publishers, subscribers or topics; the number of further ones is shown."""
+"""Maximum number of rows in a table; the number of omitted rows is shown instead."""
 
 Row = tuple[str, str, tuple[str, ...]]
-"""Row of a table: key to select on click ("" for none), name, and values."""
+"""Row of a table: key of the item to select on click ("" for none), name, and values."""
 
 
 @dataclass(frozen=True, slots=True)
 class CardTable:
-    """Table with a title; `columns` are the headers of the value columns."""
+    """Table of a card.
+
+    Attributes:
+        title: Title, which is also the header of the column with the names.
+        columns: Headers of the columns with the values.
+        rows: Rows of the table.
+        item_kind: Kind of the items that the rows select, "node" or "topic".
+    """
 
     title: str
     columns: tuple[str, ...]
@@ -53,7 +60,15 @@ class CardTable:
 
 @dataclass(frozen=True, slots=True)
 class CardStat:
-    """Number in large type with a note and an optional curve."""
+    """Number of a card in large type, such as the rate of a topic.
+
+    Attributes:
+        title: Title above the number.
+        value: Formatted number.
+        note: Text below the number, or "".
+        curve: Recent values to draw as a curve; empty for no curve.
+        is_bad: True for a number that indicates a problem.
+    """
 
     title: str
     value: str
@@ -64,7 +79,16 @@ class CardStat:
 
 @dataclass(frozen=True, slots=True)
 class CardContent:
-    """Contents of a card."""
+    """Contents of a card.
+
+    Attributes:
+        title: Name of the topic, service or node.
+        kind: Short description below the title, such as the message type.
+        figures: Numbers in large type.
+        facts: Lines of text below the numbers.
+        tables: Tables below the lines of text.
+        foot: Text at the bottom of the card, or "".
+    """
 
     title: str
     kind: str
@@ -73,7 +97,7 @@ class CardContent:
     tables: tuple[CardTable, ...] = ()
     foot: str = ""
     topic: str = ""
-    """Key of the topic that *Inspect* opens; "" hides the button."""
+    """Key of the topic for the buttons *Inspect*, *Plot a field* and *Record topic*; "" hides the buttons."""
     has_fields: bool = False
     """True if the messages have fields to plot."""
     alarm: str = ""
@@ -81,13 +105,13 @@ class CardContent:
 
 
 class GraphCard(QWidget):
-    """Displays a `CardContent`. Parts that didn't change are not rebuilt.
+    """Widget that shows a `CardContent`. Only a change of the structure rebuilds the widgets of the card.
 
     Signals:
-        closed: The card was closed.
-        inspected: Topic to inspect.
-        plotted: Topic to plot.
-        record_wanted: Topic to record.
+        closed: The close button was clicked.
+        inspected: Key of a topic to inspect.
+        plotted: Key of a topic to plot.
+        record_wanted: Key of a topic to record.
         warned: Command that creates an alarm.
         chose: Kind and key of an item to select.
     """
@@ -159,7 +183,7 @@ class GraphCard(QWidget):
         return head
 
     def first_focus_widget(self) -> QWidget:
-        """Return the widget that gets the focus first: a row, else *Inspect*, else the close button."""
+        """Return the first widget of the tab order: a row, else *Inspect*, else the close button."""
         rows = [row.button for table in self._tables for row in table.rows]
         first = next((button for button in rows if button.isVisibleTo(self)), None)
         return first or (self.inspect if self.inspect.isVisibleTo(self) else self.close_button)
@@ -181,7 +205,7 @@ class GraphCard(QWidget):
             self.record_requested.emit(self.content.topic)
 
     def show_content(self, content: CardContent | None) -> None:
-        """Show a card, or hide it if `content` is None."""
+        """Show other contents, or hide the card if `content` is None."""
         if content == self.content:
             return
         before, self.content = self.content, content
@@ -320,13 +344,13 @@ class CardSources:
     """Sources of the information on a card.
 
     Attributes:
-        topic_of: Return a topic by key.
-        view: Graph reported by the master.
-        name_of: Return the name of a node by its key.
-        box_of: Return the box of a node in the drawing; "" if it is not drawn.
-        calls: Calls per second, by service.
-        shows: Return False for topics to leave out.
-        now_ns: Clock, ns since 1970.
+        topic_of: Returns a topic by key, or None.
+        view: Graph reported by the master, or None.
+        name_of: Returns the name of a node by key.
+        box_of: Returns the key of the box that shows a node, or "" if the node is not drawn.
+        calls: Calls per second, by name of the service.
+        is_visible: Returns False for topics to hide.
+        now_ns: Returns the current time in ns since 1970.
     """
 
     topic_of: Callable[[str], Topic | None]
@@ -339,7 +363,7 @@ class CardSources:
 
 
 def topic_card(key: str, facts: CardSources) -> CardContent | None:
-    """Return the card of a topic or service, or None if it is unknown."""
+    """Return the contents of the card for a topic or service, or None if the key is unknown."""
     topic = facts.topic_of(key)
     if topic is not None:
         return _topic_content(topic, facts)
@@ -451,9 +475,12 @@ def _row(facts: CardSources, entry: str, figures: tuple[str, ...]) -> Row:
 def node_card(
     node: DrawnNode, services: Sequence[tuple[str, bool]], facts: CardSources
 ) -> CardContent | None:
-    """Return a node's card.
+    """Return the contents of the card for a node, or None for a collapsed group.
 
-    `services` maps services to True if the node offers them, False if it calls them.
+    Args:
+        node: Node to describe.
+        services: Services of the node, each with True if the node serves it, False if the node calls it.
+        facts: Sources of the information.
     """
     entry = node.entry
     if entry is None:
@@ -500,7 +527,7 @@ def _topics_table(title: str, network: str, names: Sequence[str], facts: CardSou
 
 
 def clock_offset_text(view: GraphView | None) -> str:
-    """Format the largest uncertainty of the computers' clock offsets; "" if none was measured."""
+    """Format the largest uncertainty of the clock offsets between computers; "" if none was measured."""
     if view is None:
         return ""
     known = [node.clock_uncertainty_ns for node in view.nodes.values() if node.clock_uncertainty_ns]

@@ -1,4 +1,4 @@
-"""Painter of a graph scene, on the screen or to a file."""
+"""Painting of a graph scene, on the screen or into a file."""
 
 from __future__ import annotations
 
@@ -26,18 +26,22 @@ def paint_scene(
     *,
     rings: bool = False,
 ) -> None:
-    """Paint the part of the scene within `clip` at `scale`.
+    """Paint a part of the scene.
 
     Args:
-        chosen: Selected item, which is highlighted.
-        rings: Also paint focus rings, for keyboard use.
+        scene: Scene to paint.
+        painter: Painter, which is transformed to scene coordinates.
+        clip: Part to paint, in scene coordinates.
+        scale: Scale of the painter, which determines the level of detail.
+        chosen: Selected item to highlight.
+        rings: True to paint focus rings, for use by keyboard.
     """
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     _Painting(scene, painter, clip, scale, chosen, rings=rings).paint()
 
 
 class _Painting:
-    """State of one paint pass: colours, and the ends of the selected line."""
+    """Single pass that paints the visible part of a scene."""
 
     def __init__(
         self,

@@ -68,13 +68,13 @@ from nep.i18n import _, lazy, ngettext
 SVG = FileKind(lazy("An image that stays sharp at any size"), ".svg")
 DOT = FileKind(lazy("Graph for other programs"), ".dot")
 MAX_LINES_PER_TICK = 500
-"""Number of lines above which building and first painting of a scene are spread over two ticks."""
+"""Number of lines above which a scene is painted one tick after it was built, to keep each tick short."""
 MIN_SIDE_CARD_WIDTH = 700
-"""Minimum width in px (at 100 % text size) for a card at the side; below it, the card is at the bottom."""
+"""Width of the panel in px (at 100 % text size) from which the card is at the side, else at the bottom."""
 QUIET_UPDATE_TICKS = 30
-"""Refreshes (at 30 Hz) between checks for quiet nodes."""
+"""Number of ticks (at 30 Hz) between checks for quiet nodes."""
 MAX_MENU_TOPICS = 20
-"""Maximum number of topics in a line's menu; the cards of its nodes list all of them."""
+"""Maximum number of topics in the menu of a line; the cards of its nodes list more topics."""
 GROUPS: tuple[GroupBy, ...] = ("computer", "robot", "nothing")
 
 
@@ -364,7 +364,10 @@ class GraphPanel(PanelWidget):
             menu.deleteLater()
 
     def menu_of(self, choice: GraphSelection) -> Menu:
-        """Return the context menu of a node, or of the topics and services of a line."""
+        """Return the context menu of the selected node or line.
+
+        The menu of a line with several topics has a submenu for each of them.
+        """
         menu, scene = Menu(self.theme, self), self.canvas.scene
         graph = scene.graph if scene is not None else NodeGraph()
         if choice.kind == "node":
@@ -502,7 +505,7 @@ class GraphPanel(PanelWidget):
             self.context.toast(_("Saved {name}").format(name=path.name))
 
     def picture(self) -> bytes:
-        """Return the whole graph as SVG in the colours of the theme; b"" if it is empty."""
+        """Return the whole graph as SVG in the colours of the theme; b"" if the graph is empty."""
         scene = self.canvas.scene
         if scene is None or not scene.nodes:
             return b""

@@ -1,7 +1,7 @@
 """Geometry and texts of the graph, with hit testing.
 
-Coordinates are those of the layout; the painter applies the scale. Updates return the changed areas, so that
-only these are repainted.
+Coordinates are in the units of the layout; the painter applies the scale. Methods that update an item
+return the area that has to be repainted.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ LINE_MARGIN = 14.0
 """Margin in px around lines, to include arrows and thick pens."""
 CELL_SIZE = (160.0, 48.0)
 LABEL_RATE_CHARS = 7
-"""Characters reserved in a label for the rate."""
+"""Number of characters that every label reserves for the rate."""
 MIN_TEXT_PX = 7.0
 """Font height in px below which text is not painted, because it would be illegible."""
 TINY_SCALE = 0.2
-"""Scale below which rates and line widths are left out, because thousands of lines are visible."""
+"""Scale below which rates and line widths are omitted, because thousands of lines may be visible."""
 HIT_TOLERANCE_PX = 6.0
 """Maximum distance of a click from a line, in px."""
 BRIDGE_END_WIDTH = 48.0
-"""Width in px of the right part of a bridge, which names the other network."""
+"""Width in px of the right part of a bridge's box, which contains the name of the other network."""
 
 
 StatsOf = Callable[[GraphLine], LineStats]
@@ -49,20 +49,38 @@ StatsOf = Callable[[GraphLine], LineStats]
 
 @dataclass(slots=True)
 class NodeItem:
-    """Box of a node with its texts."""
+    """Box of a node with its texts.
+
+    Attributes:
+        node: Node or collapsed group.
+        rect: Rectangle in scene coordinates.
+        name: First line, elided to the available width.
+        said: Second line in full length.
+        is_dim: True while the filter fades the box.
+    """
 
     node: DrawnNode
     rect: QRectF
     name: str
     detail: str = ""
     line: str = ""
-    """`said`, elided to the available width."""
+    """Second line, elided to the available width."""
     is_dim: bool = False
 
 
 @dataclass(slots=True)
 class LineItem:
-    """Line between two boxes: its routes, and the rectangle of its label if there was room for it."""
+    """Line between boxes.
+
+    Attributes:
+        line: Topics or services that the line stands for.
+        ways: Points of the route between each pair of source and target.
+        bounds: Bounding rectangle in scene coordinates.
+        label: Rectangle of the label, or None if there is no room for it.
+        is_placed: True after a place for the label has been searched.
+        figures: Label, width and losses.
+        is_dim: True while the filter fades the line.
+    """
 
     line: GraphLine
     routes: dict[tuple[str, str], Sequence[Position]]
@@ -92,7 +110,7 @@ class LineItem:
         return self._arrows
 
     def sharp_routes(self) -> list[QPolygonF]:
-        """Return the routes with sharp corners, which are painted faster at small scales."""
+        """Return the routes with sharp corners, which are faster to paint at small scales."""
         if self._sharp_routes is None:
             self._sharp_routes = [
                 QPolygonF([QPointF(*at) for at in points]) for points in self.routes.values()
@@ -102,7 +120,14 @@ class LineItem:
 
 @dataclass(slots=True)
 class GroupItem:
-    """Frame of a group; `quiet` is the rectangle of the text with the number of hidden nodes."""
+    """Frame of a group.
+
+    Attributes:
+        group: Group to show.
+        rect: Rectangle in scene coordinates.
+        name: Name of the group, elided to the available width.
+        quiet_rect: Rectangle of the text with the number of hidden quiet nodes, or None.
+    """
 
     group: GraphGroup
     rect: QRectF
@@ -111,9 +136,13 @@ class GroupItem:
 
 
 class GraphScene:
-    """Geometry of one graph, computed once; `renew` updates rates and counts.
+    """Geometry of a graph. Only `update_stats` changes it, to update rates and counts.
 
     Args:
+        theme: Theme with the fonts.
+        graph: Graph to show.
+        layout: Positions of nodes, groups and routes.
+        sizes: Sizes that the layout was computed with.
         host: Name of this computer.
     """
 
@@ -184,9 +213,15 @@ class GraphScene:
         return [*nodes, *(item for item in self.lines if item.bounds.intersects(area))]
 
     def update_stats(self, item: NodeItem | LineItem, figures: StatsOf, *, with_words: bool) -> QRectF | None:
-        """Update rates and counts of one item. Return the area to repaint, or None if nothing changed.
+        """Update the rates and counts of one item.
 
-        The label of a line is placed on the first call with `with_words`.
+        Args:
+            item: Item to update.
+            figures: Returns label, width and losses of a line.
+            with_words: True if small text is legible. The first such call places the label of a line.
+
+        Returns:
+            The area to repaint, or None if nothing changed.
         """
         if isinstance(item, NodeItem):
             said = node_line(item.node) if with_words else item.detail
@@ -208,7 +243,7 @@ class GraphScene:
         return area
 
     def complete(self, figures: StatsOf) -> None:
-        """Update the rates and counts of all items at once, for an exported picture."""
+        """Update the rates and counts of all items at once, for the export of an image."""
         every: list[NodeItem | LineItem] = [*self.nodes.values(), *self.lines]
         for item in every:
             self.update_stats(item, figures, with_words=True)
@@ -224,7 +259,14 @@ class GraphScene:
         return found
 
     def dim_unmatched(self, words: Sequence[str]) -> None:
-        """Fade the items that lack one of `words`. Nodes connected to matching topics stay."""
+        """Fade the items that don't match a filter.
+
+        An item matches if its texts contain all of the words. Lines at matching nodes, and nodes at
+        matching lines, are not faded either.
+
+        Args:
+            words: Words in lower case; empty for no filter.
+        """
         bright = {
             key for key, item in self.nodes.items() if all(word in _haystack(item.node) for word in words)
         }
@@ -248,11 +290,11 @@ class GraphScene:
 
     @staticmethod
     def has_stats(scale: float) -> bool:
-        """Return False for scales at which lines are drawn 1 px wide, without arrows and rates."""
+        """Return True if line widths, arrows and rates are shown at a scale."""
         return scale >= TINY_SCALE
 
     def has_small_text(self, scale: float) -> bool:
-        """Return True for scales at which the small text is legible."""
+        """Return True if the small text is legible at a scale."""
         return scale * self.small_font.pixelSize() >= MIN_TEXT_PX
 
     # -- hit testing --------------------------------------------------------------------------------------
@@ -262,9 +304,14 @@ class GraphScene:
         return next((item.node for item in self.nodes.values() if item.rect.contains(at)), None)
 
     def group_at(self, at: QPointF) -> tuple[GraphGroup, bool] | None:
-        """Return the group at a point, or None.
+        """Return the group whose title or number of quiet nodes is at a point.
 
-        The bool is True for its title, False for its number of quiet nodes.
+        Args:
+            at: Point in scene coordinates.
+
+        Returns:
+            The group, with True for its title and False for its number of quiet nodes; None if there is
+            neither.
         """
         for item in self.groups:
             if item.quiet_rect is not None and item.quiet_rect.contains(at):
@@ -275,7 +322,15 @@ class GraphScene:
         return None
 
     def line_at(self, at: QPointF, scale: float) -> LineItem | None:
-        """Return the line whose label is at the point, else the nearest line within `HIT_TOLERANCE_PX`."""
+        """Return the line at a point, or None.
+
+        Args:
+            at: Point in scene coordinates.
+            scale: Scale of the view.
+
+        Returns:
+            The line whose label contains the point, else the nearest line within `HIT_TOLERANCE_PX`.
+        """
         labelled = (item for item in self.lines if item.label is not None and item.label.contains(at))
         found = next(labelled, None)
         if found is not None:

@@ -50,17 +50,22 @@ class GraphTools(QWidget):
         self.show_choices(GraphOptions())
 
     def filter_words(self) -> list[str]:
-        """Return the words of the filter. Items that lack one of them are faded."""
+        """Return the words of the filter, in lower case."""
         return self.filter.text().casefold().split()
 
     def show_choices(self, choices: GraphOptions) -> None:
-        """Update the buttons to the current choices."""
+        """Update the buttons to show the current choices."""
         self.group.set_value(choices.group_by)
         self.quiet.setChecked(choices.hides_quiet)
         self.services.setChecked(choices.shows_services)
 
     def show_quiet_count(self, hidden: int, hides: bool) -> None:
-        """Show the number of hidden quiet nodes."""
+        """Show the number of hidden quiet nodes on the button.
+
+        Args:
+            hidden: Number of hidden nodes.
+            hides: True if quiet nodes are hidden.
+        """
         if hides and hidden:
             words = ngettext("{count} quiet node hidden", "{count} quiet nodes hidden", hidden)
             self.quiet.set_label(words.format(count=hidden))

@@ -35,7 +35,13 @@ FindTopic = Callable[[str], "Topic | None"]
 
 @dataclass(frozen=True, slots=True)
 class LineStats:
-    """Label and width (px) of a line; `lost` maps the box of a subscriber to its loss ratio."""
+    """Label, width and losses of a line.
+
+    Attributes:
+        words: Label.
+        width: Width of the line in px.
+        lost: Box key and loss ratio (0 to 1) of each subscriber with losses.
+    """
 
     label: str
     width: float
@@ -50,7 +56,7 @@ def node_icon(node: DrawnNode) -> str:
 
 
 def node_name(node: DrawnNode, host: str) -> str:
-    """Return the label of a node or collapsed group."""
+    """Return the displayed name of a node or collapsed group; `host` is the name of this computer."""
     if node.kind == "group":
         return group_name(node.key, host)
     if node.bridged_network:  # the rest of the name is painted in the bridge's right part
@@ -59,9 +65,9 @@ def node_name(node: DrawnNode, host: str) -> str:
 
 
 def node_line(node: DrawnNode) -> str:
-    """Return the second line in a node's box.
+    """Return the second line in the box of a node.
 
-    Examples are "Python, 4.1 %", "this window", "gone 4 s" and "41 nodes".
+    Examples are "Python, 4.1 %", "this window", "gone for 4 s" and "41 nodes".
     """
     entry = node.entry
     if entry is None:
@@ -94,14 +100,17 @@ def _members(members: int, quiet: int) -> str:
 
 
 def quiet_text(group: GraphGroup) -> str:
-    """Return the text with the number of hidden quiet nodes of a group."""
+    """Format the number of quiet nodes of a group, such as "3 quiet nodes"."""
     return ngettext("{count} quiet node", "{count} quiet nodes", group.quiet_count).format(
         count=group_digits(group.quiet_count)
     )
 
 
 def counts_text(graph: NodeGraph) -> str:
-    """Return a summary such as "7 of 9 nodes, 3 of them web pages, 13 topics"; "" without nodes."""
+    """Format the numbers of nodes, topics and services, such as "7 of 9 nodes, 13 topics".
+
+    Return "" if there are no nodes.
+    """
     there = graph.node_count
     if not there:
         return ""
@@ -145,9 +154,10 @@ def line_stats(
     """Return label, width and losses of a line.
 
     Args:
-        topic_of: Returns a topic by key.
-        hertz: Calls per second by service, where known.
-        box_of: Returns the box of a node's entry, or "" if it is not drawn.
+        line: Line to describe.
+        topic_of: Returns a topic by key, or None.
+        hertz: Calls per second, by name of the service; may be incomplete.
+        box_of: Returns the key of the box that shows a node, or "" if the node is not drawn.
     """
     names = line_name(line.topics)
     if line.kind == "service":
@@ -173,19 +183,22 @@ def _losses(topics: Sequence[Topic], box_of: Callable[[str], str]) -> tuple[tupl
 
 
 def finite_or_none(value: float | None) -> float | None:
-    """Return the value, or None if it is missing, NaN or infinite."""
+    """Return the value if it is finite, else None."""
     return value if value is not None and math.isfinite(value) else None
 
 
 def line_name(topics: Sequence[str]) -> str:
-    """Return the names of a line's topics, or their number if there are more than `MAX_NAMED_TOPICS`."""
+    """Return the names of a line's first topics, and the number of further topics.
+
+    At most `MAX_NAMED_TOPICS` topics are named, for example "/scan /odom and 3 more".
+    """
     named = " ".join(split_key(topic)[1] for topic in topics[:MAX_NAMED_TOPICS])
     more = len(topics) - MAX_NAMED_TOPICS
     return _("{names} and {count} more").format(names=named, count=more) if more > 0 else named
 
 
 def short_rate(rate_hz: float) -> str:
-    """Format a rate such as "52/s", "0.5/s" or "2/min"; lower rates are "0/s"."""
+    """Format a rate such as "52/s", "0.5/s" or "2/min"; rates below 0.5 per minute are "0/s"."""
     if rate_hz >= 9.95:
         return f"{group_digits(round(rate_hz))}/s"
     if rate_hz >= 0.095:
@@ -194,7 +207,10 @@ def short_rate(rate_hz: float) -> str:
 
 
 def line_width(bytes_per_s: float) -> float:
-    """Return the line width in px for a bandwidth, quantized so that small changes cause no repaint."""
+    """Return the line width in px for a bandwidth.
+
+    Widths have few steps, so that small changes of the bandwidth cause no repaint.
+    """
     if not bytes_per_s > MIN_WIDTH_BPS:
         return MIN_WIDTH
     share = min(1.0, math.log10(bytes_per_s / MIN_WIDTH_BPS) / WIDTH_DECADES)
@@ -202,5 +218,5 @@ def line_width(bytes_per_s: float) -> float:
 
 
 def percent_text(share: float) -> str:
-    """Format a ratio as "0.7 %" or "12 %"."""
+    """Format a ratio (0 to 1) as a percentage, such as "0.7 %" or "12 %"."""
     return number(share, ".1%").replace("%", " %")

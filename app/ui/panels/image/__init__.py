@@ -1,6 +1,6 @@
 """Image panel: images of one topic.
 
-Painting and zoom are implemented in `app.ui.pictures`; this package has the panel, its menu and the PNG
+`app.ui.pictures` implements painting and zoom; this package contains the panel, its menu and the PNG
 export.
 """
 

@@ -1,4 +1,4 @@
-"""Actions on an image, shared by the title bar, menus and keys."""
+"""Actions on an image, which are shared by the title bar, the menus and the keyboard."""
 
 from __future__ import annotations
 
@@ -17,7 +17,13 @@ from nep.i18n import _, lazy
 class ActionSpec:
     """Definition of an action.
 
-    The first key is shown in menus; `above` adds a separator before the action.
+    Attributes:
+        name: Id of the action.
+        text: Text in menus.
+        keys: Shortcut keys; menus show the first one.
+        icon: Name of the icon, or None.
+        has_separator: True for a separator before the action.
+        is_checkable: True for a checkable action.
     """
 
     name: str
@@ -54,7 +60,12 @@ ROWS: tuple[ActionSpec, ...] = (
 
 
 class PictureActions(QObject):
-    """QActions of `ROWS` for one view; `own` implements those that `PictureView` lacks."""
+    """QActions defined in `ROWS`, for one image view.
+
+    Args:
+        view: Image view that the actions change.
+        own: Functions of the actions that `view` does not implement, by name.
+    """
 
     def __init__(self, theme: Theme, view: ZoomablePicture, own: Mapping[str, Callable[[], object]]) -> None:
         super().__init__(view)
@@ -98,12 +109,16 @@ class PictureActions(QObject):
         return list(self._listed)
 
     def set_enabled(self, there: bool) -> None:
-        """Enable the actions if `there` is True (an image is shown), else disable them."""
+        """Enable or disable all actions.
+
+        Args:
+            there: True if an image is shown.
+        """
         for action in self._by_name.values():
             action.setEnabled(there)
 
     def update_checks(self) -> None:
-        """Check the flip actions that are active."""
+        """Update the check marks of the flip actions."""
         self["across"].setChecked(self._view.place.is_flipped_horizontally)
         self["down"].setChecked(self._view.place.is_flipped_vertically)
 

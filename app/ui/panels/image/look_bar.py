@@ -19,7 +19,7 @@ from app.ui.widgets.inputs.slider import Track
 from nep.i18n import _, lazy
 
 SLIDER_STEPS = 100
-"""Slider steps on each side of the neutral middle."""
+"""Number of slider steps on each side of the neutral middle."""
 MAP_NAMES = {
     "grey": lazy("Grey"),
     "viridis": lazy("Viridis"),
@@ -27,21 +27,21 @@ MAP_NAMES = {
     "inferno": lazy("Inferno"),
     "jet": lazy("Jet"),
 }
-"""Names of the colour maps."""
+"""Displayed names of the colour maps."""
 
 
 class _RangeEdit(NumberEdit):
-    """Number field that formats its value as briefly as possible."""
+    """Number field for an end of the value range, which formats numbers without trailing zeros."""
 
     def format_number(self, value: float) -> str:
         return f"{value:.7g}"
 
 
 class LookBar(QWidget):
-    """Bar of display settings; emits `changed` with the new `PictureLook`.
+    """Bar with display settings of an image; emits `changed` with the new `PictureLook`.
 
     Args:
-        picture: Returns the image shown.
+        picture: Returns the image shown, or None.
     """
 
     changed = Signal(object)
@@ -91,7 +91,7 @@ class LookBar(QWidget):
         return made
 
     def show_look(self, look: PictureLook) -> None:
-        """Show the settings without emitting `changed`."""
+        """Show other settings without emitting `changed`."""
         self.look = look
         wanted = (
             (self.brightness, round(SLIDER_STEPS * (1 + look.brightness))),

@@ -1,4 +1,4 @@
-"""Overlay topics, whose annotations are drawn over an image."""
+"""Overlay topics: topics with annotations that are drawn over an image."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_OVERLAYS = 8
 
 
 def may_contain_annotations(topic: Topic) -> bool:
-    """Return True if type or name of the topic suggest that it contains annotations for images."""
+    """Return True if the message type or the name of a topic indicates annotations for images."""
     if topic.codec not in {"json", "msgpack"}:
         return False
     return (
@@ -27,7 +27,7 @@ def may_contain_annotations(topic: Topic) -> bool:
 
 
 class Overlays:
-    """Overlay topics chosen by the user; each is watched while the panel is visible."""
+    """Overlay topics that the user selected, with a watch for each of them."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -36,11 +36,11 @@ class Overlays:
 
     @property
     def selected(self) -> tuple[str, ...]:
-        """Keys of the chosen topics."""
+        """Keys of the selected topics."""
         return tuple(self._watches)
 
     def choices(self) -> list[str]:
-        """Return the keys of available overlay topics, and of chosen ones even if they no longer exist."""
+        """Return the keys of the available overlay topics, and of selected ones that no longer exist."""
         every = (*self._session.topics, *self._session.networks.topics)
         there = [topic.key for topic in every if topic.gone_s is None and may_contain_annotations(topic)]
         return [*there, *(key for key in self._watches if key not in there)]
@@ -54,14 +54,19 @@ class Overlays:
             self._drawn.pop(topic, None)
 
     def restart(self) -> None:
-        """Watch the chosen topics in the new source after the source changed."""
+        """Watch the selected topics again after the session switched to another source."""
         chosen = self.selected
         self.close()
         for topic in chosen:
             self.set_visible(topic, shown=True)
 
     def annotations_for(self, width: int, height: int) -> tuple[Shape, ...]:
-        """Return the annotations for an image of this size in px. Each message is decoded once."""
+        """Return the annotations to draw over an image. Each message is decoded only once.
+
+        Args:
+            width: Width of the image in px.
+            height: Height of the image in px.
+        """
         found: list[Shape] = []
         for key in self._watches:
             topic = self._session.topic(key)

@@ -39,7 +39,7 @@ MAX_SAVED_VIEWS = 200
 
 
 class ImagePanel(PanelWidget):
-    """Panel with the image stream of one topic: the first available one until the user chooses another."""
+    """Panel with the images of one topic: the first available one until the user selects another."""
 
     shows_video = True
 
@@ -124,7 +124,7 @@ class ImagePanel(PanelWidget):
         self.header = [self.fit, self.tune, self.layers, self.freeze, self.keep]
 
     def topics(self) -> list[str]:
-        """Return the keys of available image topics, with those of other networks last."""
+        """Return the keys of the available image topics: first Studio's own network, then other networks."""
         every = (*self.session.topics, *self.session.networks.topics)
         return [topic.key for topic in every if topic.codec == CODEC and topic.gone_s is None]
 
@@ -261,7 +261,7 @@ class ImagePanel(PanelWidget):
             self.job.save(message)
 
     def save_sequence(self) -> None:
-        """Record the following images; if a recording is open, show the export of its images instead."""
+        """Start to record the images or, if a recording is open, show the export of its images."""
         replay = self.session.replay
         if replay is None:
             self.context.run(f"record.topic:{self._topic}")

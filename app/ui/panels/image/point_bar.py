@@ -1,4 +1,4 @@
-"""Bar above an image to publish the coordinates of clicks."""
+"""Bar above an image for publishing the coordinates of clicks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,12 @@ TOPIC_WIDTH_PX, MAX_TOPIC_LENGTH = 130, 200
 
 
 class PointStrip(ArmedStrip):
-    """Arming strip that also arms the target topic of this panel."""
+    """Arming strip of a `PointBar`, whose switch also arms the bar's target topic.
+
+    Args:
+        arm: Arms the target topic; returns the reason on failure, or "".
+        said: Returns the summary of the published points, or "".
+    """
 
     def __init__(self, context: PanelContext, arm: Callable[[], str], said: Callable[[], str]) -> None:
         self._arm, self._said = arm, said
@@ -45,10 +50,14 @@ class PointStrip(ArmedStrip):
 
 
 class PointBar(QWidget):
-    """Publishes the clicks in `view` while the bar is on and armed by this panel, and no recording is open.
+    """Bar for publishing the coordinates of clicks in an image.
 
-    Only the panel's own switch or button arms the bar: a restored layout sends nothing, even if its topic is
-    armed elsewhere. `left` is emitted when the user closes the bar.
+    Clicks are published while the bar is visible, this panel has armed it, and no recording is open. Only
+    the switch and the button of this panel arm the bar, so a restored layout publishes nothing even if its
+    topic is armed elsewhere. `exited` is emitted when the user closes the bar.
+
+    Args:
+        view: Image view to receive clicks from.
     """
 
     exited = Signal()
@@ -108,7 +117,7 @@ class PointBar(QWidget):
 
     @property
     def is_armed(self) -> bool:
-        """True if a click is published."""
+        """True if the next click will be published."""
         arming, target = self._acting.arming, self.target
         return (
             self.is_on
@@ -128,7 +137,11 @@ class PointBar(QWidget):
         self.strip.refresh()
 
     def set_image_topic(self, key: str) -> None:
-        """Set the topic of the images; the target topic is derived from it."""
+        """Set the topic of the images, from which the default target topic is derived.
+
+        Args:
+            key: Key of the topic, or "".
+        """
         if key != self._pictures:
             self._pictures = key
             self._view.discard_click()
@@ -159,7 +172,7 @@ class PointBar(QWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def set_active(self, on: bool) -> None:
-        """Show or hide the bar. Clicks are not published before the bar is armed as well."""
+        """Show or hide the bar. A visible bar must be armed before clicks are published."""
         if on != self.is_on:
             self.is_on = on
             self.setVisible(on)
@@ -168,7 +181,10 @@ class PointBar(QWidget):
             self.refresh()
 
     def arm(self) -> str:
-        """Arm the target topic; ask for confirmation if it moves a robot. Return the reason on failure."""
+        """Arm the target topic; ask for confirmation if the topic moves a robot.
+
+        Return the reason if arming is not possible, or "".
+        """
         if self.problem.text():
             return self.problem.text()
         arming, target = self._acting.arming, self.target
@@ -220,7 +236,7 @@ class PointBar(QWidget):
     # -- saved state --------------------------------------------------------------------------------------
 
     def to_json(self) -> dict[str, object]:
-        """Return the state for the layout, without the armed state."""
+        """Return the state for the layout, without the arming."""
         return {"on": self.is_on, "topic": self.topic.text().strip(), "type": self.kind.value}
 
     def restore(self, saved: object) -> None:

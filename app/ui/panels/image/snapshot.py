@@ -21,13 +21,21 @@ if TYPE_CHECKING:
 
 POLL_MS = 30
 JobResult = Path | QImage | str
-"""Result of a job: path of the saved file, the image for the clipboard, or an error sentence."""
+"""Result of a job: path of the saved file, image for the clipboard, or error message."""
 
 
 class SnapshotJob(QObject):
-    """Saves or copies one image at a time in a thread, and emits the result on the GUI thread.
+    """Background job that saves or copies one image at a time.
 
-    QImage is the only Qt class used in the thread. `folder` returns the folder for files.
+    The result is emitted on the main thread. QImage is the only Qt class used in the background thread.
+
+    Args:
+        folder: Returns the folder for saved images.
+
+    Signals:
+        saved: Path of the saved file.
+        copied: Image for the clipboard.
+        failed: Error message.
     """
 
     saved = Signal(str)  # path of the file
@@ -49,16 +57,16 @@ class SnapshotJob(QObject):
         return self._thread is not None
 
     def save(self, message: Message) -> None:
-        """Save the image as PNG; ignored while `busy`."""
+        """Save the image of a message as PNG; ignored while `is_busy`."""
         folder = self._folder()
         self._start(lambda: snapshots.save(message, folder))
 
     def copy(self, message: Message) -> None:
-        """Copy the image at its original size to the clipboard; ignored while `busy`."""
+        """Emit the image of a message at its original size as `copied`; ignored while `is_busy`."""
         self._start(lambda: QImage.fromData(png_of(message)))
 
     def wait(self) -> None:
-        """Wait up to 2 s for the thread without emitting the result; called on close."""
+        """Wait up to 2 s for the thread and discard its result; called on close."""
         self._timer.stop()
         if self._thread is not None:
             self._thread.join(2.0)

@@ -1,4 +1,4 @@
-"""Actions on the message in the inspector, for menus and keys."""
+"""Actions of the inspector for menus and the keyboard."""
 
 from __future__ import annotations
 
@@ -26,14 +26,16 @@ FIND_KEY = QKeyCombination(Qt.KeyboardModifier.ControlModifier, Qt.Key.Key_F)
 
 
 class InspectorActions(QObject):
-    """Actions to copy, find, plot and compare. Their keys work within `panel`.
+    """Actions to copy, plot and find values, and to step through messages.
 
     Args:
-        shown: Returns the message shown.
-        value: Returns its decoded payload.
-        find: Focuses the find field.
-        toast: Shows a confirmation.
-        plot: Plots a field by its path.
+        panel: Panel in which the shortcuts work.
+        body: Contents of the panel.
+        shown: Returns the message shown, or None.
+        value: Returns the decoded payload of the message shown.
+        find: Gives the find field the focus.
+        toast: Shows a toast.
+        plot: Plots the field with a path.
     """
 
     def __init__(
@@ -90,7 +92,11 @@ class InspectorActions(QObject):
         return list(self._actions)
 
     def set_enabled(self, there: bool) -> None:
-        """Enable the actions if the tree shows a message, else disable them."""
+        """Enable or disable all actions.
+
+        Args:
+            there: True if the tree shows a message.
+        """
         for action in self._actions:
             action.setEnabled(there)
 
@@ -107,7 +113,10 @@ class InspectorActions(QObject):
             self._copy_text(node.path, _("Copied the path {path}").format(path=node.path))
 
     def plot(self) -> None:
-        """Plot the selected value if it is a number, text, boolean or list of numbers."""
+        """Plot the selected value; if it can't be plotted, show the reason in a toast.
+
+        Numbers, texts, booleans and lists of numbers can be plotted.
+        """
         node = self._selected_node()
         path = field_of(node) if node is not None else ""
         if path:

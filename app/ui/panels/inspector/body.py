@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 NOTHING, LARGE, TREE, RAW, TABLE = range(5)
 MODES = {TREE: "tree", TABLE: "table", RAW: "raw"}
-"""Pages that show a message, mapped to the names of their modes."""
+"""Mode of each page that shows a message."""
 
 
 class CompareStrip(QWidget):
-    """Strip above the tree during a comparison: reference message, summary, and filter for changes."""
+    """Strip above the tree during a comparison, with a summary and a filter for changed values."""
 
     changes_only_toggled = Signal(bool)
 
@@ -51,7 +51,10 @@ class CompareStrip(QWidget):
     def set_summary(self, compared_with: str, counts: Counts, whole: bool) -> None:
         """Show a summary such as ``Previous message: 3 changed, 1 added``.
 
-        `whole` is False if the counts are incomplete.
+        Args:
+            compared_with: Name of the base message.
+            counts: Number of values by kind of difference.
+            whole: False if the counts are incomplete.
         """
         said = _("{compared_with}: {changes}")
         self.words.setText(said.format(compared_with=compared_with, changes=changes_text(counts, whole)))
@@ -62,8 +65,9 @@ class InspectorBody(QWidget):
     """Contents of the inspector below its title bar.
 
     Args:
-        looked_through: Returns the value and the index that the find bar searches.
-        toast: Shows a confirmation.
+        looked_through: Returns the value that the find bar searches, and the index of a large message or
+            None.
+        toast: Shows a toast.
     """
 
     def __init__(
@@ -125,7 +129,12 @@ class InspectorBody(QWidget):
         return self.pages.currentIndex()
 
     def show_page(self, page: int, *, comparing: bool) -> None:
-        """Show a page with the widgets that belong to it."""
+        """Show a page and the widgets that belong to it.
+
+        Args:
+            page: `NOTHING`, `LARGE`, `TREE`, `RAW` or `TABLE`.
+            comparing: True if the tree shows the differences to another message.
+        """
         sentence = self.sentence.text() if page == RAW else ""
         self.sentence.setText(sentence)
         self.sentence.setVisible(bool(sentence))
@@ -139,7 +148,13 @@ class InspectorBody(QWidget):
             self.mode.set_value(MODES[page])
 
     def show_waiting(self, topic: str, published: bool, why: EmptyAction) -> None:
-        """Show the empty state of a topic without a message yet; `why` opens the connection doctor."""
+        """Show the empty state for a topic whose first message has not arrived yet.
+
+        Args:
+            topic: Name of the topic.
+            published: True if the topic has a publisher.
+            why: Action that opens the connection doctor.
+        """
         if published:
             words = _("The next message on {topic} appears here.")
         else:
@@ -151,7 +166,13 @@ class InspectorBody(QWidget):
             self.empty.set_actions([why])
 
     def show_undecodable(self, topic: str, reason: str, why: EmptyAction) -> None:
-        """Show the reason why messages of the topic can't be decoded."""
+        """Show the empty state for a topic whose messages can't be decoded.
+
+        Args:
+            topic: Name of the topic.
+            reason: Reason why decoding fails.
+            why: Action that opens the connection doctor.
+        """
         words = _("{topic}: {reason}.").format(topic=topic, reason=reason)
         if words != self._waiting:
             self._waiting = words
@@ -159,7 +180,13 @@ class InspectorBody(QWidget):
             self.empty.set_actions([why])
 
     def show_empty(self, topic: str, choose: Callable[[], object], why: EmptyAction) -> None:
-        """Show the empty state of a topic without messages, or without a selected topic."""
+        """Show the empty state before the first message or without a selected topic.
+
+        Args:
+            topic: Name of the selected topic; "" if none is selected.
+            choose: Lets the user select a topic.
+            why: Action that opens the connection doctor.
+        """
         self._waiting = ""
         if topic:
             self.show_waiting(topic, published=True, why=why)
@@ -168,7 +195,13 @@ class InspectorBody(QWidget):
             self.empty.set_actions([EmptyAction(_("Choose a topic"), choose, "list")])
 
     def show_large(self, size_bytes: int, words: str, read: Callable[[], object] | None = None) -> None:
-        """Show that the message is large, with a button that calls `read` to decode it."""
+        """Show that the message is large instead of its values.
+
+        Args:
+            size_bytes: Size of the message.
+            words: Explanation.
+            read: Decodes the message when the user clicks the button; None for no button.
+        """
         self.large.set_texts(_("Large message ({size})").format(size=size_text(size_bytes)), words)
         if read is None:
             self.large.set_actions([])
@@ -177,7 +210,7 @@ class InspectorBody(QWidget):
             self.large.set_actions([action])
 
     def reveal(self, path: object) -> None:
-        """Select a value in the tree and scroll to it."""
+        """Select the value at a path in the tree and scroll to it."""
         index = self.model.reveal(path)  # type: ignore[arg-type]
         self.tree.setCurrentIndex(index)
         self.tree.scrollTo(index)

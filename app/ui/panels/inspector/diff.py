@@ -26,7 +26,7 @@ MARK_TEXTS: Mapping[Mark, str] = {
 
 
 class _Sentinel:
-    """Sentinel for a missing value, distinct from null."""
+    """Type of the sentinels `NO_BASE` and `MISSING`, which are distinct from null."""
 
     def __init__(self, words: str) -> None:
         self._words = words
@@ -51,7 +51,15 @@ def differs(before: object, after: object) -> bool:
 
 
 def mark_of(value: object, base: object) -> Mark:
-    """Return the kind of difference between a value and its counterpart in the base message."""
+    """Return the kind of difference between a value and its counterpart in the base message.
+
+    Args:
+        value: Value in the message shown; `MISSING` if it was removed.
+        base: Value in the base message; `MISSING` if it was added, `NO_BASE` without a base message.
+
+    Returns:
+        "changed", "added" or "removed"; "" for equal values and without a base message.
+    """
     if base is NO_BASE:
         return ""
     if base is MISSING:
@@ -64,11 +72,20 @@ def mark_of(value: object, base: object) -> Mark:
 def parts_of(
     value: object, base: object, mark: Mark, count: int, *, changes_only: bool
 ) -> tuple[list[Part], int]:
-    """Return the first `count` children of a value, and the total number of children.
+    """Return the first children of a value with their differences.
 
-    A child consists of key, value, base value and mark. Removed children follow the present ones, with their
-    old values. All children of an added value are added, all of a removed one removed (`mark` is the
-    parent's). With `changes_only` the first `MAX_CHILDREN` are compared.
+    Removed children follow the present ones, with their old values. All children of an added value count as
+    added, and all children of a removed value as removed.
+
+    Args:
+        value: Object or list.
+        base: Its counterpart in the base message.
+        mark: Kind of difference between `value` and `base`.
+        count: Maximum number of children to return.
+        changes_only: True to omit equal children. Only the first `MAX_CHILDREN` children are compared.
+
+    Returns:
+        Key, value, base value and kind of difference of each child, and the total number of children.
     """
     if mark in {"added", "removed"} or not is_container(base) or _kind(base) != _kind(value):
         whole: Mark = "removed" if mark == "removed" else "added"
@@ -81,10 +98,17 @@ def parts_of(
 
 
 def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[Counts, bool]:
-    """Count changed, added and removed values. The bool is False if the count is incomplete.
+    """Count the changed, added and removed values of a message.
 
-    Added or removed containers count once. At most `most` values are compared, and only the beginning of long
-    lists.
+    An added or removed object or list counts as one value.
+
+    Args:
+        value: Message to check.
+        base: Base message.
+        most: Maximum number of values to compare. In long lists only the beginning is compared.
+
+    Returns:
+        The counts by kind of difference, and True if they are complete.
     """
     counts: Counts = {"changed": 0, "added": 0, "removed": 0}
     if base is NO_BASE:
@@ -105,7 +129,12 @@ def count_changes(value: object, base: object, most: int = MAX_VALUES) -> tuple[
 
 
 def changes_text(counts: Counts, whole: bool = True) -> str:
-    """Format counts as ``3 changed, 1 added`` or ``no difference``, with "at least" if `whole` is False."""
+    """Format counts as ``3 changed, 1 added`` or ``no difference``.
+
+    Args:
+        counts: Number of values by kind of difference.
+        whole: False if the counts are incomplete; "at least" is added then.
+    """
     said = ", ".join(_count_text(mark, count) for mark, count in counts.items() if count)
     if not said:
         return _("no difference") if whole else _("no difference at the start of long lists")

@@ -24,7 +24,13 @@ Path = tuple[str | int, ...]
 
 
 def find_in_text(index: JsonIndex, words: str, most: int = MAX_MATCHES) -> list[int]:
-    """Return the offsets of `words` in a large JSON text. ASCII letters match in any case."""
+    """Return the byte offsets of a text in a large JSON message. The case of ASCII letters is ignored.
+
+    Args:
+        index: Index of the message.
+        words: Text to find.
+        most: Maximum number of offsets to return.
+    """
     text, wanted = bytes(index.data).lower(), words.encode().lower()
     found: list[int] = []
     at = text.find(wanted) if wanted else -1
@@ -35,7 +41,10 @@ def find_in_text(index: JsonIndex, words: str, most: int = MAX_MATCHES) -> list[
 
 
 class FindField(SearchField):
-    """Find field. Return: next match, Shift+Return: previous, Esc: clear, Down: focus the tree."""
+    """Find field: Return selects the next match, Shift+Return the previous one; Esc clears the field.
+
+    Down gives the tree the focus.
+    """
 
     step_requested = Signal(int)
     exited = Signal()
@@ -80,18 +89,21 @@ class FindField(SearchField):
 
 
 class FindBar(QWidget):
-    """Find bar with the field, the number of matches and arrows. Emits `found` with the path of a match.
+    """Find bar with a field, the number of matches, and buttons for the next and previous match.
 
-    Matches belong to one message. Call `forget` when the message changes; the next step then searches again
-    and continues at the same position.
+    Matches belong to one message. Call `invalidate_matches` when the message changes. The next step
+    then searches again and continues at the same position.
 
     Args:
-        source: Returns the message shown, and the index of a large message.
+        source: Returns the value to search, and the index of a large message or None.
+
+    Signals:
+        found: Path of the selected match.
     """
 
     found = Signal(object)
     query_changed = Signal(str)
-    """Query (text that begins with ``$``), or "" after the text is no longer a query."""
+    """Emitted with the query when the user typed one (a text that begins with ``$``), else with ""."""
 
     def __init__(self, theme: Theme, source: Callable[[], tuple[object, JsonIndex | None]]) -> None:
         super().__init__()
@@ -118,11 +130,11 @@ class FindBar(QWidget):
 
     @property
     def matches(self) -> list[Path] | list[int]:
-        """Matches found so far: paths, or offsets in a large text."""
+        """Matches found so far: paths, or byte offsets in a large message."""
         return self._matches or []
 
     def search(self, words: str) -> None:
-        """Search for words and select the first match. Text that begins with ``$`` is a query."""
+        """Search for a text and select the first match. A text that begins with ``$`` is a query."""
         self._place = -1
         self._matches = []
         is_query = self.is_query
@@ -140,7 +152,7 @@ class FindBar(QWidget):
             self.step(1)
 
     def invalidate_matches(self) -> None:
-        """Discard the matches because the message changed."""
+        """Discard the matches; called when the message changes."""
         self._matches = None
 
     @property
@@ -149,7 +161,7 @@ class FindBar(QWidget):
         return self.field.text().startswith("$")
 
     def step(self, by: int) -> None:
-        """Select the next match (1) or the previous one (-1)."""
+        """Select the next match (`by` is 1) or the previous one (-1)."""
         words = self.field.text()
         if not words or self.is_query:
             return
@@ -185,7 +197,11 @@ class FindBar(QWidget):
         self.mark(wrong=wrong)
 
     def mark(self, *, wrong: bool) -> None:
-        """Set or remove the style for a missing match or an invalid query."""
+        """Show or remove the error style of the field.
+
+        Args:
+            wrong: True if there is no match or the query is invalid.
+        """
         self.field.setProperty("wrong", "true" if wrong else "false")
         self.field.style().unpolish(self.field)
         self.field.style().polish(self.field)

@@ -1,4 +1,4 @@
-"""Footer of the inspector: path of the selected value, properties of the message, legend."""
+"""Footer of the inspector: path of the selected value, properties of the message, and legend."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nep.messages.message import Message
 
 _MIN_SHOWN_LATENCY_S = 0.0001
-"""Smaller latencies are left out, because they would be displayed as zero."""
+"""Minimum uncertainty in s to show, because a smaller one would be displayed as zero."""
 
 
 def message_facts(
@@ -35,9 +35,11 @@ def message_facts(
 
     Args:
         message: Message with the properties measured on arrival.
-        since_ns: Start of the subscription; a latched message sent before shows its age instead of a latency.
-        network: Foreign network, or None. Properties that it does not report are named.
-        recorded: Show the time of day instead of the latency.
+        since_ns: Start of the subscription in ns since 1970. A latched message that was sent before this
+            time shows its age instead of a latency.
+        network: Foreign network of the topic, or None. The text mentions which properties this network does
+            not report.
+        recorded: True to show the time of day instead of the latency.
     """
     facts = [size_text(message.size_bytes)]
     if message.seq is not None:
@@ -137,7 +139,7 @@ class Footer(QWidget):
             button.setEnabled(bool(path))
 
     def clear(self) -> None:
-        """Clear the path; called before another topic is shown."""
+        """Remove the path; called before another topic is shown."""
         self.show_path("")
 
     def show_facts(self, facts: str) -> None:

@@ -1,4 +1,4 @@
-"""Hex view of a message: offset, bytes and printable text. Only visible lines are formatted."""
+"""Hex view of a message: offset, bytes and printable characters. Only visible lines are formatted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,16 @@ MARGIN = 12
 
 
 def hex_line(data: memoryview, offset: int, count: int) -> tuple[str, str, str]:
-    """Return offset, hex bytes and text of one line. Unprintable bytes are dots in the text."""
+    """Format one line of a hex dump.
+
+    Args:
+        data: Bytes of the message.
+        offset: Index of the first byte of the line.
+        count: Number of bytes per line.
+
+    Returns:
+        Offset, bytes and characters. Unprintable characters are replaced by dots.
+    """
     part = bytes(data[offset : offset + count])
     text = "".join(chr(byte) if 32 <= byte < 127 else "·" for byte in part)
     return f"{offset:04x}", part.hex(" "), text
@@ -33,7 +42,7 @@ class HexView(QAbstractScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def show_bytes(self, data: memoryview | bytes) -> None:
-        """Show other bytes. The scroll position is kept."""
+        """Replace the bytes. The scroll position stays the same."""
         self._data = memoryview(data)
         self._update_scroll_range()
         self.viewport().update()

@@ -16,13 +16,18 @@ from nep.i18n import _
 from nep.messages.message import Message
 
 UPDATE_TICKS = 6
-"""Refreshes (at 30 Hz) between updates of the message count."""
+"""Number of ticks (at 30 Hz) between updates of the message count."""
 
 
 class HistoryStrip(QWidget):
-    """Collects the messages of a topic, and selects the newest or an earlier one for display.
+    """Strip that collects the messages of a topic and lets the user select one of them.
 
-    `moved` is emitted when the user selects another message; `at` is its number, None for the newest.
+    Attributes:
+        kept: Collected messages.
+        at: Number of the selected message; None while the newest one is selected.
+
+    Signals:
+        moved: The user selected another message.
     """
 
     selection_changed = Signal()
@@ -56,7 +61,12 @@ class HistoryStrip(QWidget):
         self.hide()
 
     def start(self, feed: SeriesFeed, topic: str) -> None:
-        """Start to collect messages. A different topic clears the history."""
+        """Start collecting the messages of a topic. A change of the topic clears the history.
+
+        Args:
+            feed: Source of the messages.
+            topic: Name of the topic; "" for none.
+        """
         self.pause()
         if topic != self._topic:
             self.kept.rewind()
@@ -66,13 +76,13 @@ class HistoryStrip(QWidget):
             feed.register(topic, self.kept, deep=False)
 
     def pause(self) -> None:
-        """Stop collecting messages until the next `begin`. Collected messages are kept."""
+        """Stop collecting messages until the next `start`. The collected messages remain available."""
         if self._feed is not None:
             self._feed.unregister(self._topic, self.kept)
             self._feed = None
 
     def reset(self) -> None:
-        """Stop collecting messages and clear the history, because the source changed."""
+        """Stop collecting messages and clear the history; called when the source changes."""
         self.pause()
         self._topic = ""
         self.kept.rewind()
@@ -88,21 +98,30 @@ class HistoryStrip(QWidget):
         return self.kept.at(self.at - 1) if self.at is not None else None
 
     def step(self, by: int) -> None:
-        """Move the selection by a number of messages. Past the end, the newest message is followed again."""
+        """Select another message.
+
+        Args:
+            by: Number of messages to move by; negative for earlier messages. A step beyond the end selects
+                the newest message, also when later messages arrive.
+        """
         if not len(self.kept):
             return
         wanted = (self.at if self.at is not None else self.kept.end - 1) + by
         self.select(None if wanted >= self.kept.end else self.kept.nearest(wanted))
 
     def select(self, number: int | None) -> None:
-        """Select a message by its number; None follows the newest."""
+        """Select a message by its number.
+
+        Args:
+            number: Number of the message; None always selects the newest message.
+        """
         if number != self.at:
             self.at = number
             self.refresh(at_once=True)
             self.selection_changed.emit()
 
     def clamp_selection(self) -> None:
-        """Select the newest message if the source was seeked back to before the selected one."""
+        """Select the newest message if the selected one no longer exists because the replay was rewound."""
         if self.at is not None and self.at >= self.kept.end:
             self.at = None
 
@@ -110,8 +129,9 @@ class HistoryStrip(QWidget):
         """Update the strip; call on every refresh.
 
         Args:
-            at_once: Update without waiting for `UPDATE_TICKS`.
-            beside: True if other parts of the panel are repainted in this refresh anyway.
+            at_once: True to update now instead of every `UPDATE_TICKS`.
+            beside: True if other parts of the panel are repainted in this refresh. Otherwise the strip is
+                updated half as often.
         """
         self._ticks += 1
         self.clamp_selection()

@@ -36,16 +36,20 @@ from nep.i18n import _, ngettext
 from nep.messages.fields import path_text
 
 SORT_INTERVAL_S = 1.0
-"""Interval in s between re-sorts; rows with changing values stay readable in between."""
+"""Interval in s at which rows are sorted again, so that rows with changing values remain readable."""
 CHAR_WIDTH, MIN_COLUMN_WIDTH, MAX_COLUMN_WIDTH = 8, 56, 220
 """Width of a character, and limits of a column's width, in px."""
 COLUMN_PADDING = 24
 
 
 class ObjectsView(QWidget):
-    """Table with a line above it: path of the list, number of rows, choice of another list, copy button.
+    """Table of the objects in a list, below a line with the path of the list and the number of rows.
 
-    `revealed` is emitted with the path of an object to select in the tree.
+    Signals:
+        revealed: Path of an object to select in the tree.
+
+    Args:
+        toast: Shows a toast.
     """
 
     reveal_requested = Signal(object)
@@ -100,14 +104,20 @@ class ObjectsView(QWidget):
         self._drop_table()
 
     def select_list(self, steps: Steps) -> None:
-        """Select the list to show in this and later messages.
+        """Select the list to show in this message and in later ones.
 
-        Without a list at this path, the nearest list above it is shown.
+        Args:
+            steps: Path of the list. If there is no list at this path, the nearest list above it is shown.
         """
         self._wanted = steps
 
     def show_message(self, value: object, now: float) -> None:
-        """Show the selected list of a message, or its first list; `now` is monotonic time in s."""
+        """Show the selected list of a message, or its first list.
+
+        Args:
+            value: Decoded message.
+            now: Monotonic time in s.
+        """
         self._value = value
         steps = self._find(value)
         if steps != self._steps:
@@ -118,7 +128,12 @@ class ObjectsView(QWidget):
         self.choose.setVisible(True)
 
     def show_found(self, found: Iterable[tuple[str, object]], now: float) -> None:
-        """Show the objects found by a query; `now` is monotonic time in s."""
+        """Show the objects found by a query.
+
+        Args:
+            found: Path and value of each result.
+            now: Monotonic time in s.
+        """
         self._value, self._steps = None, None
         rows = rows_found(found)
         self._show(rows, len(rows), "", now)
@@ -236,7 +251,7 @@ class ObjectsView(QWidget):
 
 
 class _ObjectModel(TableModel[ObjectRow]):
-    """Table model that provides its rows in display order."""
+    """Table model that gives access to its rows in display order."""
 
     def rows(self) -> list[ObjectRow]:
         return list(self._rows.rows)

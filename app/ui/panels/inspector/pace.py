@@ -1,18 +1,23 @@
-"""Rate limit of display updates: a burst, then ten per second."""
+"""Rate limit for display updates: some at once, then ten per second."""
 
 from __future__ import annotations
 
 BURST = 3
-"""Updates allowed at once after a pause, so that messages sent by hand appear immediately."""
+"""Number of updates allowed at once after a pause, so that single messages appear immediately."""
 MAX_UPDATE_HZ = 10.0
-"""Updates per second.
+"""Maximum number of updates per second after the burst.
 
-More would be unreadable, and each may make the graphics driver redraw the whole window.
+More would be unreadable, and each update may make the graphics driver redraw the whole window.
 """
 
 
 class UpdateLimiter:
-    """Rate limiter for display updates (token bucket): `burst` updates at once, then `hz` per second."""
+    """Rate limiter for display updates (token bucket).
+
+    Args:
+        burst: Number of updates allowed at once.
+        hz: Number of updates allowed per second after the burst.
+    """
 
     def __init__(self, burst: int = BURST, hz: float = MAX_UPDATE_HZ) -> None:
         self._most, self._hz = float(burst), hz
@@ -23,7 +28,11 @@ class UpdateLimiter:
         self._left, self._asked_s = self._most, 0.0
 
     def try_acquire(self, now_s: float) -> bool:
-        """Return True and take a token if an update is allowed at `now_s` (monotonic time)."""
+        """Take a token if an update is allowed, and return True if it is.
+
+        Args:
+            now_s: Monotonic time in s.
+        """
         grown = max(0.0, now_s - self._asked_s) * self._hz
         self._left, self._asked_s = min(self._most, self._left + grown), now_s
         if self._left < 1:
@@ -32,5 +41,9 @@ class UpdateLimiter:
         return True
 
     def drain(self, now_s: float) -> None:
-        """Empty the bucket after an update that was done without calling `may`."""
+        """Empty the bucket after an update for which `try_acquire` was not called.
+
+        Args:
+            now_s: Monotonic time in s.
+        """
         self._left, self._asked_s = 0.0, now_s

@@ -1,4 +1,4 @@
-"""Inspector panel: newest message of one topic, with find, compare and copy."""
+"""Inspector panel: newest message of one topic, with functions to find, compare and copy values."""
 
 from __future__ import annotations
 
@@ -314,12 +314,12 @@ class InspectorPanel(PanelWidget):
 
     @property
     def is_frozen(self) -> bool:
-        """True if the panel is frozen."""
+        """True while the user has frozen the display."""
         return self.freeze.isChecked()
 
     @property
     def is_held(self) -> bool:
-        """True if the message shown does not change: frozen, or selected in the history."""
+        """True if new messages don't change the display: it is frozen, or an earlier message is selected."""
         return self.is_frozen or self.history.at is not None
 
     @property
@@ -477,7 +477,17 @@ class InspectorPanel(PanelWidget):
 def chip_state(
     topic: Topic | None, frozen: bool, *, recorded: bool = False, earlier: bool = False
 ) -> tuple[str, str, str]:
-    """Return text, status and icon of the chip that shows the state of topic and panel."""
+    """Return the contents of the chip with the state of topic and panel.
+
+    Args:
+        topic: Topic shown; None if it no longer exists.
+        frozen: True while the display is frozen.
+        recorded: True if the message is from a recording.
+        earlier: True if an earlier message is selected.
+
+    Returns:
+        Text, status and icon; an icon of "" stands for the default icon of the status.
+    """
     if frozen:
         return pgettext("message", "frozen"), "off", "snowflake"
     if earlier:

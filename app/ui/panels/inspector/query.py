@@ -16,7 +16,7 @@ from app.ui.widgets.paint import show_when
 from nep.i18n import ngettext
 
 LOAD_DIVISOR = 4
-"""Inverse of the share of a core that queries may use; the pause after a slow query is chosen accordingly."""
+"""Inverse of the maximum share of a core for queries; determines the pause after each query."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ def _evaluate(asked: _QueryJob) -> _QueryOutcome:
 
 
 class QueryStrip(QWidget):
-    """Strip with the number of results, such as ``12 found``, or the syntax error. Hidden without a query."""
+    """Strip with the number of results, such as ``12 found``, or a syntax error. Hidden without a query."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,11 +57,11 @@ class QueryStrip(QWidget):
 
     @property
     def has_query(self) -> bool:
-        """True if a query was entered, even if its syntax is invalid."""
+        """True if there is a query, even one with invalid syntax."""
         return bool(self._typed)
 
     def set_query(self, text: str) -> bool:
-        """Set the query, or remove it (""). Return False if its syntax is invalid."""
+        """Set the query; "" removes the query. Return False if the syntax is invalid."""
         self._typed, self._query = text, None
         self._worker.clear()
         self._not_before = 0.0
@@ -75,13 +75,16 @@ class QueryStrip(QWidget):
         return not sentence
 
     def request_evaluation(self, value: object) -> None:
-        """Queue a message for evaluation; `pop_answer` returns the result."""
+        """Queue a message for evaluation in place of the pending one; `pop_result` returns the result."""
         self._value, self._due = value, True
 
     def pop_result(self, now: float) -> QueryResult | None:
-        """Return the result of the last evaluation once, else None.
+        """Return a new result, or None. Each result is returned once.
 
-        Call on every refresh; `now` is monotonic time in s.
+        Call this on every refresh, because it also starts pending evaluations.
+
+        Args:
+            now: Monotonic time in s.
         """
         done = self._worker.pop_result()
         if done is not None:
@@ -93,13 +96,17 @@ class QueryStrip(QWidget):
         return done.result if done is not None else None
 
     def discard_pending(self) -> None:
-        """Discard pending evaluations because another topic is shown."""
+        """Discard pending evaluations; called before another topic is shown."""
         self._worker.clear()
         self._value, self._due = None, False
         self._set_status("", wrong=False)
 
     def set_tree_visible(self, *, tree: bool) -> None:
-        """Show the strip if the tree is visible and the strip has text."""
+        """Show or hide the strip. It is visible only if it has a text.
+
+        Args:
+            tree: True if the page can show the results of a query.
+        """
         self._on_tree = tree
         show_when(self, tree and bool(self.words.text()))
 
@@ -114,7 +121,7 @@ class QueryStrip(QWidget):
 
 
 def result_text(answer: QueryResult) -> str:
-    """Format the number of results, such as ``12 found``, with the reason if the result is incomplete."""
+    """Format the number of results, such as ``12 found``, and the reason if the results are incomplete."""
     count = len(answer.found)
     said = ngettext("{count} found.", "{count} found.", count).format(count=count)
     return f"{said} {answer.cut}".rstrip()

@@ -1,8 +1,8 @@
 """Lazy tree model of a decoded message.
 
 Nodes are created when they become visible and reused for later messages. Expanded nodes and the scroll
-position therefore persist, and each changed value has the time of its change. If there is a base message,
-every node has its difference to that message.
+position therefore persist, and each node knows when its value changed. If there is a base message,
+every node has the kind of difference to that message.
 """
 
 from __future__ import annotations
@@ -30,8 +30,14 @@ class TreeNode:
     """Node in the tree of a message's values.
 
     Attributes:
-        children: None until they are loaded.
-        base: Value to compare with, or `OFF`.
+        key: Key in the parent object, or index in the parent list.
+        value: Value in the message.
+        parent: Parent node; None for the root.
+        row: Index among the children of the parent.
+        depth: Number of ancestors below the root; -1 for the root.
+        children: Child nodes; None until they are loaded.
+        changed_s: Monotonic time in s of the last change of the value; None if it has not changed.
+        base: Value in the base message; `MISSING` if it was added, `OFF` without a base message.
         mark: Kind of difference between `value` and `base`.
         total: Number of children, 0 until they are loaded.
     """
@@ -64,14 +70,17 @@ class TreeNode:
 
 
 def field_of(node: TreeNode) -> str:
-    """Return the field path to plot, or "". For a list of numbers the path stands for all elements."""
+    """Return the field path for plotting a value, or "" if the value can't be plotted.
+
+    For a list of numbers, the path stands for all elements.
+    """
     kind = kind_of_value(node.value)
     every: tuple[Step, ...] = (ALL,) if kind == "list" else ()
     return str(FieldPath((*steps_of(node), *every))) if kind is not None else ""
 
 
 def steps_of(node: TreeNode) -> tuple[str | int, ...]:
-    """Return the keys and indices that lead from the message to a value; for results of a query too."""
+    """Return the keys and indices that lead from the message to a node, also for the results of a query."""
     steps: list[str | int] = []
     above: TreeNode | None = node
     while above is not None and above.parent is not None:
@@ -81,7 +90,7 @@ def steps_of(node: TreeNode) -> tuple[str | int, ...]:
 
 
 class TreeModel(QAbstractItemModel):
-    """Item model with one column; `set_value` updates existing rows with the values of the next message."""
+    """Item model with one column. The rows of one message are reused for the next one."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -166,11 +175,16 @@ class TreeModel(QAbstractItemModel):
     def set_value(
         self, value: object, now: float, base: object = NO_BASE, *, changes_only: bool = False
     ) -> None:
-        """Update the tree to the next message; `now` is the change time of changed values (monotonic, s).
+        """Update the tree to another message.
 
-        A message that is not a container becomes one row called ``value``. No value of the first message
-        counts as changed. With a `base`, every node gets its difference, and `changes_only` omits equal
-        nodes.
+        Values of the first message don't count as changed.
+
+        Args:
+            value: Decoded message. A message that is not an object or list becomes one row called
+                ``value``.
+            now: Monotonic time in s, stored as the change time of changed values.
+            base: Message to compare with, or `OFF`.
+            changes_only: True to omit nodes that are equal in both messages.
         """
         first = not self._root.children
         shown = _as_container(value)
@@ -273,7 +287,10 @@ class TreeModel(QAbstractItemModel):
         self.layoutChanged.emit()
 
     def reveal(self, path: Sequence[str | int]) -> QModelIndex:
-        """Return the index of a value, loading its parents; an invalid index if there is no such value."""
+        """Return the index of the value at a path, or an invalid index if there is no such value.
+
+        The parents of the value are loaded if necessary.
+        """
         node = self._root
         for key in path:
             keys: list[str | int] = keys_of(node.value, size_of(node.value))

@@ -55,10 +55,14 @@ class _RowHeightDelegate(QStyledItemDelegate):
 
 
 class TreeView(QTreeView):
-    """Tree of one message; `dragged` is emitted when the user drags a value.
+    """Tree view of one message.
 
     Args:
-        clock: Returns the time in the time base of the nodes' change times.
+        model: Model of the message.
+        clock: Returns the monotonic time in s, as in `TreeNode.changed_s`.
+
+    Signals:
+        dragged: Node that the user started to drag.
     """
 
     drag_started = Signal(object)
@@ -84,7 +88,7 @@ class TreeView(QTreeView):
         self.setMouseTracking(True)
 
     def highlight_opacity(self, node: TreeNode) -> float:
-        """Return the intensity of a node's highlight: 1 for a fresh change, 0 after the fade."""
+        """Return the intensity of a node's highlight: 1 at the time of a change, 0 after the fade."""
         if node.mark:
             return 1.0
         if node.changed_s is None or node.base is not NO_BASE:
@@ -96,12 +100,16 @@ class TreeView(QTreeView):
         return max(0.0, 1.0 - age / fade_s)
 
     def is_fading(self) -> bool:
-        """Return True if a highlight may still be fading, so that the view has to be repainted."""
+        """Return True if the view must be repainted because a highlight may still be fading."""
         changed = self._tree.changed_at_s
         return changed is not None and self._clock() - changed < 1.2
 
     def expand_small(self, rows: int) -> None:
-        """Expand small containers, upper levels first, as long as at most `rows` rows are visible."""
+        """Expand objects and lists with few children, upper levels first.
+
+        Args:
+            rows: Maximum number of visible rows.
+        """
         waiting, shown = [QModelIndex()], self._tree.rowCount()
         while waiting:
             above = waiting.pop(0)

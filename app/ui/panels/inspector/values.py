@@ -49,7 +49,10 @@ def size_of(value: object) -> int:
 
 
 def value_text(value: object) -> str:
-    """Format a value as one line: quoted text, size of containers, first bytes of binary data."""
+    """Format a value as one line.
+
+    Texts are quoted, objects and lists are shown as their size, and binary data as its first bytes.
+    """
     if value is None:
         return "null"
     if isinstance(value, bool):
@@ -69,9 +72,12 @@ def value_text(value: object) -> str:
 
 
 def search(value: object, words: str, limit: int = SEARCH_LIMIT) -> Iterator[tuple[str | int, ...]]:
-    """Yield the paths of keys and values that contain `words` (in any case), in tree order.
+    """Yield the paths of keys and values that contain a text, in tree order.
 
-    At most `limit` values are checked.
+    Args:
+        value: Decoded message.
+        words: Text to find; case is ignored.
+        limit: Maximum number of values to check.
     """
     wanted = words.casefold()
     waiting: list[tuple[tuple[str | int, ...], object]] = [((), value)]
@@ -100,7 +106,10 @@ def clipboard_text(value: object) -> str:
 
 
 def decode_now(message: Message) -> Reading:
-    """Decode a small message, or the summary of an image, on the calling (GUI) thread."""
+    """Decode a small message, or summarize an image, on the calling thread.
+
+    Errors are not raised, but returned in the `Reading`.
+    """
     if message.codec != "image":
         return read(message)
     try:
@@ -110,7 +119,12 @@ def decode_now(message: Message) -> Reading:
 
 
 def payload_or(message: Message, otherwise: object) -> object:
-    """Return the decoded payload, or `otherwise` if it is invalid or too large for the GUI thread."""
+    """Decode a small message on the calling thread.
+
+    Args:
+        message: Message to decode.
+        otherwise: Returned for images, for large messages, and if decoding fails.
+    """
     if message.size_bytes > LARGE_BYTES or message.codec == "image":
         return otherwise
     found = read(message)

@@ -1,6 +1,6 @@
 """Nodes panel: table of nodes with their topics, parameters and statistics.
 
-`rows` has the columns and texts.
+`rows` contains the columns and the texts.
 """
 
 from app.ui.panels.nodes.panel import PANEL as PANEL

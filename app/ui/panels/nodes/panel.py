@@ -42,7 +42,7 @@ CHANGING_COLUMNS = frozenset({"cpu"})
 
 
 class NodesPanel(NetworkTable[NodeRow]):
-    """Panel with the table of nodes; below it, details and parameters of the selected node."""
+    """Panel with the table of nodes and, below it, details and parameters of the selected node."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, TABLE_TEXTS, "network")

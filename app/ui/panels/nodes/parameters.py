@@ -1,4 +1,4 @@
-"""Parameters of the selected node with their current values, which can be changed."""
+"""Parameters of the selected node: table of their current values, and an editor."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def allowed_values_text(parameter: ShownParameter) -> str:
 
 
 class ParametersView(QWidget):
-    """Table of parameters with an editor for the selected one below it."""
+    """Table of parameters and, below it, an editor for the selected one."""
 
     def __init__(self, theme: Theme, parameters: NodeParameters) -> None:
         super().__init__()
@@ -131,7 +131,7 @@ class ParametersView(QWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Show the current parameters; called on every refresh of the panel."""
+        """Show the current values; called on every refresh of the panel."""
         parameters = self.parameters
         parameters.refresh(self.clock())
         node = parameters.node
@@ -257,7 +257,7 @@ class ParametersView(QWidget):
 
 
 class ValueField(QLineEdit):
-    """Text field for a value. Return sets the parameter, Esc restores its current value."""
+    """Text field for the value of a parameter. Return sets the value, Esc restores the current one."""
 
     def __init__(self, theme: Theme, take: Callable[[], object], leave: Callable[[], object]) -> None:
         super().__init__()
@@ -267,7 +267,11 @@ class ValueField(QLineEdit):
         EditMenu(theme, self)
 
     def mark(self, *, wrong: bool) -> None:
-        """Show or remove the outline of an invalid value."""
+        """Show or remove the red outline.
+
+        Args:
+            wrong: True if the value is invalid.
+        """
         if (self.property("wrong") == "true") is not wrong:
             self.setProperty("wrong", "true" if wrong else "false")
             self.style().unpolish(self)

@@ -1,4 +1,4 @@
-"""Rows of the nodes table: nodes and, below an expanded node, its topics."""
+"""Rows of the nodes table: the nodes, and the topics below each expanded node."""
 
 from __future__ import annotations
 
@@ -40,7 +40,15 @@ VERSIONS = {"A": lazy("original NEP up to 0.5.4.5"), "B": lazy("original NEP 0.5
 
 @dataclass(frozen=True, slots=True)
 class NodeRow:
-    """Row of a node, or of one of its topics. `rate` returns a topic's rate as text."""
+    """Row of a node, or of one of its topics.
+
+    Attributes:
+        node: Node of the row.
+        opened: True if the node is expanded.
+        direction: `PUBLISHES` or `SUBSCRIBES` for a topic; "" for a node.
+        topic: Name of the topic; "" for a node.
+        rate: Returns the formatted rate of a topic by key.
+    """
 
     node: NodeEntry
     is_expanded: bool = False
@@ -50,12 +58,12 @@ class NodeRow:
 
     @property
     def key(self) -> str:
-        """Stable key of the row."""
+        """Key that identifies the row across updates of the table."""
         return f"{self.node.key} {self.direction} {self.topic}"
 
     @property
     def is_pattern(self) -> bool:
-        """True if the row's node subscribes to a pattern instead of a single topic."""
+        """True for a subscription to a pattern instead of a single topic."""
         return self.direction == SUBSCRIBES and is_pattern(self.topic)
 
     @property
@@ -70,7 +78,14 @@ def rows_of(
     order: Order[NodeRow],
     rate: Callable[[str], str],
 ) -> list[NodeRow]:
-    """Return the nodes in sort order, each followed by its topics if its key is in `opened`."""
+    """Return the rows of the table, sorted.
+
+    Args:
+        nodes: Nodes to show.
+        opened: Keys of expanded nodes, which are followed by the rows of their topics.
+        order: Sort order of the nodes.
+        rate: Returns the formatted rate of a topic by key.
+    """
     rows: list[NodeRow] = []
     for head in order.sort([NodeRow(node, node.key in opened) for node in nodes]):
         rows.append(head)
@@ -111,7 +126,10 @@ def no_parameters_reason(node: NodeEntry) -> str:
 
 
 def facts_of(node: NodeEntry) -> str:
-    """Format place and start time of a node in one line, for tables too narrow for those columns."""
+    """Format name, computer, process and start time of a node in one line.
+
+    The line replaces columns that don't fit into a narrow table.
+    """
     parts = [node.name]
     if node.host:
         here = node.host == platform.node()
@@ -159,7 +177,7 @@ def generation_cell(row: NodeRow) -> Cell:
 
 
 def cpu_cell(row: NodeRow) -> Cell:
-    """Return the cell with the CPU share, the time since the node left, or "not reported"."""
+    """Return the cell with the CPU load of a node, the time since it left, or "not reported"."""
     kind = find_kind(row.node.network)
     if row.topic or row.node.gone_s is not None or kind is None or kind.reports_stats:
         return _node_cell(_cpu)(row)
@@ -251,7 +269,11 @@ COLUMNS: tuple[Column[NodeRow], ...] = (
 
 
 def columns(own: Callable[[NodeEntry], bool]) -> tuple[Column[NodeRow], ...]:
-    """Return the columns. Nodes for which `own` returns True are never shown as new."""
+    """Return the columns of the table.
+
+    Args:
+        own: Returns True for Studio's own nodes, which are never shown as new.
+    """
 
     def node_name_cell(row: NodeRow) -> Cell:
         cell = name_cell(row)

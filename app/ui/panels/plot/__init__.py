@@ -1,7 +1,8 @@
-"""Plot panel: numbers and states over time, formulas of fields, and one curve against another.
+"""Plot panel: numbers and states over time, formulas of fields, and curves against each other.
 
-`canvas` draws curves, `lanes` states, `legend` is the table below and `tools` the toolbar. The package is
-imported when the first plot opens, because pyqtgraph and numpy take 200 ms.
+`canvas` draws curves, `lanes` draws states, `legend` contains the table below the plot and `tools` the
+toolbar. The package is imported when the first plot opens, because importing pyqtgraph and numpy takes
+200 ms.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Line above the legend that explains why a curve has no data."""
+"""Line above the legend that explains why curves have no data."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from nep.i18n import _
 
 
 class PlotAdvice(QWidget):
-    """Line with a hint, hidden while all curves have data. `ask` opens the connection doctor for a topic."""
+    """Line with a hint, hidden while there is nothing to explain.
+
+    Args:
+        ask: Opens the connection doctor for a topic.
+    """
 
     def __init__(self, theme: Theme, ask: Callable[[str], object]) -> None:
         super().__init__()
@@ -39,7 +43,12 @@ class PlotAdvice(QWidget):
         return self._words.text()
 
     def show_for(self, curves: Curves, shown: Sequence[PlotCurve]) -> None:
-        """Show the hint that applies to these curves, or hide the line."""
+        """Show the hint that applies to some curves, or hide the line.
+
+        Args:
+            curves: All curves of the plot.
+            shown: The same curves with their display settings.
+        """
         said = next(filter(None, (curves.no_values_reason(each.curve) for each in shown)), "")
         empty = [each for each in shown if not said and not _has_any(each)]
         topics = sorted(topics_of(empty[0].curve.source)) if shown and len(empty) == len(shown) else []

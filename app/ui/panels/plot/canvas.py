@@ -1,8 +1,9 @@
-"""Canvas of curves over time. pyqtgraph draws axes and lines; cursors are painted on top.
+"""Canvas for curves over time. pyqtgraph draws axes and curves; cursors are painted on top.
 
-The time axis counts seconds relative to its right end (`TimeView.anchor_s`). While the plot follows live data
-the anchor moves but the axis does not, so it isn't repainted. pyqtgraph's mouse handling is replaced: the
-wheel zooms time, Ctrl+wheel zooms values, dragging pans, a double click shows everything.
+The time axis counts seconds relative to its right end (`PlotCanvas.anchor_s`). While the plot follows
+live data, this end moves but the labels of the axis do not, so the axis isn't repainted. pyqtgraph's
+mouse handling is replaced: the wheel zooms time, Ctrl+wheel zooms values, dragging pans, a double click
+shows everything.
 """
 
 from __future__ import annotations
@@ -45,12 +46,12 @@ FLAG_SPACE = 24  # px, reserved for the flags of the cursors
 ZOOM_STEP = 1.2
 MIN_WINDOW_S, MAX_WINDOW_S = 1e-4, 1e9
 MAX_ANTIALIASED_POINTS = 3000
-"""Number of points above which antialiasing is turned off, because it is invisible and expensive."""
+"""Number of points above which antialiasing is disabled, because it is slow and no longer visible."""
 DENSE_LINE_MARKS, DENSE_TRAVEL_RATIO = 5, 5.0
 TICK_SPACING_X, TICK_SPACING_Y = 84, 34  # minimum distance of ticks in px
 LABEL_OVERHANG = 60
 MAX_ABS_VALUE = 1e300
-"""Absolute value above which values are clipped, because they would overflow in the axis calculations."""
+"""Maximum absolute value; larger values are clipped, because axis calculations would overflow."""
 HIT_WIDTH_PX = 10  # px
 CURSOR_RANGE_ALPHA = 0.045
 
@@ -59,7 +60,11 @@ CURSOR_RANGE_ALPHA = 0.045
 class ValueRange:
     """Range of a value axis.
 
-    `held` is True after the user zoomed; `is_new` until the first values arrive.
+    Attributes:
+        low: Lower end.
+        high: Upper end.
+        is_manual: True if the user set the range, which then isn't adjusted to new values.
+        is_new: True until the first values arrive.
     """
 
     low: float = 0.0
@@ -68,9 +73,13 @@ class ValueRange:
     is_new: bool = True
 
     def fit(self, low: float, high: float) -> bool:
-        """Adjust the range to values, with margins, unless it fits them well already.
+        """Adjust the range to values, with margins. Return True if the range changed.
 
-        Return True if it changed.
+        The range does not change while the values are within it and fill at least half of it.
+
+        Args:
+            low: Smallest visible value.
+            high: Largest visible value.
         """
         if self.is_manual or not (math.isfinite(low) and math.isfinite(high)):
             return False
@@ -85,7 +94,7 @@ class ValueRange:
 
 
 class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
-    """Axis of seconds before the time at the right end, where the time of day is shown."""
+    """Time axis whose labels are relative to the right end, which is labelled with the time of day."""
 
     def __init__(self) -> None:
         super().__init__("bottom")
@@ -103,7 +112,7 @@ class TimeAxis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph is untyped
 
 
 class ValueAxis(pg.AxisItem):  # type: ignore[misc]
-    """Axis of numbers with as many digits as the tick spacing requires."""
+    """Axis of numbers; the labels have as many decimals as the tick spacing requires."""
 
     def tickSpacing(self, least: float, most: float, size: float) -> list[tuple[float, float]]:
         apart = TICK_SPACING_Y if self.orientation in {"left", "right"} else TICK_SPACING_X
@@ -116,13 +125,25 @@ class ValueAxis(pg.AxisItem):  # type: ignore[misc]
 def readable_levels(
     levels: list[tuple[float, float]], span: float, size: float, apart: float
 ) -> list[tuple[float, float]]:
-    """Return the finest of pyqtgraph's tick levels whose labels are at least `apart` px apart."""
+    """Return the finest tick level whose labels do not overlap, in a list.
+
+    Args:
+        levels: Tick levels of pyqtgraph (spacing and offset), coarsest first.
+        span: Length of the range.
+        size: Length of the axis in px.
+        apart: Minimum distance of labels in px.
+    """
     fitting = [level for level in levels if span > 0 and level[0] / span * size >= apart]
     return fitting[-1:] or levels[:1]
 
 
 def time_label(value_s: float, spacing_s: float) -> str:
-    """Format the label of a time tick, in s or min relative to the right end."""
+    """Format the label of a tick on the time axis, such as "-2.5 s" or "-3 min".
+
+    Args:
+        value_s: Time relative to the right end in s.
+        spacing_s: Distance between ticks in s, which determines unit and decimals.
+    """
     if spacing_s >= 60:
         words = _("{minutes} min").format(minutes=number(round(abs(value_s) / 60, 3)))
     else:
@@ -132,7 +153,12 @@ def time_label(value_s: float, spacing_s: float) -> str:
 
 
 def value_label(value: float, spacing: float) -> str:
-    """Format the label of a value tick."""
+    """Format the label of a tick on a value axis.
+
+    Args:
+        value: Value at the tick.
+        spacing: Distance between ticks, which determines the number of decimals.
+    """
     if value and not 1e-4 <= abs(spacing) < 1e6:
         return number(value, ".3g").replace("-", MINUS)
     digits = max(0, math.ceil(-math.log10(abs(spacing)) - 1e-9)) if spacing else 0
@@ -140,10 +166,22 @@ def value_label(value: float, spacing: float) -> str:
 
 
 class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
-    """Canvas of curves and cursors. Emits signals for mouse actions.
+    """Canvas for curves and cursors.
 
-    `begin_s` and `end_s` are the visible range in the time base of all series; `anchor_s` is the origin of
-    the axis.
+    Attributes:
+        begin_s: Start of the visible range, in the time base of the series.
+        end_s: End of the visible range, in the time base of the series.
+        anchor_s: Time at which the time axis has its origin.
+        cursors: Times of the cursors "A" and "B".
+        painted_s: Accumulated processor time of painting in s.
+
+    Signals:
+        zoomed: Zoom factor, and time at the mouse pointer in s.
+        moved: Shift of the visible range in s.
+        values_changed: The range of a value axis changed.
+        all_wanted: All data should be shown.
+        cursor_moved: Name and new time of a cursor.
+        field_dropped: Topic and path of a field that was dropped onto the canvas.
     """
 
     zoomed = Signal(float, float)  # factor, time at the mouse in s
@@ -234,11 +272,16 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
 
     @property
     def columns(self) -> int:
-        """Number of pixel columns of the curves' area."""
+        """Width of the area of the curves in px, at least 16."""
         return max(16, round(self.area.width()))
 
     def x_of(self, time_s: float, area: QRectF | None = None) -> float:
-        """Return the x coordinate of a time. Pass `area` if it is known, to avoid computing it again."""
+        """Return the x coordinate of a time.
+
+        Args:
+            time_s: Time in the time base of the series.
+            area: Value of the property `area`, to avoid computing it repeatedly.
+        """
         area = area or self.area
         return area.left() + (time_s - self.begin_s) / (self.end_s - self.begin_s) * area.width()
 
@@ -249,12 +292,23 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         return self.begin_s + share * (self.end_s - self.begin_s)
 
     def y_of(self, value: float, *, right: bool, area: QRectF | None = None) -> float:
-        """Return the y coordinate of a value."""
+        """Return the y coordinate of a value.
+
+        Args:
+            value: Value of a curve.
+            right: True for the right axis, False for the left one.
+            area: Value of the property `area`, to avoid computing it repeatedly.
+        """
         area, shown = area or self.area, self.ranges["right" if right else "left"]
         return area.bottom() - (value - shown.low) / (shown.high - shown.low) * area.height()
 
     def show_lines(self, lines: Sequence[tuple[PlotCurve, Line]], clock_s: float) -> None:
-        """Draw these curves; `clock_s` is the time of day at the anchor, in s since 1970."""
+        """Draw curves in place of the previous ones.
+
+        Args:
+            lines: Curves with their points.
+            clock_s: Time of day at the origin of the time axis, in s since 1970.
+        """
         shown = {curve.name for curve, _line in lines}
         for name in [name for name in self._lines if name not in shown]:
             item = self._lines.pop(name)
@@ -336,9 +390,11 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
             self.time_axis.update()
 
     def scale_values(self, factor: float = 1.0, shift: float = 0.0) -> None:
-        """Zoom the value axes by `factor`, or shift them by a share of their range.
+        """Zoom or shift the value axes, and disable their automatic range until `reset_value_ranges`.
 
-        Holds them until `release_values`.
+        Args:
+            factor: Factor by which the length of the range is multiplied.
+            shift: Shift relative to the length of the range.
         """
         for shown in self.ranges.values():
             middle, half = (shown.low + shown.high) / 2, (shown.high - shown.low) / 2 * factor
@@ -348,7 +404,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.values_changed.emit()
 
     def reset_value_ranges(self) -> None:
-        """Return to automatic ranges of the value axes."""
+        """Enable the automatic range of the value axes."""
         for shown in self.ranges.values():
             shown.is_manual, shown.is_new = False, True
         self.values_changed.emit()
@@ -364,7 +420,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         self.painted_s += time.thread_time() - began
 
     def paint_cursors(self, painter: QPainter) -> None:
-        """Paint cursors A and B over the curves."""
+        """Paint the cursors A and B, and the marks of curves, over the curves."""
         area, theme = self.area, self.theme
         places = {name: self.x_of(time_s, area) for name, time_s in self.cursors.items()}
         inside = {name: x for name, x in places.items() if area.left() - 1 <= x <= area.right() + 1}

@@ -1,4 +1,4 @@
-"""Export of a plot: values as CSV, written in a background thread, or an image as PNG or SVG."""
+"""Export of a plot: values as CSV, or the image as PNG or SVG."""
 
 from __future__ import annotations
 
@@ -34,7 +34,13 @@ LEGEND_ROW_HEIGHT = 22
 
 
 class CsvWriter:
-    """Background thread that writes one CSV file. `columns` must not be modified meanwhile."""
+    """Background thread that writes one CSV file.
+
+    Args:
+        path: File to write.
+        columns: Columns to write; they must not be modified while the thread is running.
+        origin_ns: Time of the origin of the time base, in ns since 1970.
+    """
 
     def __init__(self, path: Path, columns: Sequence[CsvColumn], origin_ns: int) -> None:
         self.path = path
@@ -62,21 +68,23 @@ class CsvWriter:
             yield lines.encode()
 
     def pop_result(self) -> str | None:
-        """Return None while writing, "" on success, else the reason of the failure."""
+        """Return None while the thread is writing, "" on success, or the reason of the failure."""
         return self._done
 
     def close(self) -> None:
-        """Wait some seconds for the thread, then abort it and remove the partial file."""
+        """Wait some seconds for the thread to finish, then cancel it and remove the partial file."""
         self._thread.join(CLOSE_TIMEOUT_S)
         self._given_up.set()
         self._thread.join(CLOSE_TIMEOUT_S)
 
 
 class PlotPicture:
-    """Image of a plot: canvas, lanes and the names of the curves.
+    """Image of a plot for export: its parts from top to bottom, then the names of the curves.
 
     Args:
-        parts: Size and painter function of each part, from the top.
+        theme: Theme with colours and fonts.
+        parts: Size and paint function of the canvas and of the lanes.
+        curves: Curves of the plot; hidden ones are omitted.
     """
 
     def __init__(
@@ -117,7 +125,7 @@ class PlotPicture:
             top += row
 
     def png(self) -> bytes:
-        """Return the image as PNG with two pixels per unit."""
+        """Return the image as PNG in double resolution."""
         image = QImage(self.size * PNG_SCALE, QImage.Format.Format_RGB32)
         if image.isNull():
             raise OSError(errno.ENOMEM, _("not enough memory"))
@@ -148,11 +156,12 @@ class PlotPicture:
 
 
 class PlotExport:
-    """Exports a plot: asks for a file, writes it and reports the result in a toast.
+    """Export of a plot to a file that the user chooses; the result is shown in a toast.
 
     Args:
-        parts: Returns the parts of the image.
-        shown: Returns the visible range in s.
+        parts: Returns size and paint function of the canvas and of the lanes.
+        curves: Returns the curves of the plot.
+        shown: Returns start and end of the visible range in s.
     """
 
     def __init__(
@@ -175,13 +184,20 @@ class PlotExport:
         return menu
 
     def prompt_file(self, kind: FileKind) -> None:
-        """Ask for a file and export the plot in the format `kind`."""
+        """Ask for a file name, then export the plot. The dialog suggests the format `kind`."""
         suggestion = Path.home() / f"{_('Plot')}{kind.suffix}"
         kinds = [kind, *(each for each in (CSV, PNG, SVG) if each is not kind)]
         self._context.files.save_as(_("Export the plot"), suggestion, kinds, self.write)
 
     def write(self, path: Path, kind: FileKind) -> None:
-        """Export the plot to a file; CSV is written in a background thread."""
+        """Export the plot to a file.
+
+        CSV files are written in a background thread, whose result `poll` reports.
+
+        Args:
+            path: File to write.
+            kind: Format of the file.
+        """
         if kind != CSV:
             picture = PlotPicture(self._context.theme, self._parts(), self._curves())
             try:
@@ -199,7 +215,7 @@ class PlotExport:
         self._writer = CsvWriter(path, columns_of(curves, *self._shown()), origin_ns)
 
     def poll(self) -> None:
-        """Report a finished export; call on every tick."""
+        """Report the result of a CSV export once it has finished; call on every tick."""
         if self._writer is not None and (failed := self._writer.pop_result()) is not None:
             self._report(self._writer.path, failed)
             self._writer = None

@@ -34,7 +34,7 @@ class StateLanes(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def show_curves(self, curves: Sequence[PlotCurve]) -> None:
-        """Show the states of these curves, at most eight; the legend lists all."""
+        """Set the curves whose states are shown. Only the first eight curves have a lane."""
         count = len(self.curves)
         self.curves = curves[:MAX_LANES]
         if len(self.curves) != count:
@@ -52,9 +52,10 @@ class StateLanes(QWidget):
         return QSize(60, self.sizeHint().height())
 
     def boxes(self) -> Iterator[tuple[PlotCurve, StateRun, QRectF]]:
-        """Yield curve, run of equal values and rectangle of each visible run.
+        """Yield curve, run and rectangle of each box to paint.
 
-        For booleans, only the runs of true are included.
+        A run is a time range in which the value of a curve is the same. For boolean curves, only the runs
+        of true are included.
         """
         canvas, area = self._canvas, self._canvas.area
         for row, curve in enumerate(self.curves):

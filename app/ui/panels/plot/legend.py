@@ -21,7 +21,7 @@ from nep.i18n import _, lazy, ngettext, pgettext
 
 
 class LegendStats:
-    """Statistics of curves within a time range, computed on request."""
+    """Statistics of curves within a time range, computed when they are first requested."""
 
     def __init__(self) -> None:
         self.begin_s = self.end_s = 0.0
@@ -29,7 +29,13 @@ class LegendStats:
         self._kept: dict[str, RangeStats] = {}
 
     def set_range(self, begin_s: float, end_s: float, cursors: tuple[float, float] | None) -> None:
-        """Set the time range, and the times of cursors A and B."""
+        """Set the time range of the statistics.
+
+        Args:
+            begin_s: Start of the range in s.
+            end_s: End of the range in s.
+            cursors: Times of cursors A and B in s, or None without cursors.
+        """
         self.begin_s, self.end_s, self.cursors = begin_s, end_s, cursors
         self._kept.clear()
 
@@ -41,7 +47,12 @@ class LegendStats:
         return found
 
     def at_cursor(self, shown: PlotCurve, which: int) -> float | str | None:
-        """Return a curve's value at cursor A (0) or B (1)."""
+        """Return the value of a curve at a cursor, or None if there is no value or no cursor.
+
+        Args:
+            shown: Curve.
+            which: 0 for cursor A, 1 for cursor B.
+        """
         if self.cursors is None:
             return None
         time_s = self.cursors[which]
@@ -52,7 +63,7 @@ class LegendStats:
 
 
 class _Cells:
-    """Factory of the cells of each column."""
+    """Functions that create the cells of the columns."""
 
     def __init__(self, figures: LegendStats, is_gone: Callable[[PlotCurve], bool]) -> None:
         self.figures, self._is_gone = figures, is_gone
@@ -128,7 +139,13 @@ class _Cells:
 def columns(
     figures: LegendStats, has_cursors: Callable[[], bool], is_gone: Callable[[PlotCurve], bool]
 ) -> tuple[Column[PlotCurve], ...]:
-    """Return the columns of the legend. Those for cursors A and B are hidden without cursors."""
+    """Return the columns of the legend.
+
+    Args:
+        figures: Statistics of the curves.
+        has_cursors: Returns True if there are cursors; the columns about A and B are hidden otherwise.
+        is_gone: Returns True for a curve whose topic no longer exists.
+    """
     cells = _Cells(figures, is_gone)
     between = {"figures": True, "when": has_cursors}
     return (
@@ -147,7 +164,13 @@ def columns(
 
 
 class LegendTable(TableView[PlotCurve]):
-    """Table of a plot's curves; `changed` is emitted when visibility, axis or style of a curve change."""
+    """Table of the curves of a plot.
+
+    Signals:
+        changed: Visibility, axis or style of a curve changed.
+        removed: Name of a curve to remove.
+        chosen_copy: Name of a curve to copy to the clipboard.
+    """
 
     changed = Signal()
     removed = Signal(str)
@@ -243,7 +266,7 @@ class LegendTable(TableView[PlotCurve]):
 
 
 def next_look(there: Sequence[PlotCurve]) -> CurveLook:
-    """Return a style that no other curve has, or a repeated one if all are in use."""
+    """Return a style for a new curve, with the colour and the pattern that the fewest curves have."""
     colours = [shown.look.colour % len(COLOURS) for shown in there]
     patterns = [shown.look.pattern % 4 for shown in there]
     colour = min(range(len(COLOURS)), key=lambda each: (colours.count(each), each))
@@ -252,7 +275,13 @@ def next_look(there: Sequence[PlotCurve]) -> CurveLook:
 
 
 def caption_text(curves: Curves, *, has_cursors: bool, distance: float | None) -> str:
-    """Return the caption of the legend: range of the statistics, distance of A and B, missing data."""
+    """Format the text below the legend: range of the statistics, and number of lost or discarded values.
+
+    Args:
+        curves: All curves of the plot.
+        has_cursors: True if the statistics are limited to the range between the cursors.
+        distance: Distance of the cursors in a plot of curves against each other, or None.
+    """
     about = _("Min, max and mean between A and B")
     parts = [about if has_cursors else _("Min, max and mean of the visible range")]
     if distance is not None:

@@ -1,4 +1,4 @@
-"""Styles of curves. They differ in colour, dash and mark, so that colour is never the only distinction."""
+"""Styles of curves. Dash patterns and marks also distinguish curves for colour-blind users."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from nep.i18n import lazy
 
 LINE_WIDTH = 1.75
 COLOURS = (lazy("Blue"), lazy("Orange"), lazy("Green"), lazy("Pink"), lazy("Yellow"), lazy("Violet"))
-"""Names of the theme's curve colours, in the order of the theme."""
+"""Displayed names of the theme's curve colours, in the order of the theme."""
 DASHES: tuple[tuple[float, ...], ...] = ((), (6, 4), (2, 4), (12, 4))
 """Dash patterns in px; the first one is solid."""
 LANE_FILL_ALPHA, LANE_EDGE_ALPHA = 0.20, 0.55
@@ -21,17 +21,28 @@ LANE_FILL_ALPHA, LANE_EDGE_ALPHA = 0.20, 0.55
 
 @dataclass(frozen=True, slots=True)
 class CurveLook:
-    """Style of a curve: index of a theme colour and of a pattern (dash and mark)."""
+    """Style of a curve.
+
+    Attributes:
+        colour: Index of a curve colour of the theme.
+        pattern: Index of a dash pattern and a mark.
+    """
 
     colour: int
     pattern: int
 
     def ink(self, theme: Theme) -> QColor:
-        """Return the line colour."""
+        """Return the colour of the line."""
         return theme.series(self.colour)
 
     def pen(self, theme: Theme, *, is_dense: bool = False) -> QPen:
-        """Return the pen of the line; for dense lines it is solid and thin, which is faster to paint."""
+        """Return the pen of the line.
+
+        Args:
+            theme: Theme with the colours.
+            is_dense: True for a line with many points, which is painted thin and solid because that is
+                faster.
+        """
         pen = QPen(self.ink(theme), 1.0 if is_dense else LINE_WIDTH)
         pen.setCosmetic(True)
         dash = DASHES[self.pattern % len(DASHES)]
@@ -41,7 +52,14 @@ class CurveLook:
         return pen
 
     def paint_mark(self, painter: QPainter, theme: Theme, centre: QPointF, size: float = 8.0) -> None:
-        """Paint the mark (disc, square, triangle or diamond) of the style with an outline."""
+        """Paint the mark of the style: a disc, square, triangle or diamond with an outline.
+
+        Args:
+            painter: Painter to use.
+            theme: Theme with the colours.
+            centre: Centre of the mark.
+            size: Width of the mark in px.
+        """
         half = size / 2
         painter.setPen(QPen(theme.colour("panel"), 1))
         painter.setBrush(self.ink(theme))
@@ -62,7 +80,13 @@ class CurveLook:
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """Table cell with a sample of a curve's line and mark, or of a state's box."""
+    """Table cell with a sample of a curve's style.
+
+    Attributes:
+        look: Style of the curve.
+        is_state: True for a curve of states, whose sample is a box instead of a line with a mark.
+        is_hidden: True for a hidden curve, whose sample is faded.
+    """
 
     look: CurveLook
     is_state: bool
@@ -84,7 +108,14 @@ class Stroke:
 
 
 def paint_state(painter: QPainter, theme: Theme, box: QRectF, look: CurveLook) -> None:
-    """Paint the box of a state in the style `look`."""
+    """Paint the box of a state.
+
+    Args:
+        painter: Painter to use.
+        theme: Theme with the colours.
+        box: Rectangle of the state.
+        look: Style of the curve.
+    """
     fill, edge = look.ink(theme), look.ink(theme)
     fill.setAlphaF(LANE_FILL_ALPHA)
     edge.setAlphaF(1.0 if theme.high_contrast else LANE_EDGE_ALPHA)

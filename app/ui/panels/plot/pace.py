@@ -1,4 +1,4 @@
-"""Frame rate control of plots: redraw as often as data moves, within a share of a processor core."""
+"""Frame rate control of plots: draw as often as the data moves, within a share of a processor core."""
 
 from __future__ import annotations
 
@@ -8,21 +8,32 @@ from contextlib import contextmanager
 from typing import Protocol
 
 DRAW_INTERVAL_TICKS = (2, 8)
-"""Minimum and maximum interval between drawings, in refreshes at 30 Hz."""
+"""Minimum and maximum interval between drawings, in ticks at 30 Hz."""
 MAX_CPU_SHARE = 0.08
-"""Maximum share of a processor core for drawing."""
+"""Maximum share of a processor core that drawing may use."""
 AVERAGE_WEIGHT = 0.1
-"""Weight of a new measurement in the moving average. Thread clocks can have a resolution of only 16 ms."""
+"""Weight of a new measurement in the moving average.
+
+The average is necessary because thread clocks can have a resolution of only 16 ms.
+"""
 
 
 class TimedWidget(Protocol):
-    """Widget that is painted after drawing; `painted_s` accumulates its processor time in s."""
+    """Widget that is painted some time after each drawing.
+
+    Attributes:
+        painted_s: Accumulated processor time of painting in s.
+    """
 
     painted_s: float
 
 
 class DrawThrottle:
-    """Measures the cost of drawing and computes the interval until the next drawing."""
+    """Controller of the interval between drawings, which depends on their measured cost.
+
+    Attributes:
+        drawing_s: Moving average of the cost of a drawing, as processor time in s.
+    """
 
     def __init__(self) -> None:
         self.drawing_s = 0.0
@@ -30,17 +41,25 @@ class DrawThrottle:
 
     @contextmanager
     def measure(self, painted: TimedWidget) -> Iterator[None]:
-        """Measure one drawing, including the painting since the last one."""
+        """Measure one drawing within a ``with`` block, and the painting since the previous drawing."""
         began = time.thread_time()
         yield
         self.add_sample(time.thread_time() - began + painted.painted_s - self._painted_s)
         self._painted_s = painted.painted_s
 
     def add_sample(self, seconds: float) -> None:
-        """Add a measurement of drawing and painting (processor time in s)."""
+        """Add a measured cost to the moving average.
+
+        Args:
+            seconds: Processor time of drawing and painting in s.
+        """
         self.drawing_s += AVERAGE_WEIGHT * (seconds - self.drawing_s)
 
     def interval_ticks(self, pixel_s: float) -> int:
-        """Return the interval in refreshes: at least the time in which data moves by a pixel (`pixel_s`)."""
+        """Return the interval until the next drawing, in ticks at 30 Hz.
+
+        Args:
+            pixel_s: Time in s in which the data moves by one pixel, which is the minimum interval.
+        """
         least, most = DRAW_INTERVAL_TICKS
         return round(min(most, max(least, pixel_s * 30, self.drawing_s / MAX_CPU_SHARE * 30)))

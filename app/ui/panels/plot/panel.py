@@ -1,4 +1,4 @@
-"""Plot panel: curves over time, states in lanes, a legend with statistics, and cursors A and B."""
+"""Plot panel: curves over time, lanes of states, a legend with statistics, and cursors A and B."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ MAX_ROWS, MAX_TABLE_RATIO = 6, 0.32
 
 
 class PlotPanel(PanelWidget):
-    """Panel with one plot. Data is collected while the panel is hidden too."""
+    """Panel with one plot. Data is also collected while the panel is hidden."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Plot"))
@@ -195,7 +195,7 @@ class PlotPanel(PanelWidget):
             self.context.toast(_as_sentence(error))
 
     def show_topic(self, name: str) -> None:
-        """Ask for a field of a topic."""
+        """Ask the user which field of a topic to plot."""
         self.plot_field(name, "")
 
     def _add_typed(self, text: str, right: bool) -> None:

@@ -1,4 +1,4 @@
-"""Display settings of a curve (axis, style, visibility) and formatting of its values."""
+"""Curve with its display settings (axis, style, visibility), and formatting of values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,14 @@ MINUS = "\u2212"
 
 @dataclass(slots=True, eq=False)
 class PlotCurve:
-    """Curve with its display settings; `right` selects the right axis."""
+    """Curve with its display settings.
+
+    Attributes:
+        curve: Curve with its data.
+        look: Style.
+        right: True for the right axis, False for the left one.
+        is_hidden: True if the user has hidden the curve.
+    """
 
     curve: Curve
     look: CurveLook
@@ -27,7 +34,7 @@ class PlotCurve:
 
     @property
     def name(self) -> str:
-        """Expression as typed by the user; also the key of the curve."""
+        """Expression of the curve as typed by the user, which is also its key."""
         return self.curve.text
 
     def to_json(self) -> dict[str, object]:
@@ -46,7 +53,12 @@ class PlotCurve:
 
 
 def look_of(saved: Mapping[str, object], otherwise: CurveLook) -> CurveLook:
-    """Return the style saved in a layout. Invalid values are replaced by those of `otherwise`."""
+    """Return the style from a saved state.
+
+    Args:
+        saved: State from the layout.
+        otherwise: Style whose colour or pattern replaces an invalid entry.
+    """
     colour, pattern = saved.get("colour"), saved.get("pattern")
     return CurveLook(
         colour % 6 if isinstance(colour, int) else otherwise.colour,

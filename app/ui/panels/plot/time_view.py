@@ -1,4 +1,4 @@
-"""Visible time range of a plot: the latest seconds, everything, or a fixed range."""
+"""Visible time range of a plot: the last seconds, all data, or a fixed range."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 MIN_SPAN_S, MAX_SPAN_S = 1e-4, 1e8
 SPANS: tuple[tuple[str, float], ...] = (("12", 12.0), ("60", 60.0), ("300", 300.0), ("all", 0.0))
-"""Available lengths of the range, by choice, in s; 0 shows everything."""
+"""Key and length in s of the ranges that the user can choose; 0 stands for all data."""
 
 
 @dataclass(slots=True)
 class TimeView:
-    """Time range of `span_s` seconds that ends at the newest message or at `held_s`.
+    """Visible time range, which ends at the newest message or at a fixed time.
 
-    If `is_all` is True, it contains all data.
+    Attributes:
+        span_s: Length of the range in s.
+        is_all: True if the range starts at the oldest message, whatever `span_s` is.
+        paused_end_s: Fixed end of the range in s; None to follow new data.
     """
 
     span_s: float = 60.0
@@ -26,28 +29,48 @@ class TimeView:
         return self.paused_end_s is None
 
     def visible_range(self, oldest_s: float, newest_s: float) -> tuple[float, float]:
-        """Return the visible range, given the range of available data."""
+        """Return start and end of the visible range in s.
+
+        Args:
+            oldest_s: Time of the oldest message in s.
+            newest_s: Time of the newest message in s.
+        """
         end_s = newest_s if self.paused_end_s is None else self.paused_end_s
         if self.is_all:
             return min(oldest_s, end_s - MIN_SPAN_S), end_s
         return end_s - self.span_s, end_s
 
     def pause(self, shown: tuple[float, float]) -> None:
-        """Fix the range at `shown` while data continues to arrive."""
+        """Fix the range, so that it no longer follows new data.
+
+        Args:
+            shown: Start and end of the range in s.
+        """
         self.span_s, self.is_all, self.paused_end_s = _bounded(shown[1] - shown[0]), False, shown[1]
 
     def resume(self) -> None:
-        """Follow new data with the current length of the range."""
+        """Follow new data again. The length of the range stays the same."""
         self.paused_end_s = None
 
     def set_span(self, span_s: float) -> None:
-        """Set the length in s, 0 for everything. A fixed range keeps its end."""
+        """Set the length of the range; a fixed end stays the same.
+
+        Args:
+            span_s: Length in s; 0 for all data.
+        """
         self.is_all = span_s <= 0
         if span_s > 0:
             self.span_s = span_s
 
     def zoom(self, factor: float, at_s: float, shown: tuple[float, float]) -> None:
-        """Scale the range by `factor` around `at_s`, or around its end while it follows new data."""
+        """Scale the length of the range.
+
+        Args:
+            factor: Factor by which the length is multiplied.
+            at_s: Time in s that stays at its place. While the range follows new data, this is the end
+                instead.
+            shown: Start and end of the visible range in s.
+        """
         span_s = _bounded((shown[1] - shown[0]) * factor)
         share = (shown[1] - at_s) / max(MIN_SPAN_S, shown[1] - shown[0])
         self.span_s, self.is_all = span_s, False
@@ -55,11 +78,16 @@ class TimeView:
             self.paused_end_s = at_s + share * span_s
 
     def move(self, by_s: float, shown: tuple[float, float]) -> None:
-        """Shift the range by seconds and fix it there."""
+        """Shift the range and fix it.
+
+        Args:
+            by_s: Shift in s.
+            shown: Start and end of the visible range in s.
+        """
         self.pause((shown[0] + by_s, shown[1] + by_s))
 
     def selected_span(self) -> str:
-        """Return the key of the choice in `SPANS` that equals the current range, or ""."""
+        """Return the key in `SPANS` for the current length, or "" if the length is not one of them."""
         if self.is_all:
             return "all"
         return next((value for value, span_s in SPANS if span_s == self.span_s), "")

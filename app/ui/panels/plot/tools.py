@@ -1,7 +1,7 @@
-"""Toolbar of the plot, and the field to add curves: Tab completes, Enter adds.
+"""Toolbar of the plot, and the field for adding curves, in which Tab completes and Enter adds.
 
-While the field has the focus, topics are subscribed to (except images and those with a high data rate), so
-that it can offer their fields with current values.
+While the field has the focus, topics are subscribed to, so that the field can suggest their fields with
+current values. Images and topics with a high data rate are excluded.
 """
 
 from __future__ import annotations
@@ -41,14 +41,17 @@ EXAMPLES = ("difference({})", "derivative({})", "integral({})", "mean({}, 2 s)")
 
 
 class FieldCatalog:
-    """Fields that can be plotted, read from topics that are subscribed to while the user adds a curve."""
+    """Fields that can be plotted, read from the messages of topics.
+
+    The topics are subscribed to only between `open` and `close`.
+    """
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._watches: dict[str, Watch] = {}
 
     def open(self) -> None:
-        """Subscribe to the topics that can be plotted."""
+        """Subscribe to the topics whose fields can be plotted."""
         for topic in self._candidate_topics():
             if topic.key not in self._watches:
                 self._watches[topic.key] = self._session.watch_displayed(topic.key)
@@ -75,7 +78,7 @@ class FieldCatalog:
         ]
 
     def fields(self) -> Iterable[tuple[str, PlottableField]]:
-        """Yield the fields that can be plotted, each with the expression to type."""
+        """Yield the fields that can be plotted, each with the expression that plots it."""
         told = 0
         for key in self._watches:
             topic = self._session.topic(key)
@@ -114,10 +117,15 @@ class _Matches(QWidget):
 
 
 class AddCurve(SearchField):
-    """Field to add a curve; emits `wanted` with the expression, and True for the right axis.
+    """Field for adding a curve.
 
     Args:
-        plotted: Returns the existing curves, which can be used in expressions.
+        session: Session with the topics.
+        plotted: Returns the expressions of existing curves, which can be used in formulas.
+
+    Signals:
+        wanted: Expression of the curve to add, and True for the right axis.
+        left: The user pressed Esc.
     """
 
     icon_name = "plus"
@@ -178,7 +186,7 @@ class AddCurve(SearchField):
             self._matches.hide()
 
     def prompt(self, text: str) -> None:
-        """Focus the field with a text that the user can continue."""
+        """Focus the field and set its text to the start of an expression, which the user completes."""
         self.setText(text)
         self.setFocus(Qt.FocusReason.ShortcutFocusReason)
         if text.endswith("."):
@@ -186,7 +194,11 @@ class AddCurve(SearchField):
         self._search()
 
     def show_error(self, sentence: str) -> None:
-        """Show the reason why the text is not a valid curve; the text is kept."""
+        """Show why the text is not a valid curve. The text stays in the field.
+
+        Args:
+            sentence: Reason; "" removes the message.
+        """
         self.sentence = sentence
         self.setProperty("wrong", "true" if sentence else "false")
         self.style().unpolish(self)
@@ -346,7 +358,12 @@ SPAN_LABELS = {"12": lazy("12 s"), "60": lazy("1 min"), "300": lazy("5 min"), "a
 
 
 class PlotTools(QWidget):
-    """Toolbar that wraps in a narrow panel. `plotted` returns the existing curves."""
+    """Toolbar of the plot, which wraps in a narrow panel.
+
+    Args:
+        session: Session with the topics.
+        plotted: Returns the expressions of existing curves.
+    """
 
     def __init__(self, theme: Theme, session: Session, plotted: Callable[[], Iterable[str]]) -> None:
         super().__init__()
@@ -374,7 +391,12 @@ class PlotTools(QWidget):
             row.addWidget(widget)
 
     def update_tools(self, curves: int, numbers: int) -> None:
-        """Show the tools that apply to this number of curves, `numbers` of which are numeric."""
+        """Show the tools that apply to the current curves.
+
+        Args:
+            curves: Number of curves.
+            numbers: Number of curves with numeric values.
+        """
         for widget in self._when_there:
             paint.show_when(widget, curves > 0)
         paint.show_when(self.states, curves > numbers)

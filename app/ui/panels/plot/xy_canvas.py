@@ -1,4 +1,4 @@
-"""Plot of one curve against another: equal scales, older parts fade, an arrow marks the newest point."""
+"""Plot of curves against each other: older parts are fainter, and an arrow marks the newest point."""
 
 from __future__ import annotations
 
@@ -27,7 +27,17 @@ Path = tuple[PlotCurve, PlotCurve, Floats, Floats, Floats]
 
 
 def path_of(across: PlotCurve, up: PlotCurve, begin_s: float, end_s: float) -> tuple[Floats, Floats, Floats]:
-    """Return times, x and y of the path, at the times of the first curve and at most `MAX_POINTS` points."""
+    """Return the points of one curve against another.
+
+    Args:
+        across: Curve with the x coordinates; its times are used.
+        up: Curve with the y coordinates.
+        begin_s: Start of the time range in s.
+        end_s: End of the time range in s.
+
+    Returns:
+        Times, x and y coordinates of at most `MAX_POINTS` points.
+    """
     samples = across.curve.samples
     first, end = samples.index_range(begin_s, end_s)
     step = max(1, math.ceil((end - first) / MAX_POINTS))
@@ -83,7 +93,13 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         self.viewport().update()
 
     def show_pairs(self, pairs: Sequence[tuple[PlotCurve, PlotCurve]], begin_s: float, end_s: float) -> None:
-        """Draw the pairs over a time range."""
+        """Draw pairs of curves.
+
+        Args:
+            pairs: Curves with the x and the y coordinates of each path.
+            begin_s: Start of the time range in s.
+            end_s: End of the time range in s.
+        """
         self._paths = [(across, up, *path_of(across, up, begin_s, end_s)) for across, up in pairs]
         used = 0
         for _across, up, times, xs, ys in self._paths:
@@ -119,11 +135,11 @@ class XYCanvas(pg.GraphicsView):  # type: ignore[misc]  # pyqtgraph is untyped
         self.view.setRange(QRectF(left, low, right - left, high - low), padding=0.08)
 
     def position_of(self, x: float, y: float) -> QPointF:
-        """Return the widget coordinates of a point."""
+        """Return the widget coordinates of a point in the coordinates of the axes."""
         return QPointF(self.view.mapViewToScene(QPointF(x, y)))
 
     def distance(self) -> float | None:
-        """Return the distance of cursors A and B on the first path, or None."""
+        """Return the distance of cursors A and B on the first path in units of the axes, or None."""
         if len(self.cursors) < 2 or not self._paths:
             return None
         points = [self._point_at(self._paths[0], time_s) for time_s in self.cursors.values()]

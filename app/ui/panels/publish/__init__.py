@@ -1,6 +1,7 @@
 """Publish panel: saved messages that can be edited and sent once or repeatedly.
 
-`shelf_list` lists the messages, `message_form` edits one, `value_fields` has the fields for its placeholders.
+`shelf_list` contains the list of messages, `message_form` the form of the selected one, and
+`value_fields` the fields for the placeholders of a message.
 """
 
 from app.ui.panels.publish.panel import PANEL as PANEL

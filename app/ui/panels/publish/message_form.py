@@ -1,4 +1,4 @@
-"""Form to edit a message: name, topic, type, placeholders, JSON with error checking, and send buttons."""
+"""Form for editing a message: name, topic, type, placeholders, JSON with error checking, and send buttons."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ class MessageForm(QWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_message(self, message: SavedMessage) -> None:
-        """Show a message. Fields with an equivalent value keep their text while the user types."""
+        """Show a message. Fields with an equivalent value are not changed, so as not to disturb typing."""
         other = self.message is None or self.message.id != message.id
         if message == self.message:
             return
@@ -240,7 +240,7 @@ class MessageForm(QWidget):
             widget.setVisible(bool(self.read.manual_placeholders))
 
     def show_problem(self, problem: str) -> None:
-        """Show the reason why the message can't be sent; "" if it can."""
+        """Show the reason why the message can't be sent; "" hides the reason."""
         fault = self.read.fault
         words = _("{problem} The message can't be sent yet.").format(problem=problem) if problem else ""
         if words != self.sentence.text():
@@ -286,7 +286,7 @@ class MessageForm(QWidget):
         self._update_message(msg_type=msg_type)
 
     def replace_text(self, text: str) -> None:
-        """Replace the whole text as one undoable edit."""
+        """Replace the whole JSON text as one edit that can be undone."""
         self.edit.replace(0, len(self.edit.text()), text)
 
     def format_json(self) -> None:
@@ -297,7 +297,7 @@ class MessageForm(QWidget):
             self.show_problem(str(error))
 
     def apply_fix(self) -> None:
-        """Apply the suggested fix of the first error."""
+        """Apply the suggested fix for the first error in the JSON text, if there is one."""
         fault: JsonFault | None = self.read.fault
         if fault is not None and fault.fix is not None:
             self.edit.replace(fault.fix.start, fault.fix.end, fault.fix.text)

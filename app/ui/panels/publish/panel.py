@@ -226,7 +226,11 @@ class PublishPanel(PanelWidget):
         field.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def insert_template(self) -> None:
-        """Insert the topic's next message or, without a publisher, a template with the fields of its type."""
+        """Insert the topic's next message into the form.
+
+        If the topic has no publisher, or if this is called while waiting for the message, insert the fields
+        of the message type instead.
+        """
         message = self.message
         if message is None:
             return

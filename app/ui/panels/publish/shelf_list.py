@@ -1,4 +1,4 @@
-"""List of saved messages with their topics and states (sending, invalid, not armed)."""
+"""List of saved messages with their topics and states, such as sending, invalid or not armed."""
 
 from __future__ import annotations
 
@@ -36,10 +36,16 @@ def state_cell(message: SavedMessage, acting: SessionActing) -> Cell:
 
 
 class ShelfList(TableView[SavedMessage]):
-    """List of saved messages; a click selects one.
+    """List of saved messages; a click selects a message.
 
-    `chosen` carries the id of the selected message, also for selection by keyboard. Keys send, copy and
-    delete.
+    Args:
+        state: Returns the cell with the state of a message.
+
+    Signals:
+        chosen: Id of the message that was selected by mouse or keyboard.
+        send_wanted: Id of a message to send.
+        copy_wanted: Id of a message to duplicate.
+        delete_wanted: Id of a message to delete.
     """
 
     selected = Signal(str)

@@ -18,7 +18,11 @@ FIELD_WIDTH_PX = 120
 
 
 class ValueFields(QWidget):
-    """One text field per placeholder; `typed` carries name and text."""
+    """Text fields for the placeholders of a message.
+
+    Signals:
+        typed: Name of a placeholder, and the text that was typed.
+    """
 
     typed = Signal(str, str)
 
@@ -34,7 +38,12 @@ class ValueFields(QWidget):
         column.addWidget(self._place)
 
     def show_fields(self, names: Sequence[str], values: Mapping[str, str]) -> None:
-        """Show fields for these placeholders. Existing fields keep their text and focus."""
+        """Show a field for each placeholder. A field that exists already is reused and keeps the focus.
+
+        Args:
+            names: Names of the placeholders.
+            values: Texts of the fields by name.
+        """
         if list(names) != list(self.fields):
             self._rebuild(names)
         for name, field in self.fields.items():

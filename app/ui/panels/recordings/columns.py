@@ -27,11 +27,16 @@ BADGES = {
     "repaired": (lazy("repaired"), "info", "wrench"),
     "kept": (lazy("last seconds"), "off", "history"),
 }
-"""Text, status and icon of each badge."""
+"""Text, status and icon of each badge, by key."""
 
 
 def badge_of(facts: RecordingFacts, being_written: bool) -> str:
-    """Return the key in `BADGES` of a recording's badge, or ""."""
+    """Return the key in `BADGES` of a recording's badge, or "" for no badge.
+
+    Args:
+        facts: Properties of the recording.
+        being_written: True for the recording in progress.
+    """
     if being_written:
         return "recording"
     if facts.problem:
@@ -47,7 +52,15 @@ def badge_of(facts: RecordingFacts, being_written: bool) -> str:
 
 @dataclass(frozen=True)
 class RecordingMark:
-    """Cell with thumbnail, name, badge and note. Thumbnails are compared by identity."""
+    """Table cell with thumbnail, name, badge and note.
+
+    Attributes:
+        name: Name of the recording.
+        note: Second line, or "".
+        badge: Key in `BADGES`, or "".
+        picture_id: Cache key of the thumbnail, by which cells are compared; 0 without a thumbnail.
+        picture: Thumbnail, or None.
+    """
 
     name: str
     note: str
@@ -134,8 +147,9 @@ def columns(
     """Return the columns of the table.
 
     Args:
-        picture: Returns the thumbnail if it is loaded.
+        picture: Returns the thumbnail of a recording, or None if it is not loaded.
         is_written: Returns True for the recording in progress.
+        now: Returns the current local time.
     """
 
     def name(facts: RecordingFacts) -> Cell:

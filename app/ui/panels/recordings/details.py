@@ -1,4 +1,4 @@
-"""Details of the selected recording: open, rename, show the file, export all or a part of it."""
+"""Details of the selected recording, with actions to open, rename, export and delete it."""
 
 from __future__ import annotations
 
@@ -40,11 +40,16 @@ FORMAT_LABELS = {
     "csv": lazy("CSV"), "parquet": lazy("Parquet"), "pictures": lazy("Images"), "mp4": lazy("MP4"),
     "mcap": lazy("MCAP"),
 }  # fmt: skip
-"""Names of the export formats of `nep.recordings.export`."""
+"""Displayed names of the export formats of `nep.recordings.export`."""
 
 
 class RecordingDetails(QWidget):
-    """Details below the table; emits `wants_export` with the export format, and `cancelled`."""
+    """Details of the selected recording.
+
+    Signals:
+        wants_export: Export format, when the user starts an export.
+        cancelled: The user cancelled the running export.
+    """
 
     export_requested = Signal(str)
     cancelled = Signal()
@@ -147,7 +152,12 @@ class RecordingDetails(QWidget):
         return form
 
     def show_facts(self, facts: RecordingFacts, being_written: bool) -> None:
-        """Show the details of a recording and enable the actions that apply to it."""
+        """Show the properties of a recording and enable the possible actions.
+
+        Args:
+            facts: Properties of the recording.
+            being_written: True for the recording in progress.
+        """
         self.name.setText(facts.path.stem)
         self._recording = facts.path
         self._update_export_path()
@@ -169,7 +179,12 @@ class RecordingDetails(QWidget):
         self.delete.setEnabled(not being_written)
 
     def show_strip(self, look: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
-        """Show another recording on the film strip, completely selected; None while it is loading."""
+        """Show another recording on the film strip and select all of it for export.
+
+        Args:
+            look: Contents of the film strip; None while they are loading.
+            images: Images of the film strip; None for images that are not loaded.
+        """
         self.strip.show_preview(look, images)
         self.topics.show_patterns((), ())
         self._is_none_chosen = False
@@ -182,7 +197,10 @@ class RecordingDetails(QWidget):
         self._update_export_path()
 
     def export_path(self) -> Path | None:
-        """Return the path of the exported file, with a suffix if that exists; None without a recording."""
+        """Return the path for the export, or None without a recording.
+
+        The path contains the selected time range and the format; it may exist already.
+        """
         if self._recording is None:
             return None
         strip, name = self.strip, self._recording.stem
@@ -205,7 +223,7 @@ class RecordingDetails(QWidget):
         self._update_part()
 
     def part(self) -> Part | None:
-        """Return the part to export; None if no topic matches or a pattern is invalid."""
+        """Return the part to export; None if no topic is selected or a pattern is invalid."""
         look = self.strip.look
         if look is None:
             return FULL_RECORDING
@@ -282,7 +300,7 @@ class RecordingDetails(QWidget):
         return words.format(messages=messages, size=size_text(size))
 
     def show_export(self, job: RecordingExport | None) -> None:
-        """Show the progress of an export; None if none is running."""
+        """Show the progress of an export, or hide it if `job` is None."""
         self._is_exporting = job is not None
         self.export.set_label(_("Cancel") if job is not None else _("Export"), "x" if job else "download")
         for field in (self.format, self.strip, self.topics, self.choose, self.times, self.pick, self.list):

@@ -1,4 +1,4 @@
-"""Film strip: time line of a recording with images, and two handles to select a part of it."""
+"""Film strip: timeline of a recording with images, and two handles to select a part of it."""
 
 from __future__ import annotations
 
@@ -20,9 +20,12 @@ UNSELECTED_OPACITY = 0.35
 
 
 class StripHandle(QWidget):
-    """Handle at one end of the selection.
+    """Handle at one end of the selected part. The arrow keys move the handle by 1 s, with Shift by 10 s.
 
-    Arrow keys move the handle by 1 s, with Shift by 10 s; `moved` carries the shift.
+    Signals:
+        moved: Shift in ns, when a key was pressed.
+        dragged: New x coordinate, while the handle is dragged.
+        reset: The handle was double-clicked.
     """
 
     moved = Signal(object)
@@ -66,7 +69,16 @@ class StripHandle(QWidget):
 
 
 class FilmStrip(QWidget):
-    """Film strip of one recording; `changed` is emitted when a different part is selected."""
+    """Film strip of one recording.
+
+    Attributes:
+        look: Contents of the film strip, or None.
+        begin_ns: Start of the selected part, in ns since 1970.
+        end_ns: End of the selected part, in ns since 1970.
+
+    Signals:
+        changed: The selected part changed.
+    """
 
     changed = Signal()
 
@@ -92,7 +104,12 @@ class FilmStrip(QWidget):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_preview(self, look: FilmStripPreview | None, images: Sequence[QImage | None] = ()) -> None:
-        """Show a recording, completely selected."""
+        """Show a recording and select all of it.
+
+        Args:
+            look: Contents of the film strip; None hides the film strip.
+            images: Images of the film strip; None for images that are not loaded.
+        """
         self.look, self._images = look, images
         self.select_all()
         self.setVisible(look is not None)
@@ -103,7 +120,12 @@ class FilmStrip(QWidget):
             self.set_part(self.look.start_ns, self.look.end_ns)
 
     def set_part(self, begin_ns: int, end_ns: int) -> None:
-        """Select a part. The times are clamped to the recording and to each other."""
+        """Select a part of the recording.
+
+        Args:
+            begin_ns: Start in ns since 1970. Both times are limited to the recording and to each other.
+            end_ns: End in ns since 1970.
+        """
         look = self.look
         if look is None:
             return
@@ -118,13 +140,18 @@ class FilmStrip(QWidget):
         self.changed.emit()
 
     def time_text(self, at_ns: int, *, digits: int) -> str:
-        """Format a time relative to the start ("6:40.0") or as time of day ("15:08:40.0")."""
+        """Format a time relative to the start ("6:40.0") or as time of day ("15:08:40.0").
+
+        Args:
+            at_ns: Time in ns since 1970.
+            digits: Number of decimals of the seconds.
+        """
         if self.by_clock:
             return clock_text(at_ns, digits=digits)
         return duration_text(at_ns - (self.look.start_ns if self.look is not None else 0), digits=digits)
 
     def set_clock_mode(self, by_clock: bool) -> None:
-        """Switch between times of day and times relative to the start."""
+        """Show times of day if `by_clock` is True, else times relative to the start."""
         self.by_clock = by_clock
         self.set_part(self.begin_ns, self.end_ns)
         self.update()

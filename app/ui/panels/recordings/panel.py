@@ -1,4 +1,4 @@
-"""Recordings panel: browser of the recordings folder, which is scanned in a background thread."""
+"""Recordings panel: list of the recordings folder, which is scanned in a background thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Table of recordings: Enter or a double click opens, F2 renames in place, Delete deletes."""
+"""Table of recordings: Enter or a double click opens a recording, F2 renames it, Delete deletes it."""
 
 from __future__ import annotations
 
@@ -19,9 +19,12 @@ from nep.i18n import _
 
 
 class RecordingTable(TableView[RecordingFacts]):
-    """Table of recordings in which a click only selects.
+    """Table of recordings, in which a click selects a row without opening the recording.
 
-    `chosen` carries the key of the row, also for selection by keyboard.
+    Signals:
+        chosen: Key of the row that was selected by mouse or keyboard, or "".
+        rename_wanted: Key of a recording to rename.
+        delete_wanted: Key of a recording to delete.
     """
 
     selected = Signal(str)
@@ -59,7 +62,13 @@ class RecordingTable(TableView[RecordingFacts]):
             super().keyPressEvent(event)
 
     def rename(self, key: str, name: str, take: Callable[[str], bool]) -> None:
-        """Start in-place editing of a recording's name; `take` receives the new name."""
+        """Start editing the name of a recording in place.
+
+        Args:
+            key: Key of the recording.
+            name: Current name.
+            take: Receives the new name and returns False if it is invalid.
+        """
         self.select_key(key)
         index = self.currentIndex()
         self.scrollTo(index)

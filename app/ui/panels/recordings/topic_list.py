@@ -21,7 +21,11 @@ TABLE_HEIGHT = 150
 
 
 class TopicList(QWidget):
-    """Checklist of topics; `chosen` carries the names of all checked topics after a change."""
+    """Checklist of topics.
+
+    Signals:
+        chosen: Names of all checked topics, after the user changed one of them.
+    """
 
     selection_changed = Signal(list)
 
@@ -91,7 +95,13 @@ class TopicList(QWidget):
         chosen: Collection[str],
         size_of: Callable[[RecordedTopic], float | None],
     ) -> None:
-        """Show the topics with their check marks; `size_of` returns the size of a topic in bytes, or None."""
+        """Replace the topics.
+
+        Args:
+            topics: Topics of the recording.
+            chosen: Names of checked topics.
+            size_of: Returns the size of a topic's messages in bytes, or None if it is unknown.
+        """
         self._names, self._size_of = frozenset(chosen), size_of
         if topics is not self._topics:
             self._topics = topics
@@ -131,9 +141,15 @@ class TopicList(QWidget):
 def shortest_choice(
     topics: Sequence[RecordedTopic], names: Collection[str]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the included or of the excluded topics, whichever are fewer.
+    """Express a selection of topics by the shorter list of names: included or excluded topics.
 
-    Both are empty if all topics are included.
+    Args:
+        topics: All topics of the recording.
+        names: Names of the selected topics.
+
+    Returns:
+        Names of the included topics, and names of the excluded topics. One of them is empty; if both are
+        empty, all topics are selected.
     """
     wanted = tuple(topic.name for topic in topics if topic.name in names)
     unwanted = tuple(topic.name for topic in topics if topic.name not in names)

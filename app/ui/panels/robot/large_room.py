@@ -1,4 +1,4 @@
-"""Enlarged view of the room over the middle of the window. The run bar with Stop stays accessible."""
+"""Enlarged view of the room over the middle of the window, next to the run bar with the Stop button."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.i18n import _
 
 
 class LargeRoom(QWidget):
-    """Overlay with the room that covers the panels; closed by Esc, its button or a double click.
+    """Overlay that shows the room in place of all panels. Esc, its button or a double click close it.
 
     Args:
         panel: Panel within the area to cover.
@@ -68,7 +68,7 @@ class LargeRoom(QWidget):
             self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def toggle_full_screen(self) -> None:
-        """Toggle the window's full screen mode."""
+        """Enter or leave the full screen mode of the window."""
         window = self.window()
         self.filled = not self.filled
         window.setWindowState(window.windowState() ^ Qt.WindowState.WindowFullScreen)

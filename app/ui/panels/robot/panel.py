@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from app.core.robots.robot_link import RobotLink
 
 STALE_AFTER_S = 2.0
-"""Time in s without a state after which the drawing is stale.
+"""Time in s without a state message after which the drawing is stale.
 
-Virtual robots publish it many times a second.
+Virtual robots publish their state many times a second.
 """
 
 
@@ -49,7 +49,7 @@ ADDABLE_THINGS = {
 
 
 def things_of(room: Room) -> tuple[Thing, ...]:
-    """Return the things of a room that can be drawn."""
+    """Convert the things in a room to things of the drawing."""
     return tuple(
         Thing(
             kind_of(thing), thing.x, thing.y, thing.name,
@@ -67,7 +67,7 @@ def radius_of(robot: RobotState) -> float:
 
 
 class RobotPanel(OneRobotPanel):
-    """Panel with one virtual robot, whose name is the title."""
+    """Panel with a virtual robot in its room; the title is the robot's name."""
 
     def __init__(self, context: PanelContext) -> None:
         super().__init__(context, _("Robot"))

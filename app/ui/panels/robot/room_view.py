@@ -43,16 +43,20 @@ DRAG_DISTANCE_PX = 4
 
 
 def split(part: str) -> tuple[str, str]:
-    """Split a part such as ``Turtle/body`` into robot ("" for the main robot) and part."""
+    """Split the id of a part, such as ``Turtle/body``, into the name of the robot and the part.
+
+    The name is "" for the main robot.
+    """
     name, _slash, of = part.rpartition("/")
     return name, of
 
 
 class RoomView(QWidget):
-    """Drawing of a room. Heads and hands react to presses; robots and things can be dragged over the floor.
+    """Interactive drawing of robots and things in a room.
 
-    A click on a robot with a bumper presses it. Keys: Tab selects the next item, arrows move it, Space
-    presses a bumper or touches a head while held, H, L and R touch head and hands, Delete removes a thing.
+    Heads and hands can be pressed; robots and things can be dragged over the floor. A click on a robot with
+    a bumper presses the bumper. Keys: Tab selects the next item, arrows move it. Space presses a bumper, or
+    touches a head while held. H, L and R touch head and hands, Delete removes a thing.
     """
 
     touched = Signal(str, str, bool)  # robot ("" for the main one), part, True if pressed
@@ -104,9 +108,12 @@ class RoomView(QWidget):
         others: Sequence[tuple[str, Mapping[str, object]]] = (),
         things: tuple[Thing, ...] | None = None,
     ) -> None:
-        """Draw the main robot, other robots, and things; None draws the things of the robot's state.
+        """Draw robots and things. Repeated calls with the same objects are cheap.
 
-        Repeated calls with the same objects are cheap.
+        Args:
+            data: State of the main robot.
+            others: Names and states of the other robots in the room.
+            things: Things to draw; None for the things in the state of the main robot.
         """
         told = (id(data), [(name, id(each)) for name, each in others], things)
         if told == self._data:
@@ -123,14 +130,14 @@ class RoomView(QWidget):
             self.update()
 
     def set_stale(self, stale: bool) -> None:
-        """Show the robot as stale: drawn in grey, without speech."""
+        """Set if the robot is stale: a stale robot is grey and shows no speech."""
         if stale != self.stale:
             self.stale = stale
             self.setAccessibleDescription(self._description())
             self.update()
 
     def set_caption(self, words: str) -> None:
-        """Show heard words as a caption below the drawing; "" for none."""
+        """Show the text that a robot has heard as a caption below the drawing; "" removes the caption."""
         if words != self.heard:
             self.heard = words
             self.update()
@@ -142,7 +149,7 @@ class RoomView(QWidget):
         return QSize(382, 286)
 
     def position_of(self, part: str) -> QPointF | None:
-        """Return the position of a part in the view; for tests and tools."""
+        """Return the position of a part in the view, or None if it is not drawn; used by tests and tools."""
         return self._drawing.point_of(part, QRectF(self.rect()), self.state, self.others)
 
     def paintEvent(self, _event: QPaintEvent) -> None:

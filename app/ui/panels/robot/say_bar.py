@@ -1,4 +1,4 @@
-"""Bar below the room to speak to a virtual robot and to simulate events."""
+"""Bar below the room for speaking to a virtual robot and for simulating events."""
 
 from __future__ import annotations
 
@@ -21,13 +21,18 @@ HEARD_EVENT = "heard"
 """Name of the event that a robot publishes when it hears speech."""
 MAX_ENTRIES = 24
 MAX_WIDTH = 720
-"""Maximum width in px, which limits the bar of the enlarged room."""
+"""Maximum width of the speech field in px, which is reached in the enlarged room."""
 Awaited: TypeAlias = Callable[[Event, str], Sequence[str]]
 SimulatedEvent: TypeAlias = dict[str, object]
 
 
 class SayField(SearchField):
-    """Text field for speech. Return emits `said`; Down emits `asked` to show suggestions."""
+    """Text field for speech.
+
+    Signals:
+        said: Text to say, when Return was pressed.
+        asked: Suggestions should be shown, because Down was pressed.
+    """
 
     submitted = Signal(str)
     suggestions_requested = Signal()
@@ -44,7 +49,7 @@ class SayField(SearchField):
         return QSize(120, super().sizeHint().height())
 
     def submit(self, words: str) -> None:
-        """Emit `said` with these words and clear the field."""
+        """Emit a text as `submitted` and clear the field; ignored if the text is blank."""
         if words.strip():
             self._last = words.strip()
             self.clear()
@@ -63,14 +68,18 @@ class SayField(SearchField):
 
 
 class SayBar(QWidget):
-    """Bar with the speech field, its suggestions, and the menu of simulated events.
+    """Bar with a field for speech, its suggestions, and the menu of simulated events.
 
     Args:
-        awaited: Returns the values of an event's field that programs are waiting for.
+        awaited: Returns the values of an event's field that running or open programs react to.
+
+    Signals:
+        said: Text to say to the robot.
+        happened: Event to simulate.
     """
 
     speech_submitted = Signal(str)
-    event_simulated = Signal(object)  # `Happening`, in the format of a virtual robot's world
+    event_simulated = Signal(object)  # `SimulatedEvent`, in the format of a virtual robot's world
 
     def __init__(self, theme: Theme, awaited: Awaited) -> None:
         super().__init__()
@@ -113,12 +122,12 @@ class SayBar(QWidget):
     # -- speech -------------------------------------------------------------------------------------------
 
     def suggestions(self) -> Sequence[str]:
-        """Return the words that programs are waiting for."""
+        """Return the words that programs react to."""
         event = self._robot.event(HEARD_EVENT) if self._robot is not None else None
         return self._awaited(event, event.filters[0]) if event is not None and event.filters else ()
 
     def show_suggestions(self) -> None:
-        """Show a menu of the words that programs are waiting for; choosing one speaks it."""
+        """Show a menu of the words that programs react to; selecting one says it."""
         menu = Menu(self._theme, self)
         for word in self.suggestions():
             menu.addAction(plain.escape_menu_text(word)).triggered.connect(
@@ -131,7 +140,7 @@ class SayBar(QWidget):
     # -- simulated events ---------------------------------------------------------------------------------
 
     def simulated_events(self) -> Iterator[tuple[str, str, SimulatedEvent]]:
-        """Yield text, icon and data of each event that can be simulated."""
+        """Yield title, icon and data of each event that can be simulated."""
         for event in self._robot.events if self._robot is not None else ():
             if event.name in {HEARD_EVENT, "released"}:  # a tap includes the release
                 continue

@@ -1,6 +1,7 @@
-"""Robots panel: actions of each robot as forms, to try them.
+"""Robots panel: forms for trying the actions of each robot.
 
-`list` has the robots, `action_card` the card of an action, with its `form` and latest `tries`.
+`list` contains the list of robots, `action_card` the card of an action, `form` its form, and `tries`
+the list of its latest tries.
 """
 
 from app.ui.panels.robots.panel import PANEL as PANEL

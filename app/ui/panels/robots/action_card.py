@@ -35,10 +35,18 @@ RISKS = {"moves": MOVES, "locomotes": MOVES}
 
 
 class ActionCard(Card):
-    """Card of an action. Emits `tried` with the input, and `cancelled`.
+    """Card of an action.
 
     Args:
+        action: Action of the robot.
+        options: Returns the values that a property of the robot currently offers.
+        folded: True if the form is collapsed at first.
+        pictures: Source of images for image parameters.
         title_of: Returns the title of another action by its name.
+
+    Signals:
+        tried: Input with which to start the action.
+        cancelled: The action should be cancelled.
     """
 
     try_requested = Signal(dict)
@@ -108,7 +116,7 @@ class ActionCard(Card):
             column.addWidget(widget)
 
     def set_collapsed(self, folded: bool) -> None:
-        """Collapse or expand the form."""
+        """Collapse the form if `folded` is True, else expand it."""
         self._folded = folded
         self.form.setVisible(not folded and bool(self.action.parameters))
         self.fold.set_icon("chevron-down" if folded else "chevron-up")
@@ -120,7 +128,11 @@ class ActionCard(Card):
         self.summary.setVisible(self._folded)
 
     def set_highlighted(self, first: bool) -> None:
-        """Highlight the card, or remove the highlight: accent border and filled Try button."""
+        """Highlight the card with an accent border and a filled Try button, or remove the highlight.
+
+        Args:
+            first: True for the highlighted card.
+        """
         border = "accent" if first else "border"
         if border != self.border:
             self.border = border
@@ -152,7 +164,7 @@ class ActionCard(Card):
         self.form.show_problems(())
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
-        """Show why the input was rejected."""
+        """Show the errors for which the input was rejected; empty removes them."""
         if problems and self._folded:
             self.set_collapsed(False)
         self.form.show_problems(problems)
@@ -163,7 +175,12 @@ class ActionCard(Card):
         self.past.setVisible(bool(self.tries.rows))
 
     def show_invocation(self, invocation: Invocation | None, *, may_move: bool = False) -> None:
-        """Show the state of the latest try. `may_move` is True if the robot may still be moving."""
+        """Show the state of the latest try.
+
+        Args:
+            invocation: Latest try, or None.
+            may_move: True if the robot may still be moving after the end of the try.
+        """
         self._running = invocation is not None and invocation.is_running
         can_cancel = self._running and (
             self.action.cancellable or (invocation is not None and invocation.state in ("sent", "accepted"))

@@ -1,4 +1,4 @@
-"""Form of a robot's action, generated from its parameters."""
+"""Form for the input of a robot's action, generated from its parameters."""
 
 from __future__ import annotations
 
@@ -26,11 +26,16 @@ TALL_ROW = 60  # px; in taller rows the label is vertically centred
 
 
 class ActionForm(QWidget):
-    """Form with one row per parameter; "More" shows the advanced ones. Emits `changed` on user input.
+    """Form with one row per parameter. The button "More" shows the advanced parameters.
 
     Args:
+        theme: Theme of the window.
+        action: Action of the robot.
         options: Returns the values that a property of the robot currently offers.
-        pictures: Source of images.
+        pictures: Source of images for image parameters.
+
+    Signals:
+        changed: The user changed the input.
     """
 
     changed = Signal()
@@ -161,13 +166,13 @@ class ActionForm(QWidget):
         return {name: value for name, value in given.items() if value is not None}
 
     def set_input(self, given: Mapping[str, object]) -> None:
-        """Fill the fields with an input."""
+        """Fill the form with an input, such as the input of an earlier try."""
         for name, value in given.items():
             if name in self.controls:
                 self.controls[name].show_value(value)
 
     def show_problems(self, problems: Sequence[InputProblem]) -> None:
-        """Show each error below its parameter, and other errors at the end of the form."""
+        """Show each error below its parameter, and errors without a parameter at the end of the form."""
         for parameter in self.action.parameters:
             self._show_errors_of(
                 parameter, [each.message for each in problems if each.parameter == parameter.name]

@@ -13,9 +13,12 @@ MAX_TEXT_LENGTH = 32
 
 
 def input_summary(action: Action, given: Mapping[str, object], *, texts: bool = True) -> str:
-    """Describe the most important values of an input, in the order of the parameters.
+    """Format the most important values of an input, in the order of the parameters.
 
-    If `texts` is True, texts are included in quotation marks.
+    Args:
+        action: Action with the parameters.
+        given: Input by parameter name.
+        texts: False to omit texts, which are formatted in quotation marks.
     """
     found = (
         _value_text(parameter, given.get(parameter.name), texts=texts) for parameter in action.parameters
@@ -24,7 +27,7 @@ def input_summary(action: Action, given: Mapping[str, object], *, texts: bool = 
 
 
 def is_unit(title: str, unit: str | None) -> bool:
-    """Return True if the title of a parameter is just the name of its unit, such as "seconds"."""
+    """Return True if the title of a parameter is only the name of its unit, such as "seconds"."""
     english = UNITS.get(unit or "")
     return english is not None and title in {english, translate("robot", english)}
 

@@ -1,4 +1,4 @@
-"""List of robots at the left of the Robots panel, with help for a robot that is not found."""
+"""List of robots at the left of the Robots panel, with help for finding a missing robot."""
 
 from __future__ import annotations
 
@@ -37,7 +37,11 @@ def seen_text(seen_s: float, now: dt.datetime | None = None) -> str:
 
 
 class RobotItem(PaintedButton):
-    """Row of a robot; `menu_wanted` carries the screen position for a context menu."""
+    """Row of a robot.
+
+    Signals:
+        menu_wanted: Screen position for a context menu.
+    """
 
     menu_requested = Signal(QPoint)
 
@@ -55,14 +59,23 @@ class RobotItem(PaintedButton):
         row.addWidget(self.chip)
 
     def show_link(self, link: RobotLink, seen: str = "") -> None:
-        """Show the state of a robot; `seen` replaces the description of a disconnected one."""
+        """Show the state of a robot of this session.
+
+        Args:
+            link: Link to the robot.
+            seen: Text with the time when the robot was last seen, shown while it is disconnected.
+        """
         where = _("virtual, this computer") if link.virtual else link.robot.title
         away = not link.is_connected
         self._show(link.state, seen if away and seen else where, away=away)
         self.may_be_forgotten = self._away and not link.virtual
 
     def show_disconnected(self, seen: str) -> None:
-        """Show a robot of an earlier session that is not connected; clicking it opens the context menu."""
+        """Show a robot of an earlier session that is not connected. A click opens its context menu.
+
+        Args:
+            seen: Text with the time when the robot was last seen.
+        """
         self.setAutoExclusive(False)
         self.setCheckable(False)
         self._show("away", seen, away=True)
@@ -104,10 +117,14 @@ class RobotItem(PaintedButton):
 
 
 class RobotList(QWidget):
-    """List of robots; `chosen` and `forgotten` carry the name of a robot.
+    """List of the robots of this session and of earlier sessions.
 
     Args:
-        run: Executes a command by its id.
+        run: Runs a command of the window by its id.
+
+    Signals:
+        chosen: Name of the selected robot.
+        forgotten: Name of a robot to remove from the list.
     """
 
     selected = Signal(str)
@@ -150,7 +167,11 @@ class RobotList(QWidget):
         return len(self.items) + len(self.away)
 
     def show_fleet(self, fleet: Fleet) -> list[str]:
-        """Show the robots of this session, then those of earlier ones. Return the names of the former."""
+        """Show the robots of this session, then the robots of earlier sessions.
+
+        Returns:
+            The names of the robots of this session.
+        """
         self._known = {robot.name: robot for robot in fleet.known.robots}
         links = [
             link for link in fleet.links if link.is_connected or link.virtual or link.name in self._known
@@ -160,7 +181,7 @@ class RobotList(QWidget):
         return names
 
     def last_seen_text(self, name: str) -> str:
-        """Return the text with the time when a real robot was last last_seen_text, or ""."""
+        """Return the text with the time when a robot was last seen; "" for unknown and virtual robots."""
         return seen_text(self._known[name].seen_s) if name in self._known else ""
 
     def _show(self, links: Sequence[RobotLink], away: Sequence[KnownRobot]) -> None:

@@ -1,4 +1,4 @@
-"""Robots panel: actions of each robot as forms, to try them."""
+"""Robots panel: forms for trying the actions of each robot."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ PICTURE_CODEC = "image"
 
 
 class RobotHead(QWidget):
-    """Header of the selected robot: name, state and its own Stop button."""
+    """Header with name and state of the selected robot, a search field for actions, and a Stop button."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -70,7 +70,7 @@ class RobotHead(QWidget):
 
 
 class SessionImageSource:
-    """Image source for forms: image topics of the session, and files."""
+    """Source of images for forms: image topics of the session, and files."""
 
     def __init__(self, session: Session, files: FileDialogs) -> None:
         self._session, self._files = session, files
@@ -89,13 +89,18 @@ class SessionImageSource:
         )
 
     def stream(self, topic: str) -> ImageStream:
-        """Subscribe to a topic's images until the stream is closed."""
+        """Subscribe to the images of a topic; the caller closes the stream."""
         made = self._session.live.images.stream(topic)
         self._opened = [*self.streams, made]
         return made
 
     def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Show the dialog to choose an image file."""
+        """Show the dialog for choosing an image file.
+
+        Args:
+            folder: Initial folder; "" for the user's pictures.
+            take: Receives the path of the file.
+        """
         self._files.open_picture(folder, take)
 
 
@@ -172,7 +177,11 @@ class RobotsPanel(OneRobotPanel):
         self._fit()
 
     def robot_to_show(self) -> RobotLink | None:
-        """Return the robot that was selected here while it is listed, else the shown or the first one."""
+        """Return the robot to show, or None if the list is empty.
+
+        This is the robot selected in this panel if it is still listed, else the robot shown in other
+        panels, else the first robot in the list.
+        """
         fleet, names = self.session.fleet, self._names
         if self._robot in names:
             return fleet.link(self._robot)
@@ -203,7 +212,7 @@ class RobotsPanel(OneRobotPanel):
         self.refresh()
 
     def select_robot(self, name: str) -> None:
-        """Select a robot, here and in all panels that show one robot."""
+        """Select a robot for this panel and for all others that show one robot."""
         self.session.fleet.select(name)
         link = self.session.fleet.link(name)
         if link is not None:
@@ -301,7 +310,12 @@ class RobotsPanel(OneRobotPanel):
     # -- user actions -------------------------------------------------------------------------------------
 
     def start_action(self, action: str, given: Mapping[str, object]) -> None:
-        """Start an action; errors in its input are shown in the card."""
+        """Start an action of the selected robot. Errors are shown in the card of the action.
+
+        Args:
+            action: Name of the action.
+            given: Input by parameter name.
+        """
         card = self.cards[action]
         try:
             self.session.fleet.invoke(self._robot, action, given)

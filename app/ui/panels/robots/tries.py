@@ -1,4 +1,4 @@
-"""Tries of an action: texts for their states, and the list of the latest ones."""
+"""Tries of an action: texts for their states, and the list of the latest tries."""
 
 from __future__ import annotations
 
@@ -32,7 +32,12 @@ MAX_TRIES = 5
 
 
 def fields_text(fields: Sequence[DataField], told: Mapping[str, object]) -> str:
-    """Format the values of fields, such as "0.3 m to go, moved 0.5 m"."""
+    """Format the values of fields, such as "0.3 m to go, moved 0.5 m".
+
+    Args:
+        fields: Descriptions of the fields.
+        told: Values by field name; missing values are omitted.
+    """
     parts = []
     for field in fields:
         value = told.get(field.name)
@@ -58,15 +63,20 @@ def feedback_text(action: Action, feedback: Mapping[str, object]) -> str:
 
 
 def output_text(action: Action, output: Mapping[str, object]) -> str:
-    """Format the output of an action, without the duration, which is part of the result."""
+    """Format the output of an action, without its duration."""
     told = [field for field in action.output if not is_unit(field.title, field.unit)]
     return fields_text(told, output)
 
 
 def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[str, object]) -> float | None:
-    """Return the progress (0 to 1), as reported or derived from requested and remaining amounts.
+    """Return the progress of an action from 0 to 1, or None if it is unknown.
 
-    Return None if it is unknown.
+    The progress is reported by the robot, or derived from a requested and a remaining amount.
+
+    Args:
+        action: Action with its parameters and feedback.
+        given: Input by parameter name.
+        feedback: Latest feedback by field name.
     """
     for name in RATIO_FIELDS:
         share = _number(feedback.get(name))
@@ -93,7 +103,13 @@ def progress_of(action: Action, given: Mapping[str, object], feedback: Mapping[s
 
 
 def state_text(action: Action, made: Invocation, title_of: Callable[[str], str]) -> str:
-    """Describe the current state of a running try."""
+    """Format the current state of a running try, such as "sent" or its feedback.
+
+    Args:
+        action: Action of the try.
+        made: Running try.
+        title_of: Returns the title of another action by its name.
+    """
     if made.state == "sent":
         return _("sent")
     if made.state == "accepted":
@@ -111,7 +127,7 @@ def state_text(action: Action, made: Invocation, title_of: Callable[[str], str])
 
 
 def remaining_text(made: Invocation) -> str:
-    """Format the remaining time; "" if there is no limit."""
+    """Format the time until a running try reaches its time limit; "" without a time limit."""
     left_s = made.remaining_s
     if left_s is None or not made.is_running:
         return ""
@@ -119,9 +135,14 @@ def remaining_text(made: Invocation) -> str:
 
 
 def result_texts(made: Invocation, *, may_move: bool = False) -> tuple[str, str, str]:
-    """Return text and status of the chip of an ended try, and a sentence or "".
+    """Format the result of a try that has ended.
 
-    If `may_move` is True, the robot may still be moving, so the text doesn't say "stopped".
+    Args:
+        made: Try that has ended.
+        may_move: True if the robot may still be moving; the text then doesn't say "stopped".
+
+    Returns:
+        Text and status of the chip, and a sentence with the reason or "".
     """
     took = seconds_text(made.elapsed_s)
     if made.state == "succeeded":
@@ -208,7 +229,11 @@ class TryList(QWidget):
         self._column.setSpacing(0)
 
     def show_tries(self, tries: Sequence[Invocation]) -> None:
-        """Show those of the latest tries that have ended."""
+        """Show the latest ended tries of the action.
+
+        Args:
+            tries: Tries of all actions, oldest first; running ones are ignored.
+        """
         ended = [made for made in tries if made.action == self._action.name and not made.is_running][
             -MAX_TRIES:
         ]

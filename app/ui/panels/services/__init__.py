@@ -1,6 +1,7 @@
-"""Services panel: services of the live network, with request form, reply and earlier calls.
+"""Services panel: services of the live network, with a form for requests, the reply and earlier calls.
 
-`service_list` has the list, `request_form` the fields of a request, `answer` the reply.
+`service_list` contains the list of services, `request_form` the fields of a request, and `answer` the
+view of a reply.
 """
 
 from app.ui.panels.services.panel import PANEL as PANEL

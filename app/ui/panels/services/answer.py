@@ -33,7 +33,14 @@ MIN_WIDTH_PX, ONE_ROW_WIDTH_PX = 200, 420
 
 @dataclass(frozen=True, slots=True)
 class ReplyRow:
-    """Row of a reply: path, depth, name and text (such as "{2}" for an object with two fields)."""
+    """Row of a reply.
+
+    Attributes:
+        path: Path of the value in the reply.
+        depth: Number of ancestors of the value.
+        name: Key or index of the value.
+        text: Formatted value, such as "{2}" for an object with two fields.
+    """
 
     path: str
     depth: int
@@ -42,7 +49,10 @@ class ReplyRow:
 
 
 def reply_rows(answer: object) -> list[ReplyRow]:
-    """Return a reply as at most `MAX_ROWS` rows, with children below their parents."""
+    """Convert a reply to rows, with children below their parents.
+
+    At most `MAX_ROWS` rows are returned, followed by a note if the reply has more.
+    """
     found: list[ReplyRow] = []
     for row in (
         _iter_rows("", 0, "", answer)
@@ -82,7 +92,7 @@ def _value_text(value: object) -> str:
 
 
 def duration_cell(record: CallRecord) -> Cell:
-    """Return the cell with state and duration of a call."""
+    """Return the cell with the duration of a successful call, or with the state or error of other calls."""
     match record.state:
         case "waiting":
             return Cell(_("waiting"), "circle-dashed", "textSecondary")
@@ -101,7 +111,7 @@ def clock_text(record: CallRecord) -> str:
 
 
 class ReplyView(QWidget):
-    """View of one call: the latest of the selected service, or an earlier one from the table."""
+    """View of one call and its reply, as a table or JSON."""
 
     def __init__(self, theme: Theme, toast: ShowToast) -> None:
         super().__init__()
@@ -174,7 +184,12 @@ class ReplyView(QWidget):
             self._head.setDirection(way)
 
     def show_record(self, record: CallRecord | None, waited_s: float = 0.0) -> None:
-        """Show a call, or an empty view if `record` is None."""
+        """Show a call and its reply.
+
+        Args:
+            record: Call to show; None shows an empty view.
+            waited_s: Time in s since the start of a pending call.
+        """
         if record is not None and record.state == "waiting":
             self.chip.set(_("waiting {time}").format(time=seconds_text(waited_s)), "info", "circle-dashed")
         if record == self.record and record is not None:

@@ -1,4 +1,4 @@
-"""Form of a service request, whose fields are derived from the current request's keys and values."""
+"""Form for the request of a service, whose fields are derived from the keys and values of the request."""
 
 from __future__ import annotations
 
@@ -37,7 +37,11 @@ def kind_of(value: object) -> str:
 
 
 class RequestForm(QWidget):
-    """Form with one field per key of the request; `typed` carries the edited request."""
+    """Form with one field per key of the request.
+
+    Signals:
+        typed: Edited request.
+    """
 
     typed = Signal(object)  # a dict
 
@@ -65,11 +69,11 @@ class RequestForm(QWidget):
         column.addStretch(1)
 
     def reset_kinds(self) -> None:
-        """Discard the kinds of the fields; called before the request of another service is shown."""
+        """Discard the types of the fields; called before the request of another service is shown."""
         self._kinds, self._request = {}, {}
 
     def show_request(self, request: object) -> None:
-        """Show a request. Requests that aren't objects have no fields."""
+        """Show a request. Only requests that are objects have fields."""
         given = dict(request) if isinstance(request, Mapping) else {}
         if given == self._request and self._kinds and not self.problems:
             return

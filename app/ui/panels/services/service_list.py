@@ -20,19 +20,28 @@ from nep.protocol.service_wire import SURVEY_PREFIX
 
 @dataclass(frozen=True, slots=True)
 class OfferedService:
-    """Service with the names of its servers, the first of which receives the calls."""
+    """Service with the nodes that serve it.
+
+    Attributes:
+        name: Name of the service.
+        nodes: Names of the serving nodes. The first one receives the calls.
+    """
 
     name: str
     nodes: tuple[str, ...]
 
     @property
     def servers_text(self) -> str:
-        """Names of the servers as text, such as "face_tracker"."""
+        """Names of the serving nodes as text, such as "face_tracker"."""
         return format_list(list(self.nodes))
 
 
 def offered_services(view: GraphView | None) -> list[OfferedService]:
-    """Return the services sorted by name, without parameter services and surveys."""
+    """Return the available services, sorted by name. Parameter services and surveys are omitted.
+
+    Args:
+        view: Graph reported by the master, or None.
+    """
     if view is None:
         return []
     found = []
@@ -54,9 +63,10 @@ def count_text(services: Sequence[OfferedService]) -> str:
 
 
 class ServiceList(TableView[OfferedService]):
-    """List of services; a click selects one, Ctrl+Enter calls it.
+    """List of services; a click selects a service, Ctrl+Enter calls it.
 
-    `chosen` carries the name of the selected service, also for selection by keyboard.
+    Signals:
+        chosen: Name of the service that was selected by mouse or keyboard.
     """
 
     selected = Signal(str)

@@ -1,6 +1,6 @@
-"""Timeline panel: contents of an open recording, and controls of its replay.
+"""Timeline panel: contents of the open recording, and controls for its replay.
 
-`transport` is the row of controls, `canvas` has the ruler and lanes.
+`transport` contains the row of controls, `canvas` the ruler and the lanes.
 """
 
 from __future__ import annotations

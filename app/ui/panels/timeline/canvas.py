@@ -1,6 +1,7 @@
-"""Ruler and lanes of a recording: events, and for each topic the message density and losses.
+"""Ruler and lanes of a recording: a lane for events of each kind, and a lane for each topic.
 
-The lanes are cached in a pixmap; during replay only the playhead is repainted.
+The lanes of topics show message density and losses. The lanes are cached in a pixmap, so that only the
+playhead is repainted during replay.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ RULER_HEIGHT, LANE_HEIGHT, ROW_HEIGHT = 26, 24, 22
 DENSITY_HEIGHT, TICK_WIDTH = 10, 2
 MIN_ALPHA, MAX_ALPHA = 0.14, 0.76
 SPARSE_PX = 8
-"""Average distance in px between messages above which each message is drawn as a tick."""
+"""Average distance between messages in px above which each message is drawn as a line."""
 LABEL_SPACING_PX = 78
 MAX_BUCKETS = 4000
 GRIP_PX = 6
@@ -55,7 +56,7 @@ ZOOM_PER_WHEEL_UNIT = 1.0015
 
 
 class TimelineCanvas(QAbstractScrollArea):
-    """Timeline of one replay.
+    """Canvas with the timeline of one replay.
 
     Signals:
         chosen: Topic that was clicked.
@@ -94,7 +95,7 @@ class TimelineCanvas(QAbstractScrollArea):
     # -- display ------------------------------------------------------------------------------------------
 
     def show_replay(self, replay: Replay | None) -> None:
-        """Show another recording in its full length, or None for none."""
+        """Show the whole time range of a recording; None clears the canvas."""
         if self.field is not None:
             self.field.close_field()
         self._replay = replay
@@ -105,7 +106,12 @@ class TimelineCanvas(QAbstractScrollArea):
         self.update_scroll_range()
 
     def move_to(self, position_ns: int, loop: tuple[int, int] | None) -> None:
-        """Move the playhead. The view follows unless the user scrolled away from it."""
+        """Move the playhead. The view follows unless the user has scrolled away from the playhead.
+
+        Args:
+            position_ns: Time of the playhead, in ns since 1970.
+            loop: Start and end of the repeated range in ns since 1970, or None.
+        """
         if (position_ns, loop) == (self._position_ns, self._loop):
             return
         self._position_ns, self._loop = position_ns, loop
@@ -120,7 +126,12 @@ class TimelineCanvas(QAbstractScrollArea):
             self.refresh_lanes()
 
     def zoom(self, factor: float, at_ns: int | None = None) -> None:
-        """Scale the visible range by `factor` around a time, by default the playhead."""
+        """Scale the visible time range around a time.
+
+        Args:
+            factor: Factor by which the length of the range is multiplied.
+            at_ns: Time in ns since 1970 that stays at its place; by default the playhead.
+        """
         if self.scale is not None:
             self.set_scale(self.scale.zoomed(factor, self._position_ns if at_ns is None else at_ns))
 
@@ -130,13 +141,13 @@ class TimelineCanvas(QAbstractScrollArea):
             self.set_scale(TimeScale.full(self.scale.first_ns, self.scale.last_ns))
 
     def refresh_lanes(self) -> None:
-        """Repaint the lanes and request their message counts."""
+        """Repaint the lanes after requesting their message counts."""
         self._lanes = None
         self.request_counts()
         self.viewport().update()
 
     def request_counts(self) -> None:
-        """Request the message counts of the visible range from the background thread."""
+        """Request the message counts of the visible time range, which are computed in a background thread."""
         replay, scale = self._replay, self.scale
         if replay is not None and replay.densities is not None and scale is not None:
             buckets = max(1, min(MAX_BUCKETS, round(self._plot().width())))
@@ -162,7 +173,7 @@ class TimelineCanvas(QAbstractScrollArea):
         return QRectF(left, 0, max(20.0, view.width() - left - right), view.height())
 
     def x_of(self, at_ns: int) -> float:
-        """Return the x coordinate of a time."""
+        """Return the x coordinate of a time in ns since 1970."""
         return self._x_mapper(self._plot())(at_ns)
 
     def _x_mapper(self, plot: QRectF) -> Callable[[int], float]:
@@ -174,12 +185,12 @@ class TimelineCanvas(QAbstractScrollArea):
         return lambda at_ns: left + max(-1.0, min(2.0, share(at_ns))) * wide
 
     def time_at(self, x: float) -> int:
-        """Return the time at an x coordinate."""
+        """Return the time at an x coordinate, in ns since 1970."""
         plot = self._plot()
         return self.scale.time((x - plot.left()) / plot.width()) if self.scale is not None else 0
 
     def topic_at(self, y: float) -> str:
-        """Return the topic of the lane at a y coordinate, or ""."""
+        """Return the topic whose lane is at a y coordinate, or "" if there is none."""
         if y < self._lanes_top():
             return ""
         place = int((y - self._lanes_top() + self.verticalScrollBar().value()) / self._row_height())
@@ -464,7 +475,7 @@ class TimelineCanvas(QAbstractScrollArea):
     # -- mouse --------------------------------------------------------------------------------------------
 
     def mark_at(self, at: QPointF) -> LaneMark | None:
-        """Return the mark at a position; of overlapping marks, the narrowest."""
+        """Return the mark at a position, or None. If marks overlap, the narrowest one is returned."""
         found = [mark for mark in self._marks if mark.box.contains(at)]
         return min(found, key=lambda mark: mark.box.width(), default=None)
 
@@ -535,7 +546,12 @@ class TimelineCanvas(QAbstractScrollArea):
             event.accept()
 
     def rename(self, bookmark: Bookmark, take: Callable[[str], bool]) -> None:
-        """Rename a bookmark in place. `take` returns False for an invalid name."""
+        """Start editing the name of a bookmark in place.
+
+        Args:
+            bookmark: Bookmark to rename.
+            take: Receives the new name and returns False if it is invalid.
+        """
         if self.field is not None:
             return
         if self.scale is not None:
@@ -594,7 +610,13 @@ class TimelineCanvas(QAbstractScrollArea):
 
 
 def density_image(counts: Sequence[int], peak: int, colour: QColor) -> QImage:
-    """Return a one-line image with one pixel per bucket, which is more opaque for higher counts."""
+    """Return an image with a height of 1 px that shows counts by opacity.
+
+    Args:
+        counts: Number of messages for each pixel.
+        peak: Count that is shown with the highest opacity.
+        colour: Colour of the pixels.
+    """
     levels = []
     for level in range(256):
         alpha = 0.0 if level == 0 else MIN_ALPHA + (MAX_ALPHA - MIN_ALPHA) * level / 255

@@ -1,4 +1,4 @@
-"""Lanes above the topics for bookmarks, runs of behaviours and alarms. Their marks can be clicked."""
+"""Lanes for bookmarks, runs of behaviours and alarms, above the topics. Their marks can be clicked."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ RESULTS = {
     "stopped": ("square", "textSecondary", lazy("stopped")),
     "failed": ("circle-x", "error", lazy("failed")),
 }
-"""Icon, colour and text for each result of a run."""
+"""Icon, colour and text for each result of a run, by id."""
 MIN_MARK_WIDTH = 3.0
 """Minimum width of a mark in px."""
 ICON_SIZE, GAP, MIN_TEXT_WIDTH, MAX_NAME_WIDTH, FLAG_SIZE = 13, 4, 34, 160, 8
@@ -37,7 +37,14 @@ ICON_SIZE, GAP, MIN_TEXT_WIDTH, MAX_NAME_WIDTH, FLAG_SIZE = 13, 4, 34, 160, 8
 
 @dataclass(frozen=True, slots=True)
 class LaneMark:
-    """Mark that can be clicked: rectangle, time to seek to, and description."""
+    """Mark in a lane that can be clicked.
+
+    Attributes:
+        box: Rectangle of the mark.
+        at_ns: Time to seek to on click, in ns since 1970.
+        words: Tooltip.
+        bookmark: Bookmark that the mark stands for, or None.
+    """
 
     box: QRectF
     at_ns: int
@@ -46,7 +53,7 @@ class LaneMark:
 
 
 def visible_lanes(replay: Replay | None) -> tuple[str, ...]:
-    """Return the lanes to show: bookmarks, and the other ones that are not empty."""
+    """Return the lanes to show: always bookmarks, and runs and alarms if the recording contains any."""
     spans = replay.densities.spans if replay is not None and replay.densities is not None else None
     if spans is None:
         return (BOOKMARKS,)
@@ -54,13 +61,27 @@ def visible_lanes(replay: Replay | None) -> tuple[str, ...]:
 
 
 class EventLanes:
-    """Painter of the event lanes within the visible time range. `x_of` maps a time to an x coordinate."""
+    """Painter of the event lanes.
+
+    Args:
+        theme: Theme with colours and fonts.
+        painter: Painter to use.
+        plot: Area of all lanes; its width is the visible time range.
+        x_of: Returns the x coordinate of a time in ns since 1970.
+    """
 
     def __init__(self, theme: Theme, painter: QPainter, plot: QRectF, x_of: Callable[[int], float]) -> None:
         self._theme, self._painter, self._plot, self._x_of = theme, painter, plot, x_of
 
     def paint(self, lane: str, replay: Replay, top: float, high: float) -> list[LaneMark]:
-        """Paint one of the lanes in `NAMES` and return its marks."""
+        """Paint one lane and return its marks.
+
+        Args:
+            lane: Lane, a key in `LANE_LABELS`.
+            replay: Open recording.
+            top: Upper edge of the lane in px.
+            high: Height of the lane in px.
+        """
         plot = self._plot
         box = QRectF(plot.left(), top, plot.width(), high)
         spans = replay.densities.spans if replay.densities is not None else None
@@ -80,7 +101,7 @@ class EventLanes:
         return made
 
     def visible_spans(self, spans: Iterable[RecordedSpan]) -> Iterator[RecordedSpan]:
-        """Yield the spans in the visible range, except for those that the previous one would hide."""
+        """Yield the spans to paint: visible spans that the mark of the previous span does not hide."""
         plot, free = self._plot, -1.0
         for span in spans:
             left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
@@ -122,7 +143,13 @@ class EventLanes:
     # -- behaviours ---------------------------------------------------------------------------------------
 
     def bar(self, span: RecordedSpan, top: float, high: float) -> QRectF:
-        """Return the rectangle of a run."""
+        """Return the rectangle of a run in a lane.
+
+        Args:
+            span: Run.
+            top: Upper edge of the lane in px.
+            high: Height of the lane in px.
+        """
         left, right = self._x_of(span.start_ns), self._x_of(span.end_ns)
         return QRectF(left, top + 3, max(MIN_MARK_WIDTH, right - left), high - 6)
 
@@ -132,7 +159,14 @@ class EventLanes:
         return LaneMark(bar, span.start_ns, run_text(span, start_ns))
 
     def paint_run(self, span: RecordedSpan, bar: QRectF, fill: str, edge: str) -> None:
-        """Paint a run with its name at the left and its result at the right, as far as they fit."""
+        """Paint a run, with its name at the left and its result at the right if there is room for them.
+
+        Args:
+            span: Run.
+            bar: Rectangle of the run.
+            fill: Name of the theme's fill colour.
+            edge: Name of the theme's border colour.
+        """
         theme, painter = self._theme, self._painter
         paint.box(painter, bar, theme.radius("small"), theme.colour(fill), theme.colour(edge))
         seen = bar.intersected(QRectF(self._plot.left(), bar.top(), self._plot.width(), bar.height()))
@@ -187,7 +221,7 @@ class EventLanes:
 
 
 def alarm_text(span: RecordedSpan) -> str:
-    """Describe an alarm, with its duration if known: "/distance: range is 0.36, below 0.4, 1.2 s"."""
+    """Format an alarm and, if known, its duration: "/distance: range is 0.36, below 0.4, 1.2 s"."""
     name = span.name.rstrip(".")
     name = f"{name[:1].upper()}{name[1:]}"
     if not span.is_over:
@@ -197,7 +231,12 @@ def alarm_text(span: RecordedSpan) -> str:
 
 
 def run_text(span: RecordedSpan, start_ns: int) -> str:
-    """Describe a run: behaviour, result and times."""
+    """Format a run: name of the behaviour, result and times.
+
+    Args:
+        span: Run.
+        start_ns: Start of the recording, in ns since 1970.
+    """
     known = RESULTS.get(span.result)
     words = span.details or (_(known[2]) if known is not None else "")
     return _with_times(f"{span.name}: {words}" if words else span.name, span, start_ns)

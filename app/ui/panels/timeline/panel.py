@@ -145,7 +145,7 @@ class TimelinePanel(PanelWidget):
     # -- user actions -------------------------------------------------------------------------------------
 
     def show_topic(self, name: str) -> None:
-        """Select a topic, through whose messages the replay then steps."""
+        """Select a topic. Steps of the replay then lead from one message of this topic to the next."""
         self._select_topic(name)
         self.canvas.show_topic(name)
 
@@ -218,7 +218,7 @@ class TimelinePanel(PanelWidget):
     # -- sending ------------------------------------------------------------------------------------------
 
     def show_send_chooser(self) -> None:
-        """Show the page to choose topics to send to the live network."""
+        """Show the page for choosing topics that are sent to the live network."""
         replay = self._shown
         if replay is not None and replay.sending is not None:
             counts = {name: topic.message_count for name, topic in replay.recorded_topics.items()}
@@ -255,7 +255,7 @@ class TimelinePanel(PanelWidget):
         fill_menu(menu, self.theme, actions).popup(place)
 
     def rename_bookmark(self, mark: Bookmark) -> None:
-        """Rename a bookmark in place."""
+        """Start editing the name of a bookmark in place."""
         replay = self._shown
         if replay is not None and not self._rejects_note(mark):
             self.canvas.rename(

@@ -1,4 +1,4 @@
-"""Sending of replayed topics to the live network: arming strip, and page to choose the topics."""
+"""Sending of replayed topics to the live network: arming strip, and page for choosing the topics."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ NAME_WIDTH_PX = 240
 
 
 class ReplayStrip(ArmedStrip):
-    """Arming strip that is visible while topics are armed or a confirmation is pending.
+    """Arming strip for a replay, visible while topics are armed or a confirmation is pending.
 
-    `change_wanted` is emitted when the user asks to change the topics.
+    Signals:
+        change_wanted: The page for choosing topics should be shown.
     """
 
     for_replay = True
@@ -74,7 +75,14 @@ class ReplayStrip(ArmedStrip):
 
 
 class SendRow(NamedTuple):
-    """Row of a recorded topic; `name` is the name under which it is sent, or None if it is not sent."""
+    """Row of a recorded topic.
+
+    Attributes:
+        topic: Name of the topic in the recording.
+        message_count: Number of recorded messages.
+        name: Name under which the topic is sent; None if it is not sent.
+        moves_robot: True if the topic moves a robot.
+    """
 
     topic: str
     message_count: int
@@ -83,9 +91,10 @@ class SendRow(NamedTuple):
 
 
 class SendChooser(QWidget):
-    """Table to choose topics and the names under which they are sent; shown in place of the lanes.
+    """Table for choosing the topics to send and their names on the live network; shown in place of the lanes.
 
-    `left` is emitted when the user is done.
+    Signals:
+        left: The page should be closed.
     """
 
     exited = Signal()
@@ -141,7 +150,13 @@ class SendChooser(QWidget):
         row.addWidget(scroll)
 
     def open(self, sending: ReplaySending, counts: dict[str, int], chosen: str) -> None:
-        """Show the topics of a recording with their message counts."""
+        """Show the topics of a recording.
+
+        Args:
+            sending: Controller that sends the topics.
+            counts: Number of recorded messages by topic.
+            chosen: Topic whose row is selected.
+        """
         self._sending, self._counts, self._seen = sending, counts, None
         sending.analyze()
         self.problem.setText("")
@@ -151,7 +166,7 @@ class SendChooser(QWidget):
         self.table.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def refresh(self) -> None:
-        """Update the table after a change."""
+        """Update the table if the topics to send have changed."""
         sending = self._sending
         if sending is None or self._seen == (sending, sending.revision):
             return

@@ -1,4 +1,4 @@
-"""Transport controls of a replay: position, play, step, speed, loop, bookmark."""
+"""Transport controls of a replay: position, play, step, speed, loop and bookmark."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from nep.recordings.player import SPEED_MAX, SPEED_MIN, PlayerStatus
 
 SPEED_STEPS = 40
 SLOW_RATIO = 0.97
-"""Ratio of actual to requested speed below which the actual speed is shown."""
+"""Ratio of actual to requested speed below which the actual speed is displayed."""
 
 
 class TransportRow(QWidget):
@@ -68,7 +68,11 @@ class TransportRow(QWidget):
         flow.addWidget(self.nothing)
 
     def set_armed(self, *, is_armed: bool) -> None:
-        """Hide the switch while sending is armed, because the strip below has a switch too."""
+        """Hide the arming switch while sending is armed, because the arming strip then shows a switch too.
+
+        Args:
+            is_armed: True while sending is armed.
+        """
         self.armed.setVisible(not is_armed)
         self.nothing.setVisible(not is_armed)
 
@@ -95,7 +99,12 @@ class TransportRow(QWidget):
             what(self._replay)
 
     def show_replay(self, replay: Replay, player: PlayerStatus) -> None:
-        """Show the state of a replay."""
+        """Show the state of a replay.
+
+        Args:
+            replay: Open recording.
+            player: Position, speed and state of the player.
+        """
         if replay is not self._replay:
             self._replay = replay
             self.speed.blockSignals(True)
@@ -140,7 +149,7 @@ def speed_of(step: int) -> float:
 
 
 def step_of(speed: float) -> int:
-    """Return the slider step that is nearest to a speed."""
+    """Return the slider step for a speed, rounded to the nearest step."""
     return round(
         log10(max(SPEED_MIN, min(SPEED_MAX, speed)) / SPEED_MIN) / log10(SPEED_MAX / SPEED_MIN) * SPEED_STEPS
     )

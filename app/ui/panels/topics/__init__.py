@@ -1,6 +1,6 @@
 """Topics panel: all topics of the network with their rates, bandwidths and losses.
 
-`columns` has the columns and cells.
+`columns` contains the columns and their cells.
 """
 
 from app.ui.panels.topics.panel import PANEL as PANEL

@@ -23,13 +23,13 @@ def _text_role(topic: Topic, role: str) -> str:
 
 
 def network_without_stats(topic: Topic) -> NetworkKind | None:
-    """Return the topic's network if it does not report statistics, else None."""
+    """Return the kind of a topic's network if this network reports no statistics, else None."""
     kind = find_kind(topic.network)
     return kind if kind is not None and not kind.reports_stats else None
 
 
 def name_cell(topic: Topic) -> Cell:
-    """Return the cell with the name: bold with a chip while new, struck through when gone."""
+    """Return the cell with the name, bold with a chip while the topic is new, struck through when gone."""
     gone = topic.gone_s is not None
     chip = pgettext("topic", "new") if topic.is_new and not gone else None
     return Cell(
@@ -104,9 +104,10 @@ def age_cell(topic: Topic) -> Cell:
 
 
 def loss_cell(topic: Topic) -> Cell:
-    """Return the cell with the loss ratio and, unless it is zero, a warning icon; blank if unknown.
+    """Return the cell with the loss ratio, with a warning icon unless the ratio is zero.
 
-    For networks that report no statistics, a note replaces all values.
+    The cell is empty if the ratio is unknown. If the network reports no statistics at all, the cell
+    contains a note that extends over the other columns.
     """
     kind = network_without_stats(topic)
     if kind is not None and topic.gone_s is None and (topic.rate_hz, topic.age_s, topic.lost) == (None,) * 3:
@@ -316,7 +317,7 @@ FOLDERS: dict[str, FolderColumn] = {
     ),
     "loss": (_folder_loss, lambda _f: None, _folder_loss_tip),
 }  # fmt: skip
-"""Cell, sort key and tooltip of folders, by column. Other columns are blank for folders."""
+"""Cell, sort key and tooltip for folders, by column; the other columns are empty for folders."""
 
 
 BLANK: FolderColumn = (lambda _f: Cell(), lambda _f: None, None)
@@ -349,18 +350,18 @@ def _with_folders(column: Column[Topic], of_folder: FolderColumn) -> Column[Tree
 
 
 COMMON_COLUMNS = tuple(_with_folders(column, FOLDERS.get(column.name, BLANK)) for column in COLUMNS[1:])
-"""Columns that are the same in every panel."""
+"""Columns that do not depend on the arguments of `columns`."""
 
 
 def columns(
     own: Callable[[Topic], bool], several: Callable[[], bool], as_tree: Callable[[], bool]
 ) -> tuple[Column[TreeRow], ...]:
-    """Return the columns.
+    """Return the columns of the table.
 
     Args:
         own: Returns True for Studio's own topics, which are never shown as new.
         several: Returns True to show the network column.
-        as_tree: Returns True to show only the last part of names, below their folders.
+        as_tree: Returns True if topics are shown below folders, with only the last part of their names.
     """
 
     def topic_name_cell(topic: Topic) -> Cell:

@@ -47,18 +47,19 @@ STATS_UPDATE_TICKS = 6  # refreshes at 30 Hz; faster changes would be illegible
 SORT_TICKS = 30
 CHANGING_COLUMNS = frozenset({"rate", "bandwidth", "age", "loss"})
 MAX_CLOSED = 1000
-"""Maximum number of collapsed folders saved in a layout."""
+"""Maximum number of collapsed folders to save in a layout."""
 
 
 class TopicsTable(TableView[TreeRow]):
     """Table in which Left and Right collapse and expand folders.
 
-    `fold_wanted` carries the key of a row, and True to expand or False to collapse it.
+    Signals:
+        fold_wanted: Key of a row, and True to expand it or False to collapse it.
     """
 
     expand_requested = Signal(str, bool)
     shows_folders = False
-    """True while folders are shown. Otherwise Left and Right have their usual meaning."""
+    """True while folders are shown; otherwise Left and Right have their default behaviour."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = self.selected_key() if self.shows_folders and is_plain(event) else None

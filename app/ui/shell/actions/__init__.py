@@ -1,4 +1,4 @@
-"""Commands, their QActions and their configurable keyboard shortcuts.
+"""Commands, their QActions and their keyboard shortcuts.
 
-Independent of the window; `app.ui.shell.commands` implements the commands.
+Independent of the window; the commands are implemented in `app.ui.shell.commands`.
 """

@@ -1,4 +1,4 @@
-"""QActions of all commands, shared by menus, keys and buttons."""
+"""QActions of all commands, shared by menus, shortcuts and buttons."""
 
 from __future__ import annotations
 
@@ -23,16 +23,19 @@ ROLES = {
     "file.quit": QAction.MenuRole.QuitRole,
     "help.about": QAction.MenuRole.AboutRole,
 }
-"""Menu roles of commands that macOS places in the application menu."""
+"""Menu roles of the commands that macOS moves to the application menu."""
 
 T = TypeVar("T")
 
 
 class Actions:
-    """Creates and owns one QAction per command.
+    """Collection of QActions, one per command.
 
     Args:
-        do: Passed to `run` and `why_not` of each command.
+        window: Window in which the shortcuts work.
+        theme: Theme that provides the icons.
+        commands: Commands in the order of the menus.
+        do: Object that is passed to `run` and `disabled_reason` of each command.
     """
 
     def __init__(self, window: QWidget, theme: Theme, commands: Sequence[Command[T]], do: T) -> None:
@@ -72,12 +75,20 @@ class Actions:
         return name in self._actions
 
     def bind(self, button: QAbstractButton, name: str) -> None:
-        """Make a button trigger a command and show the command's keys in its tooltip (see `Shortcuts`)."""
+        """Connect a button to a command.
+
+        A click triggers the command, and the button's tooltip shows the command's shortcut (see
+        `Shortcuts`).
+        """
         name_command(button, name)
         button.clicked.connect(self[name].trigger)
 
     def set_keys(self, keys_of: Callable[[str], Sequence[str]]) -> None:
-        """Set the shortcuts of all commands. The first one of each command is shown in menus."""
+        """Set the shortcuts of all commands.
+
+        Args:
+            keys_of: Returns the shortcuts of a command by name; menus show the first one.
+        """
         for name, action in self._actions.items():
             action.setShortcuts([QKeySequence(key) for key in keys_of(name)])
 
@@ -90,14 +101,14 @@ class Actions:
         return self._why_not[name]()
 
     def disable_unavailable(self) -> None:
-        """Disable the actions of commands that are unavailable. Stop is always enabled."""
+        """Disable the actions of unavailable commands, except for Stop, which is always enabled."""
         for name, action in self._actions.items():
             action.setEnabled(name == STOP or not self.disabled_reason(name))
 
     def enable_all(self) -> None:
-        """Enable all actions, because shortcuts of disabled actions don't work.
+        """Enable all actions, because Qt ignores the shortcuts of disabled actions.
 
-        Each command checks for itself whether it is available.
+        Each command checks its availability when it is run.
         """
         for action in self._actions.values():
             action.setEnabled(True)
@@ -115,13 +126,20 @@ class Actions:
         return True
 
     def select(self, name: str) -> None:
-        """Check the action of a choice in an exclusive group without running its command."""
+        """Check the action of an option in an exclusive group without running its command."""
         self[name].setChecked(True)
 
     def fill(self, bar: QMenuBar, menus: Sequence[str]) -> dict[str, Menu]:
-        """Add menus to a menu bar, with titles in the current language. Return the menus by name.
+        """Add menus with the actions of all commands to a menu bar.
 
-        A mnemonic (Alt with a letter of its title) opens each menu. Names of submenus are like "View/Look".
+        Titles are translated and have mnemonics.
+
+        Args:
+            bar: Menu bar.
+            menus: Names of the menus, which are their English titles, from left to right.
+
+        Returns:
+            The menus by name; names of submenus contain a slash, such as "View/Look".
         """
         titles = with_mnemonics([_(name) for name in menus])
         made = {name: Menu(self._theme, bar, title) for name, title in zip(menus, titles, strict=True)}

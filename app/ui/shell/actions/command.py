@@ -1,4 +1,4 @@
-"""Command of the window, as a row in the command table."""
+"""Command of the window: one row of the command table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class UnknownCommandError(LookupError):
-    """Raised for a command that isn't in the table, which is a programming error."""
+    """Raised for the name of a command that doesn't exist, which is a programming error."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"no command '{name}'; the commands are in app.ui.shell.commands.table")
@@ -26,25 +26,32 @@ def _always_available(_do: object) -> str:
 
 @dataclass(frozen=True)
 class Command(Generic[T]):
-    """Action of the window with a text, keys and a place in a menu.
+    """Action of the window with a text, shortcuts and a place in a menu.
 
-    A command without a menu appears only in the palette (``in_palette``) and in the list of shortcuts
-    (``in_shortcuts``).
+    The texts ``text``, ``menu``, ``tip`` and ``submenu`` are wrapped in `lazy` and translated when they
+    are shown. A command without a menu appears only in the palette and in the list of shortcuts.
 
     Attributes:
         id: Unique name, such as ``file.open``.
-        text, menu, tip, under: Wrapped in `lazy` and translated when shown; `words` is the translated text.
+        text: Text of the menu entry.
         run: Executes the command.
-        why_not: Returns a short phrase if the command is unavailable, else "".
+        menu: Menu that contains the command, or "" for none.
+        keys: Default shortcuts.
+        icon: Name of the icon.
         tip: Tooltip of buttons for the command.
-        under: Submenu of ``menu`` that contains the command.
-        group: Name of the exclusive group that the command belongs to.
-        above: True to insert a separator above the command in the menu.
-        everywhere: True if the key works in all windows.
-        check: True if the action is checkable.
-        mac: Keys on macOS in place of ``keys``. As in Qt, Ctrl stands for Cmd and Meta for Ctrl.
-        number: Value for the placeholder ``number`` of ``text``.
-        shows: Key shown in the menu but handled by the focused widget, as Ctrl+C is by text fields.
+        submenu: Submenu of ``menu`` that contains the command.
+        group: Name of the exclusive group to which the command belongs.
+        separator_above: True to insert a separator above the command in the menu.
+        in_all_windows: True if the shortcuts work in all windows of Studio.
+        is_checkable: True if the action is checkable.
+        mac_keys: Default shortcuts on macOS if they differ from ``keys``. As in Qt, Ctrl stands for Cmd
+            and Meta for Ctrl.
+        in_palette: True to list the command in the palette.
+        in_shortcuts: True to list the command in the sheet of shortcuts.
+        disabled_reason: Returns a short phrase if the command is unavailable, else "".
+        number: Value for the placeholder ``{number}`` in ``text``.
+        displayed_key: Shortcut that the menu only shows, because the focused widget handles it, such as
+            Ctrl+C in text fields.
     """
 
     id: str
@@ -72,7 +79,7 @@ class Command(Generic[T]):
         return _(self.text).format(number=self.number)
 
     def default_keys(self, platform: str = sys.platform) -> tuple[str, ...]:
-        """Return the default keys on a platform. The first one is shown in menus."""
+        """Return the default shortcuts on a platform, a value of `sys.platform`; menus show the first one."""
         return self.mac_keys if platform == "darwin" and self.mac_keys else self.keys
 
 
@@ -80,8 +87,10 @@ class Command(Generic[T]):
 class ArgumentCommand(Generic[T]):
     """Command with an argument, written ``id:argument``, such as ``inspect:/faces``.
 
-    ``run`` gets the text after the colon. It returns False if the argument refers to nothing, and raises
-    ValueError if the argument is invalid.
+    Attributes:
+        id: Name before the colon.
+        run: Executes the command with the text after the colon. Returns False if the object that the
+            argument names doesn't exist; raises ValueError if the argument is invalid.
     """
 
     id: str

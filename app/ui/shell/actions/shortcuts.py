@@ -1,7 +1,7 @@
-"""Keyboard shortcuts: defaults of the command table, changes by the user, and fixed keys.
+"""Keyboard shortcuts: defaults from the command table, changes by the user, and fixed keys.
 
-The settings store only the differences from the table, under "shortcuts". F12 is always Stop. Stop also has a
-second key, Ctrl+. by default (Cmd+. on macOS, where F12 changes the volume).
+The settings store only the differences from the defaults. F12 is always Stop. Stop has a second
+shortcut, Ctrl+. by default (Cmd+. on macOS, where F12 changes the volume).
 """
 
 from __future__ import annotations
@@ -36,7 +36,13 @@ MODIFIERS = (
 
 @dataclass(frozen=True, slots=True)
 class FixedKey:
-    """Keys that can't be changed, with the place where they work and their function (both `lazy`)."""
+    """Keys that can't be changed.
+
+    Attributes:
+        scope: Part of the window in which the keys work, wrapped in `lazy`.
+        label: Function of the keys, wrapped in `lazy`.
+        key: Keys in Qt's portable format, separated by ", ".
+    """
 
     scope: str
     label: str
@@ -111,17 +117,17 @@ FIXED_KEYS: tuple[FixedKey, ...] = (
 
 
 def normal(key: str) -> str:
-    """Convert a key to Qt's portable spelling for comparison and storage; "" if it is invalid."""
+    """Convert a shortcut to Qt's portable text format; return "" if it is invalid."""
     return QKeySequence(key).toString(QKeySequence.SequenceFormat.PortableText)
 
 
 def key_of(pressed: QKeyCombination) -> str:
-    """Return the key of a key press in Qt's portable spelling."""
+    """Return a key combination in Qt's portable text format."""
     return QKeySequence(pressed).toString(QKeySequence.SequenceFormat.PortableText)
 
 
 class Shortcuts(QObject):
-    """Current keys of all commands; emits `changed` when any of them changes."""
+    """Current shortcuts of all commands. `changed` is emitted when any of them changes."""
 
     changed = Signal()
 
@@ -150,7 +156,7 @@ class Shortcuts(QObject):
         return found
 
     def default_keys(self, name: str) -> tuple[str, ...]:
-        """Return the default keys of a command.
+        """Return the default shortcuts of a command.
 
         Raises:
             UnknownCommandError: The name is unknown.
@@ -161,7 +167,7 @@ class Shortcuts(QObject):
         return tuple(normal(key) for key in command.default_keys(self._platform))
 
     def keys_of(self, name: str) -> tuple[str, ...]:
-        """Return the current keys of a command. The first one is shown in menus and tooltips."""
+        """Return the current shortcuts of a command; menus show the first one."""
         keys = self._own.get(name, self.default_keys(name))
         if name == STOP:
             given = {key for other, own in self._own.items() if other != STOP for key in own}
@@ -169,19 +175,19 @@ class Shortcuts(QObject):
         return tuple(key for key in keys if key != STOP_KEY)
 
     def first(self, name: str) -> str:
-        """Return the first key of a command, or ""."""
+        """Return the first shortcut of a command, or "" if it has none."""
         return next(iter(self.keys_of(name)), "")
 
     def is_customised(self, name: str) -> bool:
-        """Return True if the keys of a command differ from the defaults."""
+        """Return True if the shortcuts of a command differ from the defaults."""
         return self.keys_of(name) != self.default_keys(name)
 
     def command_for(self, key: str) -> str:
-        """Return the name of the command that has a key, or ""."""
+        """Return the name of the command to which a shortcut is assigned, or ""."""
         return next((name for name in self.commands if normal(key) in self.keys_of(name)), "")
 
     def rejection_reason(self, name: str, pressed: QKeyCombination) -> str:
-        """Return the reason why a command can't have a key, as a sentence, or "" if it can."""
+        """Return the reason why a shortcut can't be assigned to a command, as a sentence, or "" if it can."""
         key = key_of(pressed)
         if key == STOP_KEY:
             return "" if name == STOP else _("F12 always stops and can't be changed.")
@@ -197,9 +203,13 @@ class Shortcuts(QObject):
         return ""
 
     def assign(self, name: str, key: str) -> None:
-        """Replace the keys of a command by one key, and remove that key from other commands.
+        """Replace the shortcuts of a command by one, which is removed from other commands.
 
-        Stop gets the key in addition to F12.
+        Stop keeps F12 in addition.
+
+        Args:
+            name: Name of the command.
+            key: New shortcut; "" removes all.
         """
         key, holder = normal(key), self.command_for(key)
         if holder and holder != name:
@@ -208,7 +218,7 @@ class Shortcuts(QObject):
         self._save()
 
     def swap(self, name: str, key: str) -> None:
-        """Assign a key to a command, and the command's first key to the previous holder."""
+        """Assign a shortcut to a command, and the command's first shortcut to the one that had it."""
         holder, before = self.command_for(key), self.first(name)
         self._own[name] = (normal(key),)
         if holder and holder != name:
@@ -216,10 +226,10 @@ class Shortcuts(QObject):
         self._save()
 
     def reset(self, name: str) -> None:
-        """Restore the default keys of a command and remove them from commands that have taken them.
+        """Restore the default shortcuts of a command and remove them from other commands.
 
-        Each such command gets its own default key back unless that is taken, so that no command is left
-        without a key after a swap.
+        Another command that loses its only shortcut gets its default back, unless that is assigned to a
+        third command. After a swap, therefore, no command is left without a shortcut.
         """
         self._own.pop(name, None)
         for key in self.default_keys(name):
@@ -230,7 +240,7 @@ class Shortcuts(QObject):
         self._save()
 
     def reset_all(self) -> None:
-        """Restore the default keys of all commands."""
+        """Restore the default shortcuts of all commands."""
         self._own = {}
         self._save()
 
@@ -244,7 +254,7 @@ class Shortcuts(QObject):
         self.changed.emit()
 
     def update_tooltips(self) -> None:
-        """Update the keys in the tooltips of all buttons with the property ``command``."""
+        """Update the shortcuts in the tooltips of all widgets with the property ``command``."""
         for widget in QApplication.allWidgets():
             command = widget.property("command")
             if isinstance(command, str):

@@ -35,7 +35,7 @@ CHIP_TEXTS = {
     "paused": lazy("{robot} is paused"),
     "running": lazy("{robot} running"),
 }
-"""Text of the robot chip for a single robot, by state."""
+"""Templates for the text of the robot chip if one robot is connected, by state."""
 
 
 class AppBar(QWidget):
@@ -132,16 +132,18 @@ class AppBar(QWidget):
         return max(part.minimumSizeHint().width(), part.minimumWidth())
 
     def set_actions(self, actions: Actions) -> None:
-        """Connect the buttons to the actions."""
+        """Connect the buttons to the actions of their commands."""
         actions.bind(self.home, "file.start_page")
         self.back.clicked.connect(actions["start_page.leave"].trigger)
         actions.bind(self.search, "palette.open")
         actions.bind(self.stop, "run.stop")
 
     def show_layout(self, name: str | None, *, back: bool = False) -> None:
-        """Show the name of the current layout as selected; None means the start page.
+        """Select the current layout in the layout switch, or show Stop in its place on the start page.
 
-        On the start page, Stop replaces the switch, and with ``back`` a button returns to the open work.
+        Args:
+            name: Name of the layout, or None for the start page.
+            back: True to show a button on the start page that returns to the previous layout.
         """
         self.home.setVisible(name is not None)
         self.back.setVisible(name is None and back)
@@ -168,9 +170,9 @@ class AppBar(QWidget):
 
 
 class PaletteField(PaintedButton):
-    """Button that opens the command palette, painted as a search field with its key at the right.
+    """Button that opens the command palette, painted as a search field with the shortcut on the right.
 
-    In narrow windows the text is shortened, then hidden so that only icon and key are shown.
+    If there is little space, the text is first shortened and then hidden.
     """
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
@@ -180,14 +182,14 @@ class PaletteField(PaintedButton):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon (and key), or the text too where it fits."""
+        """Hide the shortcut if `bare`, so that the button can be narrower."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def show_key(self, key: str) -> None:
-        """Show the key that opens the palette; "" for none."""
+        """Set the displayed shortcut; "" for none."""
         self._key = shortcut_text(key)
         self.updateGeometry()
         self.update()
@@ -229,7 +231,7 @@ class PaletteField(PaintedButton):
 
 
 def robots_chip(session: Session) -> tuple[str, str]:
-    """Return text and status of the robot chip, such as "Pepper ready", "2 robots" or "No robot"."""
+    """Return the text of the robot chip, such as "Pepper ready" or "2 robots", and its status."""
     links = [link for link in session.fleet.links if link.state != "away"]
     if not links:
         coming = session.starting_robots

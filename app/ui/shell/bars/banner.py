@@ -1,7 +1,7 @@
 """Banner that shows an alert over the free area of the current bar, with a button for the next step.
 
-One alert is shown at a time. The banner takes no space of its own, because that would move the panels under
-the mouse.
+One alert is shown at a time. The banner is an overlay, because a widget in the layout would move the
+panels under the mouse pointer when it appears.
 """
 
 from __future__ import annotations
@@ -35,39 +35,39 @@ STEP_ICONS = {
 }
 NEXT_ICON = "arrow-right"
 CLICK_GUARD_S = 0.5
-"""Time in s for which a banner that appears under the mouse passes clicks on to the widget below."""
+"""Time in s during which a banner that appeared under the mouse pointer ignores clicks."""
 
 
 class AlertLike(Protocol):
-    """Interface of `app.core.alerts.ActiveAlert` as used by the banner."""
+    """Interface of `app.core.alerts.ActiveAlert` that the banner uses."""
 
     @property
     def id(self) -> str:
-        """Unique id."""
+        """Unique id of the alert."""
 
     @property
     def severity(self) -> str:
-        """Severity: "error", "warn" or "info"."""
+        """Severity of the alert: "error", "warn" or "info"."""
 
     @property
     def title(self) -> str:
-        """Description of the problem as one sentence."""
+        """Problem, described in one sentence."""
 
     @property
     def detail(self) -> str:
-        """Explanation of the problem."""
+        """Explanation of the problem, or ""."""
 
     @property
     def button(self) -> str | None:
-        """Text of the button for the next step."""
+        """Text of the button for the next step, or None for no button."""
 
     @property
     def action(self) -> str | None:
-        """Name of the action for the next step."""
+        """Command that the button runs, or None."""
 
 
 class BannerText(QWidget):
-    """Title in bold and detail, wrapped to the available lines; the tooltip has the full text."""
+    """Title in bold and detail of an alert, wrapped to the available lines; the tooltip has the full text."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ class BannerText(QWidget):
         theme.changed.connect(self.update)
 
     def show_text(self, title: str, detail: str) -> None:
-        """Set title and detail."""
+        """Set the title and the detail."""
         if (title, detail) != (self._title, self._detail):
             self._title, self._detail = title, detail
             self.setToolTip(plain.tip(f"{title}\n{detail}".strip()))
@@ -105,9 +105,14 @@ class BannerText(QWidget):
         painter.end()
 
     def lines(self, kind: str) -> tuple[list[list[tuple[str, QFont, str]]], bool]:
-        """Return the lines, each as pieces of text with font and colour.
+        """Break the text into lines for a font.
 
-        The last line is elided when painted. The bool is True if the full text fits.
+        Args:
+            kind: Kind of text, which determines the font.
+
+        Returns:
+            The lines, each as a list of (text, font, colour role), and True if the full text fits. If
+            it doesn't, the last line is elided when it is painted.
         """
         plain_font, bold = self._theme.font(kind), self._theme.font(kind)
         bold.setWeight(QFont.Weight.DemiBold)
@@ -145,7 +150,7 @@ def _fitting_word_count(font: QFont, words: Sequence[str], width: float) -> int:
 
 
 class Banner(AlertBox):
-    """Icon, title, detail, a button for the next step, an optional second button, and a close button."""
+    """Banner with an icon, a title, a detail, up to two buttons, and a close button."""
 
     icon_side, icon_left, left, high, gap = 18, 12, 40, 0, 6
 
@@ -187,7 +192,17 @@ class Banner(AlertBox):
         second: str | None = None,
         icon: str | None = None,
     ) -> None:
-        """Set the contents; ``others`` is the number of further alerts."""
+        """Set the contents of the banner.
+
+        Args:
+            status: Status that determines the colours and, unless `icon` is given, the icon.
+            title: Problem, described in one sentence.
+            detail: Explanation.
+            button: Text of the button for the next step, or None.
+            others: Number of further alerts.
+            second: Text of the second button, or None.
+            icon: Icon of the button in a narrow banner, or None for an arrow.
+        """
         self._icon = self.button.icon_name = icon
         self.set_status(status)
         self.words.show_text(title, detail)
@@ -232,7 +247,10 @@ class Banner(AlertBox):
 
 
 class AlertBanner(QWidget):
-    """Banner over the current bar. Shows the most severe alert that isn't dismissed, until it is resolved."""
+    """Overlay over the current bar that shows the most severe undismissed alert until it is resolved.
+
+    The overlay can also show an offer, which takes precedence over alerts.
+    """
 
     def __init__(
         self,
@@ -267,19 +285,22 @@ class AlertBanner(QWidget):
 
     @property
     def identity(self) -> str:
-        """Identity of the contents, independent of the texts: id of an alert, "offer", or "" if empty."""
+        """Identity of the contents: the id of the alert, "offer", or "" if the banner is empty.
+
+        Independent of the texts, which can change while the same alert is shown.
+        """
         if self._offer is not None:
             return "offer"
         return self._alert.id if self._alert is not None else ""
 
     @property
     def alert(self) -> AlertLike | None:
-        """Alert that is shown, or None."""
+        """Alert that is shown, or None if there is none."""
         return self._alert
 
     @property
     def has_offer(self) -> bool:
-        """True while an offer waits for a choice."""
+        """True while an offer is shown and the user hasn't chosen yet."""
         return self._offer is not None
 
     def offer(
@@ -289,13 +310,20 @@ class AlertBanner(QWidget):
         yes: tuple[str, Callable[[], object]],
         no: tuple[str, Callable[[], object]],
     ) -> None:
-        """Show an offer with two buttons. Alerts are shown after one of them was chosen."""
+        """Show an offer with two buttons; alerts are shown again after the user's choice.
+
+        Args:
+            title: Offer, as a question.
+            detail: Explanation.
+            yes: Text and callback of the first button.
+            no: Text and callback of the second button.
+        """
         self._offer = (yes[1], no[1])
         self.banner.show_text("info", title, detail, yes[0], second=no[0])
         self.show()
 
     def show_alerts(self, alerts: Sequence[AlertLike]) -> None:
-        """Set the alerts that are active and not dismissed, most severe first."""
+        """Set the active alerts that are not dismissed, most severe first."""
         self._alerts = alerts
         if self._offer is not None:
             return
@@ -345,9 +373,10 @@ class AlertBanner(QWidget):
         self.on_more()
 
     def move_to(self, area: QRect) -> None:
-        """Move to an area of the parent. Called on every tick, because the bars change their layout.
+        """Move the banner to an area of its parent.
 
-        A banner that appears under the mouse ignores clicks for `FRESH_S`.
+        Called on every tick, because the bars change their layout. A banner that appears under the
+        mouse pointer ignores clicks for `CLICK_GUARD_S`.
         """
         if not self.identity:
             self._placed = ""

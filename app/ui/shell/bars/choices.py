@@ -1,4 +1,4 @@
-"""Choices for a question as large buttons, operated by mouse, arrow keys and number keys."""
+"""Answer choices of a question as large buttons, operated by mouse, arrow keys and number keys."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class ChoiceButton(PaintedButton):
         return PADDING + (paint.key_width(self._theme, self.key) + 10 if self.key else 0)
 
     def one_line_width(self) -> int:
-        """Return the width in px with the text on one line."""
+        """Return the width in px that the button needs to show its text on one line."""
         return math.ceil(self._text_left() + paint.width_of(self._font(), self.text()) + PADDING) + 1
 
     def height_for(self, width: int) -> int:
-        """Return the height in px that is needed for a width."""
+        """Return the height in px that the button needs at a width in px."""
         room = QRectF(0, 0, max(1.0, width - self._text_left() - PADDING), 1e6)
         needed = QFontMetricsF(self._font()).boundingRect(room, _WRAP_FLAGS, self._shown).height()
         return max(round(self._theme.scaled(MIN_HEIGHT)), math.ceil(needed) + 2 * PADDING)
@@ -54,9 +54,9 @@ class ChoiceButton(PaintedButton):
         return QSize(wide, self.height_for(wide))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Handle Enter and Space.
+        """Handle Enter and Space, and pass all other keys on to `Choices`.
 
-        Other keys, including those that Qt's buttons handle, are left to `Choices`.
+        Qt's buttons would handle the arrow keys themselves.
         """
         if is_activation_key(event.key()):
             super().keyPressEvent(event)
@@ -81,11 +81,15 @@ class ChoiceButton(PaintedButton):
 
 
 class Choices(QWidget):
-    """Buttons for the choices of one question, in as many columns as fit with each text on one line."""
+    """Grid of buttons for the choices of a question.
+
+    There are as many columns as fit with each text on one line. `chosen` is emitted with the text of
+    the activated button.
+    """
 
     selected = Signal(str)
     focus_moved = Signal(QWidget)
-    """Emitted when an arrow key moved the focus to a button, which may have to be scrolled into view."""
+    """Emitted with the button that got the focus by an arrow key, so that it can be scrolled into view."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -96,7 +100,7 @@ class Choices(QWidget):
         self.setSizePolicy(policy)
 
     def show_choices(self, choices: Sequence[str]) -> None:
-        """Replace the choices."""
+        """Replace the buttons by one for each choice."""
         for button in self.buttons:
             button.hide()
             button.deleteLater()
@@ -111,23 +115,26 @@ class Choices(QWidget):
         self.updateGeometry()
 
     def take_focus(self) -> None:
-        """Focus the first choice."""
+        """Set the focus to the first choice."""
         if self.buttons:
             self.buttons[0].setFocus(Qt.FocusReason.PopupFocusReason)
 
     def set_paused(self, *, held: bool) -> None:
-        """Disable or enable all choices."""
+        """Disable all choices if `held`, else enable them."""
         for button in self.buttons:
             button.setEnabled(not held)
 
     def columns(self, width: int) -> int:
-        """Return the number of columns for a width in px."""
+        """Return the number of columns that fit into a width in px."""
         widest = max((each.one_line_width() for each in self.buttons), default=1)
         fitting = (width - GAP) // (widest + GAP)
         return max(1, min(MAX_COLUMNS, len(self.buttons), fitting))
 
     def button_rects(self, width: int) -> list[QRect]:
-        """Return the rectangles of the buttons for a width. The buttons of a row have equal heights."""
+        """Return the rectangles of the buttons for a width in px.
+
+        Buttons of the same row have equal heights.
+        """
         columns = self.columns(width)
         wide = (width - GAP) // columns - GAP
         found: list[QRect] = []
@@ -162,7 +169,7 @@ class Choices(QWidget):
             button.setGeometry(place)
 
     def handle_key(self, event: QKeyEvent) -> bool:
-        """Move the focus by an arrow key, or choose by a number key. Return True if the key was handled."""
+        """Move the focus on an arrow key, or activate a choice on a number key; return True if handled."""
         key = event.key()
         number = key - Qt.Key.Key_1
         if not is_plain(event) or not self.buttons or not self.buttons[0].isEnabled():

@@ -33,7 +33,7 @@ RECORDING_ROOM_PX = 1240  # the same with the button back to the live network
 
 
 class RecordButton(Button):
-    """Button that starts a recording, and shows the length and size of the current one."""
+    """Button that starts a recording and shows the duration and size of the current recording."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, _("Record"), "circle-dot", size="small")
@@ -41,7 +41,7 @@ class RecordButton(Button):
         self._is_on = self._is_bare = False
 
     def set_icon_only(self, bare: bool) -> None:
-        """Show only the dot if `bare`, else the text too."""
+        """Show only the icon if `bare`, else the icon and the text."""
         if bare != self._is_bare:
             self._is_bare = bare
             self.updateGeometry()
@@ -51,7 +51,7 @@ class RecordButton(Button):
         return "" if self._is_bare else self.text()
 
     def show_recording(self, recordings: SessionRecordings) -> None:
-        """Show the state of the current recording."""
+        """Show the duration and size of the current recording, or "Record" if there is none."""
         self._is_on = recordings.is_recording
         if not self._is_on:
             self.set_label(_("Record"))
@@ -79,7 +79,11 @@ LIVE_ICON, RECORDING_ICON = "radio-tower", "history"
 
 
 class SourceSwitch(MenuButton):
-    """Menu button to choose the source. ``back`` is visible while a recording is shown."""
+    """Menu button to switch between the live network and a recording.
+
+    Attributes:
+        back: Button that returns to the live network, shown while a recording is the source.
+    """
 
     def __init__(self, theme: Theme, session: Session, actions: Actions) -> None:
         super().__init__(theme, _("Live network"), LIVE_ICON, size="small")
@@ -97,7 +101,7 @@ class SourceSwitch(MenuButton):
         return self._is_recording
 
     def refresh(self) -> None:
-        """Show the current source."""
+        """Update the text and icon to the current source."""
         replay = self._session.replay
         self._is_recording = replay is not None
         if replay is None:
@@ -120,7 +124,7 @@ class SourceSwitch(MenuButton):
 
 
 class DeveloperTools(QObject):
-    """Adds the tools to the tool bar and updates them in `follow`."""
+    """Controller that adds the tools to the tool bar and updates them in `on_half_tick`."""
 
     def __init__(self, shell: Shell, bar: ToolBar, commands: Commands, session: Session) -> None:
         super().__init__(bar)
@@ -189,7 +193,7 @@ class DeveloperTools(QObject):
         paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))
 
     def on_half_tick(self) -> None:
-        """Refresh the tools every few half ticks while the bar is visible."""
+        """Refresh the tools at regular intervals while the bar is visible; called on every half tick."""
         self._ticks += 1
         if self._ticks % REFRESH_HALF_TICKS == 0 and self._bar.isVisible():
             self.refresh()

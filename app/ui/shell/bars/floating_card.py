@@ -1,4 +1,4 @@
-"""Card that floats over a window without dimming it, and keeps its place when either is resized."""
+"""Card that floats over a window without dimming it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ from PySide6.QtWidgets import QWidget
 
 
 class FloatingCard(QWidget):
-    """Card that is initially hidden; subclasses position it in `place`."""
+    """Base class of cards, which are repositioned when the window or their contents change size.
+
+    A card is hidden at first. Subclasses implement `place`.
+    """
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)

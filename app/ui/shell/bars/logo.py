@@ -1,4 +1,4 @@
-"""Logo, an N between two amber joints on the accent colour, painted at any size."""
+"""Logo of Studio, painted at any size: an N between two amber joints on the accent colour."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def paint_logo(painter: QPainter, rect: QRectF, theme: Theme) -> None:
 
 
 class Logo(QWidget):
-    """Logo of the app bar."""
+    """Widget that shows the logo in the app bar."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

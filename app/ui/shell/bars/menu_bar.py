@@ -12,10 +12,11 @@ from app.ui.widgets.letters import strip_mnemonic
 
 
 class _Alt(QObject):
-    """Event filter that reports whether Alt is held.
+    """Event filter that emits `held` when Alt is pressed or released.
 
-    A separate object is needed: while Alt is held, Qt makes a menu bar filter the events of the whole
-    application, and events of the web view's internal objects must not reach Python.
+    This is an object separate from the menu bar, because Qt installs a menu bar as an event filter of
+    the whole application while Alt is held, and events of the web view's internal objects must not
+    reach Python.
     """
 
     held = Signal(bool)

@@ -1,4 +1,4 @@
-"""Card for questions of a running behaviour. It takes the focus and never covers Stop."""
+"""Card for questions of a running behaviour. The card takes the focus and never covers Stop."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ MAX_ANSWER_LENGTH = 10_000
 
 
 class QuestionCard(FloatingCard):
-    """Card with a question and a text field or choices. Enter answers; Esc closes it without an answer.
+    """Card with a question, and a text field or choices for the answer.
 
-    The card is disabled while the behaviour is paused.
+    Enter submits the answer; Esc closes the card without an answer. The card is disabled while the
+    behaviour is paused.
     """
 
     def __init__(self, theme: Theme, window: QWidget, answer: Callable[[AskedQuestion, str], object]) -> None:
@@ -76,9 +77,11 @@ class QuestionCard(FloatingCard):
         self.setGraphicsEffect(shadow)
 
     def show_question(self, question: AskedQuestion | None, *, held: bool) -> None:
-        """Show a question, or hide the card for None. Called on every tick.
+        """Show a question, or hide the card; called on every tick.
 
-        ``held`` disables the card, while the behaviour is paused.
+        Args:
+            question: Question, or None to hide the card.
+            held: True to disable the card while the behaviour is paused.
         """
         if question != self._question:
             self._question = question
@@ -112,7 +115,7 @@ class QuestionCard(FloatingCard):
         paint.announce(self, ", ".join((words, *question.choices)))
 
     def take_focus(self) -> None:
-        """Take the focus if there is a question and the card is enabled."""
+        """Set the focus to the input if there is a question and the card is enabled."""
         if self._question is None or self._held:
             return
         if self.choices.buttons:
@@ -146,7 +149,7 @@ class QuestionCard(FloatingCard):
         self.button.setEnabled(not held)
 
     def place(self) -> None:
-        """Move to the centre of the lower part of the window, or higher if Stop would be covered."""
+        """Move the card to the lower part of the window, centred, but higher if it would cover Stop."""
         window = self.parentWidget()
         layout = self.layout()
         if window is None or layout is None:

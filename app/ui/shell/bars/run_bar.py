@@ -1,4 +1,7 @@
-"""Run bar of the Behaviour layout and tool bar of the Developer layout, with Run, Pause, Step and Stop."""
+"""Run bar of the Behaviour layout and tool bar of the Developer layout.
+
+Both contain Run, Pause, Step and Stop.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,7 @@ MARKS = {
 
 
 class Mark(QWidget):
-    """Mark of the run state: ring (idle), amber dot (running), pause, crossed circle (action needed)."""
+    """Icon of the run state: ring (idle), amber dot (running), pause sign, or cross (action required)."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -52,11 +55,11 @@ class Mark(QWidget):
 
     @property
     def state(self) -> str:
-        """Name of one of the six states of Run and Stop."""
+        """Run state as in `RunView.state`."""
         return self._state
 
     def show_state(self, state: str) -> None:
-        """Show the mark of one of the six states of Run and Stop."""
+        """Show the icon of a run state."""
         if state != self._state:
             self._state = state
             self.update()
@@ -88,7 +91,7 @@ class Mark(QWidget):
 
 
 class StateText(QWidget):
-    """Text of the current state, with a title and a detail."""
+    """Text that describes the run state, with a title and a detail."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -99,7 +102,10 @@ class StateText(QWidget):
         theme.changed.connect(self.updateGeometry)
 
     def limit_width(self, width: float | None) -> None:
-        """Limit the text to a width, because an alert covers the rest. None removes the limit."""
+        """Limit the painted text to a width in px; None removes the limit.
+
+        A limit is set while an alert covers the rest of the widget.
+        """
         if width != self._shared_px:
             self._shared_px = width
             self.update()
@@ -110,7 +116,13 @@ class StateText(QWidget):
         return self._theme.status("error").colour if self._is_alarm else "text"
 
     def show_text(self, title: str, detail: str, *, is_alarm: bool = False) -> None:
-        """Set title and detail. With ``is_alarm`` the title is red because the user has to act."""
+        """Set the title and the detail.
+
+        Args:
+            title: First line.
+            detail: Second line, or "".
+            is_alarm: True if the user has to act; the title is then red.
+        """
         if (title, detail, is_alarm) != (self._title, self._detail, self._is_alarm):
             self._title, self._detail, self._is_alarm = title, detail, is_alarm
             said = [each for each in (title, detail) if each]
@@ -124,7 +136,7 @@ class StateText(QWidget):
         return font
 
     def full_width(self) -> float:
-        """Return the width of the longer line in px."""
+        """Return the width in px of the longer line."""
         lines = self.lines(float(QWIDGETSIZE_MAX))
         return max(paint.width_of(font, text) for text, font, _role in lines)
 
@@ -149,10 +161,10 @@ class StateText(QWidget):
         painter.end()
 
     def lines(self, width: float) -> list[tuple[str, QFont, str]]:
-        """Return the lines to paint, with font and colour; the last one is elided if it is too long.
+        """Return the lines to paint, each as (text, font, colour role).
 
-        A detail that is too long for one line is split into two lines in a small font if the bar is high
-        enough.
+        The last line is elided if it is too long. If the bar is high enough, a long detail is split
+        into two lines in a small font.
         """
         bold, plain, small = self._title_font(), self._theme.font("body"), self._theme.font("small")
         title, quiet = [(self._title, bold, self.colour_role)], "textSecondary"
@@ -165,7 +177,10 @@ class StateText(QWidget):
 
 
 class StopResult(QWidget):
-    """Result of the last Stop: confirmed, pending or unanswered; during a run, a reminder of it."""
+    """Result of the last Stop: confirmed, pending or unanswered.
+
+    While a behaviour runs, a less prominent style shows the result of the previous Stop.
+    """
 
     def __init__(self, theme: Theme, *, compact: bool = False) -> None:
         super().__init__()
@@ -178,12 +193,12 @@ class StopResult(QWidget):
 
     @property
     def text(self) -> str:
-        """Text that is shown."""
+        """Current text, or "" if there is no result."""
         return self._text
 
     @property
     def appearance(self) -> str:
-        """Style: "ok", "off", "error", "counting", "reminder" or ""."""
+        """Style of the widget: "ok", "off", "error", "counting", "reminder", or "" if there is no result."""
         return self._look
 
     @property
@@ -192,7 +207,7 @@ class StopResult(QWidget):
         return self._status
 
     def show_view(self, view: RunView) -> None:
-        """Show the result of the last Stop."""
+        """Show the result of the last Stop, or hide the widget if there is none."""
         look, text = "", ""
         if view.state == "unanswered":
             look, text = "error", (view.compact if self._compact else view.result or "")
@@ -274,7 +289,7 @@ class StopResult(QWidget):
 
 
 class Bar(QWidget):
-    """Surface below the app bar with a separator line at its bottom."""
+    """Base class of the bars below the app bar, with a separator line at the bottom."""
 
     def __init__(self, theme: Theme, height: int) -> None:
         super().__init__()
@@ -291,13 +306,19 @@ class Bar(QWidget):
 
 
 def free_area(bar: Bar, left: int, beside: Iterable[QWidget]) -> QRect:
-    """Return the free area of a bar from ``left`` to the first of the widgets, above the separator."""
+    """Return the free area of a bar, for an alert.
+
+    Args:
+        bar: Bar.
+        left: Left edge of the area in px.
+        beside: Widgets that limit the area on the right.
+    """
     right = min((each.x() for each in beside), default=bar.width()) - GAP
     return QRect(left, BANNER_EDGE, max(0, right - left), bar.height() - 1 - 2 * BANNER_EDGE)
 
 
 class RunBar(Bar):
-    """Run bar, 60 px high: three large buttons, the current state, the result of the last Stop, and Stop."""
+    """Run bar with three large buttons, the run state, the result of the last Stop, and Stop; 60 px high."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("runBar"))
@@ -347,9 +368,10 @@ class RunBar(Bar):
         self._paces.addActions([actions[name] for name in PACES])
 
     def banner_area(self) -> QRect:
-        """Return the area for an alert, next to the state, which stays readable while the user has to act.
+        """Return the area for an alert, to the right of the run state.
 
-        The area may include the reminder of the last Stop, but no buttons and no result of Stop.
+        The alert may cover the result of a previous Stop, but no buttons and no new result. If the user
+        has to act, the text of the run state stays fully visible.
         """
         left = self.sentence.x() + self._state_text_px() + GAP
         beside: list[QWidget] = [
@@ -360,7 +382,7 @@ class RunBar(Bar):
         return free_area(self, round(left), beside)
 
     def reserve_banner_room(self, *, has_banner: bool) -> None:
-        """Leave room for an alert next to the state if there is a banner."""
+        """Shorten the text of the run state if there is a banner, else restore its width."""
         self.sentence.limit_width(self._state_text_px() if has_banner else None)
 
     def _state_text_px(self) -> float:
@@ -398,7 +420,7 @@ class RunBar(Bar):
         )
 
     def show_view(self, view: RunView) -> None:
-        """Show one of the six states. During a run, Restart replaces Run; while paused, Run is Resume."""
+        """Show a run state. While running, Run is replaced by Restart; while paused, by Resume."""
         restarts = view.can_restart and not view.can_run
         self.run.set_label(_(view.run_label), "rotate-ccw" if view.run_label == RESTART else "play")
         self.run.set_filled(view.can_run or (restarts and view.is_edited))
@@ -419,7 +441,7 @@ class RunBar(Bar):
 
 
 class ToolBar(Bar):
-    """Tool bar, 40 px high, which shows the run state at its right end."""
+    """Tool bar, 40 px high, with tools on the left and the run state on the right."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme, theme.size("toolBar"))
@@ -456,7 +478,10 @@ class ToolBar(Bar):
         row.addWidget(self.stop)
 
     def banner_area(self) -> QRect:
-        """Return the area for an alert: between tools and state, in a narrow bar also over the state."""
+        """Return the area for an alert, between the tools and the run state.
+
+        In a narrow bar, the area includes the run state.
+        """
         shown = [each for each in self._tools() if not each.isHidden()]
         left = max((each.geometry().right() + 1 for each in shown), default=0) + GAP
         buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
@@ -470,15 +495,20 @@ class ToolBar(Bar):
         return [tool for item in items if item is not None and (tool := item.widget()) is not None]
 
     def set_actions(self, actions: Actions) -> None:
-        """Connect the buttons to the actions."""
+        """Connect the buttons to the actions of their commands."""
         bind_run_buttons(self, actions)
 
     def add_tool(self, tool: QWidget, place: int = -1) -> None:
-        """Insert a button at the left end, after the existing ones unless `place` is given."""
+        """Insert a tool on the left of the bar.
+
+        Args:
+            tool: Widget to insert.
+            place: Position among the tools; -1 appends the tool.
+        """
         self.tools.insertWidget(place, tool)
 
     def show_view(self, view: RunView) -> None:
-        """Show one of the six states in short form."""
+        """Show a run state in short form."""
         self.result.show_view(view)
         spoken = bool(self.result.text) and view.state in {"proven", "unanswered"}
         self.mark.show_state(view.state)
@@ -496,7 +526,7 @@ class ToolBar(Bar):
 
 
 def bind_run_buttons(bar: RunBar | ToolBar, actions: Actions) -> None:
-    """Connect the run buttons of a bar to their commands."""
+    """Connect the run buttons of a bar to the actions of their commands."""
     actions.bind(bar.run, "run.run")
     actions.bind(bar.restart, "run.restart")
     actions.bind(bar.pause, "run.pause")

@@ -1,4 +1,4 @@
-"""Status bar with short texts about the session. Unknown facts are left out."""
+"""Status bar with short texts about the session."""
 
 from __future__ import annotations
 
@@ -33,7 +33,13 @@ def _worst_status(found: Iterable[str]) -> tuple[str, str]:
 
 
 class StatusFacts:
-    """Formats the session's state as short texts with icons. Methods return an empty fact to show nothing."""
+    """Formatter of the session's state for the status bar.
+
+    Each method returns a `Fact` (icon, text, status), which is empty if there is nothing to show.
+
+    Attributes:
+        window_ms: Duration in ms of the last refresh of the window.
+    """
 
     def __init__(self, session: Session, clock: Callable[[float], time.struct_time] = time.localtime) -> None:
         self._session = session
@@ -42,7 +48,11 @@ class StatusFacts:
         self._web_host = self._web_network = ""
 
     def alerts(self, *, for_developers: bool = False) -> Fact:
-        """Return the number of alerts."""
+        """Return a `Fact` with the number of alerts.
+
+        Args:
+            for_developers: True to count alerts that are meant for developers too.
+        """
         alerts = self._session.alerts.errors_and_warnings(for_developers=for_developers)
         if not alerts:
             return NO_FACT
@@ -51,7 +61,7 @@ class StatusFacts:
         return icon, words.format(count=len(alerts)), status
 
     def health(self) -> Fact:
-        """Return the number of alerts or problems in Health, or that the robots are well.
+        """Return a `Fact` with the number of alerts, else with the health of the robots.
 
         A robot that hasn't reported its state yet is only described as "connected".
         """
@@ -88,7 +98,7 @@ class StatusFacts:
         return "circle-dashed", words.format(robot=name, count=count), "off"
 
     def save_state(self) -> Fact:
-        """Return when the behaviour was saved, or that it has unsaved changes and if they are backed up."""
+        """Return a `Fact` with the time of the last save or, for unsaved changes, the state of the backup."""
         document = self._session.document
         if document.dirty and document.journal_error is not None:
             return "circle-x", _("Not saved · no backup"), "error"
@@ -101,28 +111,31 @@ class StatusFacts:
         return "save", _("Saved {clock}").format(clock=f"{then.tm_hour}:{then.tm_min:02d}"), None
 
     def topics(self) -> Fact:
-        """Return the number of active topics."""
+        """Return a `Fact` with the number of active topics."""
         live = sum(1 for topic in self._session.live.topics if topic.gone_s is None)
         return "", ngettext("{count} active topic", "{count} active topics", live).format(count=live), None
 
     def remote_access(self) -> Fact:
-        """Return which computers can connect to this master."""
+        """Return a `Fact` about the computers that can connect to this master."""
         return access_status(self._session.remote_access)
 
     def remote_access_plain(self) -> Fact:
-        """Return the same as `remote_access`, without an icon for the default setting."""
+        """Return the fact of `remote_access`, but without an icon for the default setting."""
         icon, words, status = self.remote_access()
         return ("" if status is None else icon), words, status
 
     def web_pages(self) -> Fact:
-        """Return the network of the web server and the number of connected pages; empty while it is off."""
+        """Return a `Fact` with the network of the web server and the number of connected pages.
+
+        The fact is empty while the server is off.
+        """
         web = self._session.web_pages
         if web.host != self._web_host:  # resolving the computer's addresses is slow
             self._web_host, self._web_network = web.host, host_text(web)
         return web_status(web, self._web_network)
 
     def master(self) -> Fact:
-        """Return the state and address of the master."""
+        """Return a `Fact` with the state and the address of the master."""
         master = self._session.master
         if master.kind == "connected":
             return "circle-check", _("Master {address}").format(address=master.address), "ok"
@@ -132,7 +145,7 @@ class StatusFacts:
         return "circle-dashed", _("No master"), "off"
 
     def traffic(self) -> Fact:
-        """Return the numbers of nodes and topics and the message rate."""
+        """Return a `Fact` with the numbers of nodes and topics, and the message rate."""
         graph = self._session.live.graph
         if graph is None:
             return NO_FACT
@@ -147,7 +160,7 @@ class StatusFacts:
         return "", ", ".join(facts), None
 
     def lost(self) -> Fact:
-        """Return the number of messages lost in 30 s; empty for 0."""
+        """Return a `Fact` with the number of messages lost during the last 30 s; empty for 0."""
         lost = self._session.traffic.lost_30s
         if not lost:
             return NO_FACT
@@ -155,7 +168,7 @@ class StatusFacts:
         return "triangle-alert", words.format(count=group_digits(lost)), "warn"
 
     def recording(self) -> Fact:
-        """Return length, size and losses of the current recording; empty without one."""
+        """Return a `Fact` with duration, size and losses of the current recording; empty if there is none."""
         recordings = self._session.recordings
         state = recordings.client.state
         if not recordings.is_recording:
@@ -172,7 +185,7 @@ class StatusFacts:
         return ("triangle-alert", words, "warn") if state.unwritten else ("circle-dot", words, "recording")
 
     def arming(self) -> Fact:
-        """Return the remaining arming time and the topics being sent; empty while disarmed."""
+        """Return a `Fact` with the remaining arming time and the topics being sent; empty while disarmed."""
         acting = self._session.acting
         if not acting.arming.is_on:
             return NO_FACT
@@ -197,14 +210,14 @@ class StatusFacts:
         return "triangle-alert", words, "warn"
 
     def flight_recorder(self) -> Fact:
-        """Return the number of seconds in the flight recorder; empty while it is off."""
+        """Return a `Fact` with the duration stored in the flight recorder; empty while it is off."""
         seconds = self._session.recordings.client.state.ring_s
         if seconds is None:
             return NO_FACT
         return "history", _("last {count} s available").format(count=round(seconds)), None
 
     def replayed_recording(self) -> tuple[Fact, ...]:
-        """Return name, time range, contents and losses of the recording that is shown."""
+        """Return facts about the opened recording: name, time range, contents and losses."""
         replay = self._session.replay
         if replay is None or replay.opened is None:
             return ()
@@ -227,11 +240,14 @@ class StatusFacts:
         )
 
     def live_network_note(self) -> Fact:
-        """Return the note that robots, Stop and alarms still use the live network."""
+        """Return a `Fact` that the live network keeps running while a recording is shown."""
         return "radio-tower", _("The live network keeps running"), None
 
     def displayed_messages(self) -> Fact:
-        """Return the number of displayed messages of watched topics; empty if all were displayed."""
+        """Return a `Fact` with the number of messages of watched topics that were displayed.
+
+        The fact is empty if all messages were displayed.
+        """
         traffic = self._session.traffic
         if traffic.shown_30s >= traffic.sent_30s:
             return NO_FACT
@@ -243,13 +259,16 @@ class StatusFacts:
         )
 
     def window(self) -> Fact:
-        """Return the duration of the last refresh of the window."""
+        """Return a `Fact` with the duration of the last refresh of the window."""
         spent = f"{round(self.window_ms):>2}".replace(" ", FIGURE_SPACE)  # equal width for 9 and 10
         return "", _("Refresh {spent} ms of {most} ms").format(spent=spent, most=TICK_MS), None
 
 
 class StatusBar(QWidget):
-    """Status bar, 26 px high, with facts at the left and right. Clicking some of them runs a command."""
+    """Status bar, 26 px high, with facts on the left and right.
+
+    `pressed` is emitted with the command of a clicked fact; only some facts have one.
+    """
 
     pressed = Signal(str)
 
@@ -284,7 +303,12 @@ class StatusBar(QWidget):
             items.append((item, line))
 
     def show_facts(self, left: Sequence[Fact], right: Sequence[Fact]) -> None:
-        """Show the facts that have a text."""
+        """Show the given facts; empty ones are left out.
+
+        Args:
+            left: Facts on the left, from left to right.
+            right: Facts on the right, from left to right.
+        """
         for facts, items, at_right in ((left, self._left, False), (right, self._right, True)):
             shown = [fact for fact in facts if fact[1]]
             self._add_items(items, len(shown), right=at_right)
@@ -299,11 +323,11 @@ class StatusBar(QWidget):
                 paint.show_when(line, bool(fact[1]) and (at_right or index < len(shown) - 1))
 
     def items(self) -> list[StatusItem]:
-        """Return the items that show a fact, from left to right."""
+        """Return the visible items, from left to right."""
         return [item for item, _line in (*self._left, *self._right) if item.text]
 
     def texts(self) -> list[str]:
-        """Return the texts of all facts, from left to right."""
+        """Return the texts of the visible items, from left to right."""
         return [item.text for item in self.items()]
 
     def paintEvent(self, _event: QPaintEvent) -> None:

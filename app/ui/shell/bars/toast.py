@@ -1,4 +1,4 @@
-"""Toast that confirms an action of the user for six seconds at the bottom right. Never used for errors."""
+"""Toast at the bottom right that confirms an action of the user for six seconds. Not used for errors."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Toast(FloatingCard):
 
     @property
     def text(self) -> str:
-        """Sentence that was shown last."""
+        """Sentence of the current or last toast."""
         return self._words.text()
 
     def show_toast(
@@ -58,13 +58,13 @@ class Toast(FloatingCard):
         *,
         until: Callable[[], bool] | None = None,
     ) -> None:
-        """Show a sentence until ``until`` returns True or the time is over.
+        """Show a sentence for some seconds, with an optional button.
 
         Args:
             words: Sentence.
-            button: Text of the button, which undoes or follows up the action.
-            run: Action of the button.
-            until: Returns True when the sentence is outdated.
+            button: Text of the button, such as "Undo"; "" for no button.
+            run: Callback of the button.
+            until: Returns True when the sentence is outdated, which closes the toast early.
         """
         self._until = until
         self._words.setText(words)
@@ -79,13 +79,13 @@ class Toast(FloatingCard):
         self._timer.start(self._theme.duration("toastShown"))
 
     def refresh(self) -> None:
-        """Hide the toast once `until` returns True; called on every tick."""
+        """Close the toast if its `until` returns True; called on every tick."""
         if self._until is not None and self._until():
             self._until = None
             self.hide()
 
     def place(self) -> None:
-        """Move to the bottom right of the window, or left of a sheet that is docked there if it fits."""
+        """Move the toast to the bottom right of the window, or to the left of a sheet docked there."""
         window = self.parentWidget()
         if window is not None:
             self._fit(window.width() - 2 * MARGIN)

@@ -1,4 +1,4 @@
-"""Commands for manual operation: publish a message, call a service."""
+"""Commands to publish messages and call services manually."""
 
 from __future__ import annotations
 
@@ -11,27 +11,41 @@ from nep.i18n import _
 
 @runtime_checkable
 class SupportsActing(Protocol):
-    """Panel that sends messages or calls services."""
+    """Interface of a panel that publishes messages or calls services."""
 
     def open_for(self, name: str) -> None:
-        """Select a topic or service; "" selects none."""
+        """Select a topic or service by name; "" selects none."""
 
 
 class ActingCommands:
-    """Opens the panels for manual sending. Nothing is sent before the user arms them."""
+    """Handlers of the commands that open the panels Publish and Services.
+
+    Nothing is sent before the user arms the panel.
+    """
 
     def __init__(self, shell: Shell) -> None:
         self._shell = shell
 
     def publish(self, key: str = "") -> bool:
-        """Open a new message for the topic `key`, or without a topic for ""."""
+        """Open a new message in the Publish panel.
+
+        Args:
+            key: Key of the topic, or "" for a message without a topic.
+
+        Returns:
+            False if the topic is in another network, to which Studio can't publish.
+        """
         if split_key(key)[0]:
             self._shell.show_toast(_("Only topics of Studio's own network can be published to"))
             return False
         return self._open("publish", key)
 
     def call(self, service: str) -> bool:
-        """Show the request form of a service, or all services for ""."""
+        """Show the request form of a service in the Services panel, or all services for "".
+
+        Returns:
+            False if the panel can't be opened.
+        """
         return self._open("services", service)
 
     def _open(self, panel: str, name: str) -> bool:

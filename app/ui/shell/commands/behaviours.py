@@ -34,14 +34,14 @@ OfferButton = tuple[str, Callable[[], object]]
 
 
 class OfferChoice(Protocol):
-    """Function that shows an offer with two buttons, each with a text and a callback."""
+    """Function that shows an offer with two buttons, given as (text, callback)."""
 
     def __call__(self, title: str, detail: str, yes: OfferButton, no: OfferButton) -> None: ...
 
 
 @runtime_checkable
 class SupportsUndo(Protocol):
-    """Panel with an undo stack."""
+    """Interface of a panel with an undo stack."""
 
     def undo(self) -> None:
         """Undo the last edit."""
@@ -52,46 +52,59 @@ class SupportsUndo(Protocol):
 
 @runtime_checkable
 class SupportsBlockEdits(Protocol):
-    """Panel with blocks that can be copied and pasted."""
+    """Interface of a panel with blocks that can be copied and pasted."""
 
     def edit_blocks(self, what: str) -> None:
-        """Run "copy", "cut", "paste" or "duplicate", unless the page handles the keys itself."""
+        """Apply an edit to the selected blocks, unless the page handles the keys itself.
+
+        Args:
+            what: "copy", "cut", "paste" or "duplicate".
+        """
 
 
 @runtime_checkable
 class SupportsShowBlock(Protocol):
-    """Panel that can scroll to a block."""
+    """Interface of a panel that can scroll to a block."""
 
     def show_block(self, block: str) -> None:
-        """Scroll to a block by its id."""
+        """Scroll to the block with this id."""
 
 
 @runtime_checkable
 class SupportsFindBlocks(Protocol):
-    """Panel that can search for blocks."""
+    """Interface of a panel that can search for blocks."""
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Open the search in the behaviour's blocks, or in the toolbox if ``to_add``."""
+        """Open the search for blocks.
+
+        Args:
+            to_add: True to search the toolbox, False to search the behaviour.
+        """
 
 
 @runtime_checkable
 class SupportsPointAt(Protocol):
-    """Panel that can highlight a block in the toolbox."""
+    """Interface of a panel that can highlight a block in the toolbox."""
 
     def point_at(self, block: str) -> None:
-        """Highlight the block of this type in the toolbox; "" removes the highlight."""
+        """Highlight a block in the toolbox by its type; "" removes the highlight."""
 
 
 @dataclass(frozen=True, slots=True)
 class TabPosition:
-    """New position, counted from 0, for the tab of a document."""
+    """New position of a tab, as argument of a command.
+
+    Attributes:
+        key: Key of the document.
+        position: Position, counted from 0.
+    """
 
     key: str
     position: int
 
     @classmethod
     def parse(cls, text: str) -> TabPosition:
-        """Parse ``KEY:2``.
+        """Parse a text such as ``KEY:2``.
 
         Raises:
             ValueError: The position isn't a number.
@@ -101,7 +114,7 @@ class TabPosition:
 
 
 def read_stack(text: str) -> Stack:
-    """Parse the script that the editor's page sends as JSON.
+    """Parse a script that the block editor's page has sent as JSON.
 
     Raises:
         ValueError: The text isn't a valid script.
@@ -111,24 +124,29 @@ def read_stack(text: str) -> Stack:
 
 @dataclass(frozen=True, slots=True)
 class TabName:
-    """New name for the tab of a document."""
+    """New name of a tab, as argument of a command.
+
+    Attributes:
+        key: Key of the document.
+        name: New name.
+    """
 
     key: str
     name: str
 
     @classmethod
     def parse(cls, text: str) -> TabName:
-        """Parse ``KEY:NAME``."""
+        """Parse a text such as ``KEY:NAME``."""
         key, _colon, name = text.partition(":")
         return cls(key, name)
 
 
 @runtime_checkable
 class SupportsRename(Protocol):
-    """Panel in which the name of a behaviour can be edited."""
+    """Interface of a panel in which the name of a behaviour can be edited."""
 
     def rename_tab(self, key: str) -> None:
-        """Start to edit the name of the tab with this key."""
+        """Open a text field for the name of the tab with this key."""
 
 
 def bring_into_view(shell: Shell) -> None:
@@ -138,7 +156,10 @@ def bring_into_view(shell: Shell) -> None:
 
 
 class BehaviourCommands:
-    """Implements the commands for behaviours and their tabs."""
+    """Handlers of the commands for behaviours and their tabs.
+
+    Methods with a document key as argument return False if there is no such document.
+    """
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController, asks: FileDialogs) -> None:
         self._shell, self._session, self._files = shell, session, files
@@ -147,7 +168,10 @@ class BehaviourCommands:
         self.printing = Printing(shell, session, asks)
 
     def run_or_resume(self) -> None:
-        """Resume a paused program, or run (again) the behaviour with the editor's newest edit."""
+        """Resume a paused program, or run the current behaviour.
+
+        Before a run, the newest edit of the block editor is applied.
+        """
         runs = self._session.runs
         if runs.view().state == "paused":
             runs.resume()
@@ -173,9 +197,10 @@ class BehaviourCommands:
             )
 
     def run_named(self, name: str) -> str:
-        """Run the open or recent behaviour of this name. Return the reason why it can't be run, or "".
+        """Run an open or recent behaviour by its name, unless another program is running.
 
-        A program that is already running is not interrupted.
+        Returns:
+            The reason why the behaviour can't be run, or "".
         """
         session = self._session
         if session.runs.active:
@@ -197,27 +222,31 @@ class BehaviourCommands:
         return ""
 
     def try_stack(self, stack: Stack) -> None:
-        """Run a single script with the editor's newest edit."""
+        """Run a single script, after the newest edit of the block editor was applied."""
         try_it = partial(self._session.runs.try_stack, stack)
         self._files.after_flush(partial(self._replace_run, try_it))
 
     def restart(self) -> None:
-        """Restart the running behaviour with the editor's newest edit."""
+        """Restart the running behaviour, after the newest edit of the block editor was applied."""
         self._files.after_flush(self._session.runs.restart)
 
     def run_step(self) -> None:
-        """Run one block with the editor's newest edit."""
+        """Run the next block, after the newest edit of the block editor was applied."""
         self._files.after_flush(self._session.runs.step)
 
     def start_demo(self) -> None:
-        """Start the virtual Pepper and open the first example, as a demonstration."""
+        """Start the virtual Pepper and open the first example."""
         self._session.launcher.start_virtual_robot()
         self._shell.show_layout("behaviour")
         if self._shell.examples:
             self._files.open_example(self._shell.examples[0].path)
 
     def next_tab(self, step: int) -> None:
-        """Show the tab that is ``step`` positions to the right, wrapping around."""
+        """Show another tab by its offset from the current one, wrapping around.
+
+        Args:
+            step: Number of positions to the right; negative to the left.
+        """
         self._files.show(self._session.documents.neighbour(step))
         bring_into_view(self._shell)
 
@@ -226,22 +255,22 @@ class BehaviourCommands:
         self._files.close(self._session.document)
 
     def show_tab(self, key: str) -> bool:
-        """Show the tab with this key. Return False if there is none; so do the following methods."""
+        """Show the tab with this key; return False if there is none."""
         return self._with_document(key, self._files.show)
 
     def close_tab(self, key: str) -> bool:
-        """Close a tab."""
+        """Close the tab with this key; return False if there is none."""
         return self._with_document(key, self._files.close)
 
     def close_other_tabs(self, key: str) -> bool:
-        """Close all tabs except the one with this key."""
+        """Close all tabs except the one with this key; return False if there is no such tab."""
         documents = self._session.documents
         return self._with_document(
             key, lambda document: self._files.close(*(other for other in documents if other is not document))
         )
 
     def save_tab_as(self, key: str) -> bool:
-        """Show the tab and ask for the file to save its behaviour to."""
+        """Show a tab and ask for a file to save its behaviour to; return False if there is no such tab."""
 
         def save_as(document: Document) -> None:
             self._files.show(document)
@@ -250,22 +279,22 @@ class BehaviourCommands:
         return self._with_document(key, save_as)
 
     def rename_current(self) -> None:
-        """Start to edit the name of the current tab."""
+        """Open a text field for the name of the current tab."""
         bring_into_view(self._shell)
         editor = self._shell.editor()
         if isinstance(editor, SupportsRename):
             editor.rename_tab(self._session.document.key)
 
     def rename_tab(self, to: TabName) -> bool:
-        """Rename a behaviour."""
+        """Rename a behaviour; return False if there is no such tab."""
         return self._with_document(to.key, lambda document: self._files.rename(document, to.name))
 
     def duplicate_tab(self, key: str) -> bool:
-        """Open a copy of a behaviour as a new one."""
+        """Open a copy of a behaviour in a new tab; return False if there is no such behaviour."""
         return self._with_document(key, self._files.duplicate)
 
     def save_tab(self, key: str) -> bool:
-        """Show the tab and save its behaviour."""
+        """Show a tab and save its behaviour; return False if there is no such tab."""
 
         def save(document: Document) -> None:
             self._files.show(document)
@@ -274,7 +303,7 @@ class BehaviourCommands:
         return self._with_document(key, save)
 
     def show_folder(self, key: str) -> bool:
-        """Open the folder of a behaviour's file in the file manager."""
+        """Open the folder of a behaviour's file in the file manager; return False if there is no such tab."""
 
         def show(document: Document) -> None:
             if document.path is None:
@@ -286,7 +315,7 @@ class BehaviourCommands:
         return self._with_document(key, show)
 
     def move_tab(self, to: TabPosition) -> bool:
-        """Move a tab to another position."""
+        """Move a tab to another position; return False if there is no such tab."""
         return self._with_document(to.key, lambda document: self._files.move(document, to.position))
 
     def _with_document(self, key: str, act: Callable[[Document], object]) -> bool:
@@ -308,7 +337,11 @@ class BehaviourCommands:
             editor.redo()
 
     def edit_blocks(self, what: str) -> None:
-        """Run "copy", "cut", "paste" or "duplicate" on the blocks, wherever the focus is in the layout."""
+        """Apply an edit to the selected blocks if the Behaviour layout is shown, wherever the focus is.
+
+        Args:
+            what: "copy", "cut", "paste" or "duplicate".
+        """
         editor = self._shell.editor()
         if self._shell.current_layout == "behaviour" and isinstance(editor, SupportsBlockEdits):
             editor.edit_blocks(what)
@@ -321,7 +354,11 @@ class BehaviourCommands:
             editor.show_block(block)
 
     def point_at(self, block: str) -> bool:
-        """Highlight the block of this type in the toolbox; "-" removes the highlight."""
+        """Show the toolbox and highlight a block by its type; return False without a block editor.
+
+        Args:
+            block: Type of the block; "-" removes the highlight.
+        """
         shows = block != "-"
         if shows:
             bring_into_view(self._shell)
@@ -331,14 +368,18 @@ class BehaviourCommands:
         return isinstance(editor, SupportsPointAt)
 
     def find_blocks(self, *, to_add: bool) -> None:
-        """Open the search in the behaviour's blocks, or in the toolbox if ``to_add``."""
+        """Show the Behaviour layout and open the search for blocks.
+
+        Args:
+            to_add: True to search the toolbox, False to search the behaviour.
+        """
         self._shell.show_layout("behaviour")
         editor = self._shell.editor()
         if isinstance(editor, SupportsFindBlocks):
             editor.find_blocks(to_add=to_add)
 
     def show_earlier_versions(self) -> None:
-        """Show earlier versions of the file, after the newest edit was saved to it."""
+        """Open the version history of the current behaviour, after its newest edit was applied."""
         self._files.after_flush(self._show_versions)
 
     def _show_versions(self) -> None:
@@ -351,7 +392,7 @@ class BehaviourCommands:
         self._versions.show_for(document.name, document.path, document.workspace, title=title)
 
     def clear_recent(self) -> None:
-        """Clear the list of recent files; the toast offers to undo it."""
+        """Clear the list of recent files and show a toast with an Undo button."""
         before: list[RecentFile] = self._session.settings.all_recent
         words = _("Recent files cleared")
         if not self._set_recent([]):
@@ -369,7 +410,12 @@ class BehaviourCommands:
         return kept
 
     def restore_tabs(self, left: Sequence[UnsavedWork], offer: OfferChoice) -> None:
-        """Restore the tabs of the last session, and offer to recover changes that were left by a crash."""
+        """Restore the tabs of the last session, and offer to recover unsaved changes.
+
+        Args:
+            left: Changes that were not saved, for example because of a crash.
+            offer: Shows the offer; called only if changes remain that the tabs don't contain.
+        """
         rest = self._session.tabs.restore(left)
         if not rest:
             return
@@ -387,7 +433,7 @@ class BehaviourCommands:
 
 
 def unsaved_text(left: Sequence[UnsavedWork]) -> str:
-    """Return a sentence with the names of the unsaved behaviours."""
+    """Return a sentence that names the behaviours with unsaved changes."""
     if len(left) == 1:
         return _("“{name}” wasn't saved before Studio closed.").format(name=left[0].name)
     if len(left) == 2:

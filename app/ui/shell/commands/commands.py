@@ -1,4 +1,4 @@
-"""Commands of one window: creates the handlers of the table, and runs a command by its id."""
+"""Commands of a window: creation of the handlers, and dispatch by id."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ARGUMENT_COMMANDS_BY_ID = {command.id: command for command in ARGUMENT_COMMANDS
 
 
 class Commands:
-    """Creates the menus and shortcuts of a window, and runs commands by id."""
+    """Handlers, actions, menus and shortcuts of a window."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         keys = Shortcuts(session.settings, shell.log_problem, COMMANDS)
@@ -71,12 +71,17 @@ class Commands:
         self.stop_keys = StopKeys(shell.surface, lambda: keys.keys_of(STOP), self.actions[STOP].trigger)
 
     def run(self, name: str) -> bool:
-        """Run a command by its id or ``id:argument``; return False if it is unavailable.
+        """Run a command by its id or ``id:argument``.
 
-        ``panel:topics`` shows a panel, ``inspect:/faces`` a topic, ``block:ID`` a block.
+        Examples are ``panel:topics`` to show a panel, ``inspect:/faces`` to inspect a topic, and
+        ``block:ID`` to scroll to a block.
+
+        Returns:
+            False if the command is unavailable, or if the object that the argument names doesn't exist.
 
         Raises:
             UnknownCommandError: The id isn't in `app.ui.shell.commands.table`.
+            ValueError: The argument is invalid.
         """
         id, colon, argument = name.partition(":")
         if not colon:

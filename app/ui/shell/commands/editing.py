@@ -18,16 +18,16 @@ MODIFYING_EDITS = frozenset({"cut", "paste"})
 
 @runtime_checkable
 class SupportsEditMenu(Protocol):
-    """Panel with blocks, and with text fields that aren't Qt widgets."""
+    """Interface of a panel that handles the Edit menu itself, because its text fields aren't Qt widgets."""
 
     def edit_from_menu(self, what: Edit) -> None:
         """Apply an edit command to the focused field of the page, or to the selected blocks."""
 
 
 class EditCommands:
-    """Implements the entries of the Edit menu.
+    """Handlers of the entries of the Edit menu.
 
-    Their keys, such as Ctrl+C, are handled by the focused field, page or panel instead.
+    The menu only shows the shortcuts, such as Ctrl+C; the focused field, page or panel handles them.
     """
 
     def __init__(self, shell: Shell) -> None:
@@ -43,7 +43,7 @@ class EditCommands:
             self._had = now
 
     def run(self, what: Edit) -> None:
-        """Run cut, copy, paste or select all."""
+        """Apply an edit to the focused field or to the blocks."""
         field = self._field()
         if field is not None:
             getattr(field, what)()
@@ -53,7 +53,7 @@ class EditCommands:
             editor.edit_from_menu(what)
 
     def disabled_reason(self, what: Edit) -> str:
-        """Return the reason why an edit command is unavailable, or ""."""
+        """Return the reason why an edit is unavailable, or "" if it is available."""
         field = self._field()
         if field is not None:
             return _("This text can't be changed") if what in MODIFYING_EDITS and field.isReadOnly() else ""

@@ -1,4 +1,4 @@
-"""Command that freezes all open panels that have a freeze button."""
+"""Command that freezes or unfreezes all open panels that have a freeze button."""
 
 from __future__ import annotations
 
@@ -11,20 +11,24 @@ from app.ui.shell.docking.workbench import Workbench
 
 @runtime_checkable
 class SupportsFreeze(Protocol):
-    """Panel whose button ``freeze`` stops its updates; the button is hidden without live contents."""
+    """Interface of a panel that can stop its updates.
+
+    Attributes:
+        freeze: Checkable button that stops the updates; hidden while the panel has no live contents.
+    """
 
     freeze: QAbstractButton
 
 
 def freeze_buttons(bench: Workbench | None) -> list[QAbstractButton]:
-    """Return the freeze buttons of open panels with live contents."""
+    """Return the visible freeze buttons of the open panels; empty without a workbench."""
     panels = [bench.docks[name].panel for name in bench.open_names()] if bench is not None else []
     buttons = [panel.freeze for panel in panels if isinstance(panel, SupportsFreeze)]
     return [button for button in buttons if not button.isHidden()]
 
 
 def all_frozen(bench: Workbench | None) -> bool:
-    """Return True if there are panels with live contents and all of them are frozen."""
+    """Return True if at least one panel can be frozen, and all such panels are frozen."""
     found = freeze_buttons(bench)
     return bool(found) and all(button.isChecked() for button in found)
 

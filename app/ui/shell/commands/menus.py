@@ -1,4 +1,4 @@
-"""Menus that depend on the state: recent files, panels, layouts; disabling of unavailable entries."""
+"""Menus whose entries depend on the state: recent files, panels and layouts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LAYOUT_COMMANDS = ("layout.keep", "layout.rename", "layout.delete", "layout.expo
 
 
 class DynamicMenus:
-    """Updates the dynamic menus when they open."""
+    """Controller that updates the dynamic menus, and disables unavailable entries, when a menu opens."""
 
     def __init__(
         self,
@@ -51,14 +51,14 @@ class DynamicMenus:
         self._arranging.aboutToHide.connect(actions.enable_all)
 
     def open_layout_menu(self, anchor: QWidget) -> None:
-        """Show a menu with layouts and layout commands below a button."""
+        """Open a menu with the layouts and the commands for layouts below a button."""
         self.actions.disable_unavailable()
         self._list_layouts(self._arranging)
         self._arranging.addAction(self.actions["layout.reset"])
         open_below(self._arranging, anchor)
 
     def open_panel_menu(self, anchor: QWidget) -> None:
-        """Show a menu with panels below a button."""
+        """Open a menu with the panels below a button; open panels are checked."""
         self._list_panels()
         open_below(self._panels, anchor)
 

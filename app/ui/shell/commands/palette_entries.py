@@ -1,4 +1,4 @@
-"""Entries of the command palette: commands, panels, topics, robots and recent files, with their keys."""
+"""Entries of the command palette: commands, panels, topics, robots, layouts, files and examples."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ TOPIC_ICONS = {"json": "braces", "string": "type", "bytes": "binary", "image": "
 
 
 class PaletteEntries:
-    """Creates the palette entries of a window. Those of topics are cached until the topics change."""
+    """Factory of the palette entries of a window.
+
+    The entries of topics are cached until the topics change.
+    """
 
     def __init__(
         self,
@@ -39,7 +42,7 @@ class PaletteEntries:
         self._topics_seen = (-1, -1)
 
     def all(self) -> list[Entry]:
-        """Return all entries. Their order decides between equally good matches."""
+        """Return all entries. Among equally good matches the palette keeps this order."""
         return [
             *self._commands(),
             *self._panels(),

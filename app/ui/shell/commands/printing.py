@@ -1,4 +1,4 @@
-"""Printing of blocks, to a printer or a PDF file."""
+"""Printing of the blocks to a printer or a PDF file."""
 
 from __future__ import annotations
 
@@ -22,19 +22,26 @@ if TYPE_CHECKING:
     from PySide6.QtPrintSupport import QPrinter
 
 MAX_DPI = 300
-"""Maximum resolution: more isn't visible in blocks, and a page at 1200 dpi takes 500 MB."""
+"""Maximum resolution. Blocks don't look better above it, and a page at 1200 dpi takes 500 MB."""
 
 
 @runtime_checkable
 class SupportsPrinting(Protocol):
-    """Panel whose contents can be printed."""
+    """Interface of a panel whose contents can be printed."""
 
     def render_pdf(self, title: str, date: str, layout: QPageLayout, done: Callable[[bytes], None]) -> None:
-        """Render a PDF with this page layout; ``done`` gets b"" if there is nothing to print."""
+        """Render the contents as a PDF document.
+
+        Args:
+            title: Title of the document.
+            date: Formatted date, printed on each page.
+            layout: Page size, orientation and margins.
+            done: Called with the PDF data; b"" if there is nothing to print.
+        """
 
 
 class Printing:
-    """Prints the blocks of the open behaviour."""
+    """Handlers that print the blocks of the current behaviour or save them as PDF."""
 
     def __init__(
         self,
@@ -67,7 +74,7 @@ class Printing:
         dialog.show()
 
     def print(self, printer: QPrinter) -> None:
-        """Print on a printer, with the settings of the printer object."""
+        """Print the blocks on a printer, with the page layout and page range of the printer object."""
 
         def paint(data: bytes) -> None:
             if not data:
@@ -82,7 +89,7 @@ class Printing:
         self._make(printer.pageLayout(), paint)
 
     def ask_pdf(self) -> None:
-        """Ask for a file and save a PDF."""
+        """Ask for a file and save the blocks to it as PDF."""
         self._asks.save_as(
             _("Save blocks as PDF"),
             suggested_path(self._session.document),
@@ -91,7 +98,7 @@ class Printing:
         )
 
     def save(self, path: Path) -> None:
-        """Save as PDF, adding the file extension ".pdf" if it is missing."""
+        """Save the blocks as PDF, adding the file extension ".pdf" if it is missing."""
         whole = path if path.suffix.lower() == ".pdf" else path.with_name(f"{path.name}.pdf")
 
         def write(data: bytes) -> None:
@@ -130,14 +137,14 @@ def printer_names() -> list[str]:
 
 
 def default_page_layout() -> QPageLayout:
-    """Return A4, or Letter where US units are the system's default."""
+    """Return a portrait page layout: Letter on systems with US units, else A4."""
     inches = QLocale.system().measurementSystem() == QLocale.MeasurementSystem.ImperialUSSystem
     size = QPageSize.PageSizeId.Letter if inches else QPageSize.PageSizeId.A4
     return QPageLayout(QPageSize(size), QPageLayout.Orientation.Portrait, QMarginsF())
 
 
 def paint_pdf(data: bytes, printer: QPrinter) -> bool:
-    """Paint the requested page range. Return False if the printer rejected it."""
+    """Paint the printer's page range of a PDF document; return False if the printer rejected it."""
     from PySide6.QtPdf import QPdfDocument  # noqa: PLC0415 - needed for printing only
 
     buffer = QBuffer()

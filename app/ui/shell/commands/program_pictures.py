@@ -29,9 +29,9 @@ KINDS = (
 
 
 def suggested_path(document: Document) -> Path:
-    """Return the suggested path, without extension, for a file made from a behaviour.
+    """Return the suggested path, without extension, of a file that is exported from a behaviour.
 
-    Its folder is that of the behaviour's file, or the home folder for files that Studio manages.
+    The folder is that of the behaviour's file; for files in Studio's own folder it is the home folder.
     """
     own = document.path
     folder = own.parent if own is not None and own.parent != closed_tabs_folder() else Path.home()
@@ -40,14 +40,20 @@ def suggested_path(document: Document) -> Path:
 
 @runtime_checkable
 class SupportsPicture(Protocol):
-    """Panel that can render an image of its contents."""
+    """Interface of a panel that can render an image of its contents."""
 
     def picture(self, kind: str, white: bool, done: Callable[[bytes], None]) -> None:
-        """Render a "png" or "svg", on white or transparent; ``done`` gets b"" if there are no blocks."""
+        """Render all blocks.
+
+        Args:
+            kind: Image format, "png" or "svg".
+            white: True for a white background, False for a transparent one.
+            done: Called with the image data; b"" if there are no blocks.
+        """
 
 
 class ProgramPictures:
-    """Saves and copies images of the blocks of the open behaviour."""
+    """Handlers that save or copy an image of the current behaviour's blocks."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
@@ -62,7 +68,13 @@ class ProgramPictures:
         self._asks.save_as(_("Save blocks as image"), suggestion, KINDS, take)
 
     def save(self, path: Path, kind: str, white: bool) -> None:
-        """Save a "png" or "svg", adding the file extension if it is missing."""
+        """Save an image of the blocks, adding the file extension if it is missing.
+
+        Args:
+            path: File to write.
+            kind: Image format, "png" or "svg".
+            white: True for a white background, False for a transparent one.
+        """
         whole = path if path.suffix.lower() == f".{kind}" else path.with_name(f"{path.name}.{kind}")
 
         def write(data: bytes) -> None:

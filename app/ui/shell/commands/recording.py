@@ -23,14 +23,14 @@ else:
 
 @runtime_checkable
 class SupportsRecordings(Protocol):
-    """Panel of recordings."""
+    """Interface of the panel that lists recordings."""
 
     def select_file(self, path: Path) -> None:
-        """Select this recording as soon as it is listed."""
+        """Select a recording, now or as soon as it is listed."""
 
 
 class RecordCommands:
-    """Implements the commands for recording, for keys, menus, the tool bar and the sheet."""
+    """Handlers of the commands for recording, used by shortcuts, menus, the tool bar and the sheet."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
@@ -46,7 +46,7 @@ class RecordCommands:
             self._start()
 
     def start_and_open_sheet(self) -> None:
-        """Start a recording with the last settings if none is running, and open the sheet."""
+        """Start a recording with the last settings unless one is running, and open the sheet."""
         if not self._recordings.is_recording:
             self._start()
         self.open_sheet()
@@ -62,7 +62,11 @@ class RecordCommands:
         return not why_not
 
     def record_topic(self, key: str) -> bool:
-        """Record only this topic; the saved settings are not changed."""
+        """Start a recording of a single topic, without changing the saved settings.
+
+        Returns:
+            False if the recording can't be started; a toast shows the reason.
+        """
         network, topic = split_key(key)
         if network:
             self._shell.show_toast(_("Only topics of Studio's own network can be recorded"))
@@ -84,7 +88,10 @@ class RecordCommands:
         self._sheet.open()
 
     def save_last(self) -> None:
-        """Save the contents of the flight recorder as a recording."""
+        """Save the contents of the flight recorder as a recording.
+
+        If the flight recorder is off, a toast offers to turn it on.
+        """
         recordings = self._recordings
         if not recordings.wish.is_on:
             self._shell.show_toast(
@@ -104,7 +111,7 @@ class RecordCommands:
         self._shell.show_toast(words.format(count=recordings.wish.seconds))
 
     def show(self, path: Path | None = None) -> None:
-        """Show the recordings panel and select a recording."""
+        """Show the recordings panel and select a recording in it, if one is given."""
         if self._sheet is not None:
             self._sheet.dismiss()  # the sheet may cover the panel
         if self._shell.bench is None:
@@ -115,7 +122,10 @@ class RecordCommands:
         self._shell.panel_focus.focus(dock)
 
     def show_for_export(self, path: Path) -> None:
-        """Show the recordings panel to export a part of a recording: the timeline's loop, if it is open."""
+        """Select a recording in the recordings panel, which can export a part of it.
+
+        If the recording is in another folder, a toast offers to choose that folder.
+        """
         if path.parent == self._recordings.folder:
             self.show(path)
         else:

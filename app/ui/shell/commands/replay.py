@@ -1,4 +1,4 @@
-"""Commands for replay: open and close recordings, play, add bookmarks."""
+"""Commands for replay: open and close a recording, play, add a bookmark."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TIMELINE = "timeline"
 
 
 class ReplayCommands:
-    """Implements the commands that show recordings in place of the live network."""
+    """Handlers of the commands that show a recording in place of the live network."""
 
     def __init__(self, shell: Shell, session: Session, asks: FileDialogs) -> None:
         self._shell, self._session, self._asks = shell, session, asks
@@ -37,7 +37,7 @@ class ReplayCommands:
         self._asks.open_recording(str(place), self.open)
 
     def open(self, path: Path) -> None:
-        """Open a recording with its timeline. Errors become alerts."""
+        """Open a recording and show the timeline; an error is shown as an alert."""
         if not path.is_file():
             self._shell.show_toast(_("{file} no longer exists").format(file=path.name))
             return
@@ -61,7 +61,7 @@ class ReplayCommands:
         return self._session.replay
 
     def play(self) -> None:
-        """Start or pause the replay."""
+        """Start the replay, or pause it."""
         if self._replay is not None:
             self._replay.toggle()
 

@@ -29,13 +29,13 @@ else:
     report_sheet = lazy_module("app.ui.shell.dialogs.report")
 
 DOCTOR_TIMEOUT_S = 15.0
-"""Maximum time in s that a report waits for the connection doctor."""
+"""Time limit in s for the connection doctor while a report is being created."""
 DOCTOR_MAX_AGE_S = 60.0
-"""Maximum age in s of results of the connection doctor that are reused."""
+"""Maximum age in s at which results of the connection doctor are reused for a report."""
 
 
 class ReportCommands:
-    """Implements the commands for problem reports and the web page of releases."""
+    """Handlers of the commands for problem reports and releases."""
 
     def __init__(
         self,
@@ -51,7 +51,7 @@ class ReportCommands:
         self._sheet: report_sheet.ReportSheet | None = None
 
     def report(self) -> None:
-        """Open a problem report that includes the newest edits of the open behaviours."""
+        """Open the sheet for a problem report, after the newest edit of the block editor was applied."""
         self._session.alerts.resolve(ALERT)
         doctor = self._session.doctor
         if doctor.finished_s is None or self._clock() - doctor.finished_s > DOCTOR_MAX_AGE_S:
@@ -83,7 +83,7 @@ class ReportCommands:
         ]
 
     def open_releases_page(self, page: str = RELEASES_PAGE) -> None:
-        """Open the web page of releases in the browser, and show the installed version.
+        """Open the web page of releases in the browser, and show the installed version in a toast.
 
         Studio itself sends no request.
         """
@@ -97,7 +97,11 @@ class ReportCommands:
 
 
 def qt_facts(window: QWidget) -> tuple[tuple[str, str], ...]:
-    """Return facts that only Qt knows (version, screens, window), in English for developers."""
+    """Return information that only Qt has, about its version, the screens and the window.
+
+    Returns:
+        Pairs of name and value, in English, because developers read the reports.
+    """
     screens = [
         (f"screen {place}", f"{size.width()} x {size.height()} at {each.devicePixelRatio():g}, {rate:.0f} Hz")
         for place, each in enumerate(QGuiApplication.screens(), start=1)

@@ -1,4 +1,4 @@
-"""Commands for robots and other computers, and fixes for missing robots."""
+"""Commands for robots, network access, and the replacement of missing robots."""
 
 from __future__ import annotations
 
@@ -19,28 +19,33 @@ from nep.i18n import _
 
 @dataclass(frozen=True, slots=True)
 class RobotSwap:
-    """Missing robot, and the robot that replaces it in the behaviour."""
+    """Replacement of a robot in a behaviour, as argument of a command.
+
+    Attributes:
+        missing: Name of the robot that is missing.
+        replacement: Name of the robot that replaces it.
+    """
 
     missing: str
     replacement: str
 
     @classmethod
     def parse(cls, text: str) -> RobotSwap:
-        """Parse ``MISSING:OTHER``."""
+        """Parse a text such as ``MISSING:OTHER``."""
         missing, _colon, other = text.partition(":")
         return cls(missing, other)
 
 
 @runtime_checkable
 class SupportsFullScreen(Protocol):
-    """Panel that can be shown in full screen."""
+    """Interface of a panel that can be shown in full screen."""
 
     def toggle_full_screen(self) -> None:
         """Toggle full screen."""
 
 
 class RobotCommands:
-    """Starts virtual robots, restarts missing ones, and opens the sheets for network access."""
+    """Handlers of the commands for robots and for access to the network."""
 
     def __init__(
         self, shell: Shell, session: Session, files: DocumentController, undo: Callable[[], object]
@@ -52,7 +57,7 @@ class RobotCommands:
         self._web_pages: WebPagesSheet | None = None
 
     def toggle_reset_before_run(self) -> None:
-        """Toggle whether virtual robots return to their start position before each run."""
+        """Toggle the setting that virtual robots return to their start position before each run."""
         fleet = self._session.fleet
         try:
             fleet.set_resets_at_start(begins=not fleet.resets_at_start)
@@ -70,7 +75,7 @@ class RobotCommands:
             self._shell.show_layout("behaviour")
 
     def use_virtual_turtle(self) -> None:
-        """Start the virtual Turtle."""
+        """Start the virtual Turtle; on the start page, show the Behaviour layout."""
         self._session.launcher.start_virtual_robot("Turtle", "diffdrive")
         if self._shell.bench is None:
             self._shell.show_layout("behaviour")
@@ -82,7 +87,14 @@ class RobotCommands:
         return name in self._session.starting_robots
 
     def stop_virtual(self, name: str = "") -> bool:
-        """Stop one or all virtual robots that this Studio started. They aren't restored at the next start."""
+        """Stop a virtual robot that this Studio has started, and don't restart it at the next start.
+
+        Args:
+            name: Name of the robot; "" stops all of them.
+
+        Returns:
+            False if there is no such robot.
+        """
         launcher = self._session.launcher
         names = [each for each in launcher.wanted if name in {"", each}]
         for each in names:
@@ -90,13 +102,13 @@ class RobotCommands:
         return bool(names)
 
     def toggle_room_full_screen(self) -> None:
-        """Toggle full screen for the room of virtual robots."""
+        """Show the room of the virtual robots in full screen, or leave full screen."""
         dock = self._shell.open_panel("robot")
         if dock is not None and isinstance(dock.panel, SupportsFullScreen):
             dock.panel.toggle_full_screen()
 
     def connect(self, name: str) -> None:
-        """Restart a missing virtual robot, or show the list of robots for a missing real one."""
+        """Restart a missing virtual robot, or show the Robots panel if the missing robot is real."""
         kind = self._description(name).get("rb:robot")
         model = _virtual_model(kind) if isinstance(kind, Mapping) and kind.get("virtual") is True else None
         if model is not None:
@@ -105,7 +117,10 @@ class RobotCommands:
             self._shell.open_panel("robots")
 
     def start_virtual_model(self, missing: str) -> bool:
-        """Start the virtual model of a missing robot, with undo. Return False if it has none."""
+        """Start a virtual robot in place of a missing one; return False if it has no virtual model.
+
+        The toast has an Undo button.
+        """
         model = _virtual_model(self._description(missing).get("rb:robot"))
         if model is None:
             return False
@@ -125,9 +140,9 @@ class RobotCommands:
         return link.robot.source if link is not None else self._session.document.robots.get(name, {})
 
     def replace_robot(self, swap: RobotSwap) -> bool:
-        """Replace a missing robot in the behaviour, with undo.
+        """Replace a missing robot in the behaviour; return False if the new one is not connected.
 
-        Return False if the other one is not connected.
+        The toast has an Undo button.
         """
         link = self._session.fleet.link(swap.replacement)
         if link is None:
@@ -144,7 +159,7 @@ class RobotCommands:
         return True
 
     def revoke_motion_permissions(self) -> None:
-        """Revoke the permissions of real robots to move, so that Studio asks again."""
+        """Revoke all permissions of real robots to move, so that Studio asks again before a movement."""
         words = _("Studio will ask again before a real robot moves")
         try:
             self._session.fleet.permission.revoke_all()
@@ -154,7 +169,7 @@ class RobotCommands:
         self._shell.show_toast(words)
 
     def open_network_access(self) -> None:
-        """Open the sheet for access from other computers."""
+        """Open the sheet that controls access from other computers."""
         if self._network_access is None:
             self._network_access = NetworkAccessSheet(
                 self._shell.theme, self._shell.surface, self._session.remote_access
@@ -162,7 +177,7 @@ class RobotCommands:
         self._network_access.open()
 
     def open_other_networks(self) -> None:
-        """Open the sheet for monitoring other networks."""
+        """Open the sheet to select other networks to monitor."""
         if self._other_networks is None:
             self._other_networks = OtherNetworksSheet(
                 self._shell.theme, self._shell.surface, self._session.live.networks
@@ -170,7 +185,7 @@ class RobotCommands:
         self._other_networks.open()
 
     def show_web_pages(self) -> None:
-        """Open the sheet of the web server: switch, permissions, connected pages."""
+        """Open the sheet of the web server."""
         if self._web_pages is None:
             self._web_pages = WebPagesSheet(
                 self._shell.theme,

@@ -16,11 +16,19 @@ from app.ui.shell.start_page.page import Example
 from app.ui.shell.window_state import WindowState
 from app.ui.theme.theme import Theme
 
-START_PAGE = "start"  # value of `Shell.showing` for the start page
+START_PAGE = "start"  # value of `Shell.current_layout` for the start page
 
 
 class Shell(Protocol):
-    """Window as seen by commands, menus and the palette."""
+    """Interface of the main window that commands, menus and the palette use.
+
+    Attributes:
+        theme: Theme of the window.
+        state: Saved state of the window.
+        saved_layouts: Saved arrangements of the layouts.
+        panels: Descriptions of the available panels, by name.
+        panel_focus: Keyboard navigation between panels.
+    """
 
     theme: Theme
     state: WindowState
@@ -30,7 +38,7 @@ class Shell(Protocol):
 
     @property
     def examples(self) -> Sequence[Example]:
-        """Examples on the start page."""
+        """Examples that the start page offers."""
 
     @property
     def menu_bar(self) -> QMenuBar:
@@ -38,11 +46,11 @@ class Shell(Protocol):
 
     @property
     def surface(self) -> QWidget:
-        """Parent widget of sheets and menus, in which shortcuts work."""
+        """Parent widget of sheets and menus, and context of the shortcuts."""
 
     @property
     def current_layout(self) -> str:
-        """Name of the current layout, or `START`."""
+        """Name of the current layout, or `START_PAGE` for the start page."""
 
     @property
     def bench(self) -> Workbench | None:
@@ -50,17 +58,17 @@ class Shell(Protocol):
 
     @property
     def show_toast(self) -> ShowToast:
-        """Function that shows a toast."""
+        """Function that shows a toast, see `Toast`."""
 
     def log_problem(self, sentence: str) -> None:
-        """Log a problem that needs no action in the Console."""
+        """Log a sentence to the Console, about a problem that requires no action."""
 
     def editor(self) -> object:
-        """Return the panel of behaviours, or None before it is first shown."""
+        """Return the panel with the block editor, or None if it wasn't created yet."""
 
     @property
     def left(self) -> str:
-        """Name of the layout to return to from the start page, or ""."""
+        """Name of the layout that was shown before the start page, or ""."""
 
     def show_start(self) -> None:
         """Show the start page."""
@@ -69,23 +77,27 @@ class Shell(Protocol):
         """Show all examples on the start page and focus the first one."""
 
     def show_recent(self) -> None:
-        """Show the recent files on the start page."""
+        """Update the recent files on the start page."""
 
     def show_layout(self, name: str) -> Workbench:
-        """Show a layout in its last state and return its workbench."""
+        """Show a layout with its last arrangement, and return its workbench."""
 
     def open_panel(self, name: str) -> Dock | None:
-        """Show a panel; return None if the name is unknown."""
+        """Show a panel in the current layout; return None if the panel isn't available."""
 
     def open_topic(self, topic: str) -> None:
-        """Show a topic in the open panel that fits its type best."""
+        """Show a topic in the open panel that suits its type best."""
 
     def close(self) -> bool:
-        """Close the window. Return False if it stays open."""
+        """Close the window; return False if it stays open."""
 
     @property
     def can_restart(self) -> bool:
         """True if Studio can restart and reopen all documents."""
 
     def restart(self) -> str:
-        """Close the window and restart Studio. Return the reason if that is impossible, or ""."""
+        """Close the window and restart Studio.
+
+        Returns:
+            The reason why a restart is impossible, or "".
+        """

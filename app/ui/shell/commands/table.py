@@ -1,7 +1,7 @@
-"""Table of all commands, for menus, palette, shortcuts, tooltips and buttons.
+"""Command table, used by menus, palette, shortcuts, tooltips and buttons.
 
-Panels, alerts and problems run a command by its id, such as ``help.doctor``, or with an argument, such as
-``inspect:/faces``.
+Panels, alerts and problems run a command by its id, such as ``help.doctor``, or with an argument, such
+as ``inspect:/faces``.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ NOTHING_TO_RUN = lazy("Nothing to run")
 
 @dataclass(frozen=True)
 class Handlers:
-    """Objects that implement the commands."""
+    """Handlers of all commands, passed to `run` and `disabled_reason` of each command."""
 
     session: Session
     shell: Shell
@@ -174,7 +174,11 @@ def _edit(what: Edit, text: str, key: str, icon: str, *, above: bool = False) ->
 
 
 def releases(page: str) -> tuple[C, ...]:
-    """Return the command for the web page of releases; empty if the project has no such page."""
+    """Return the command that opens the web page of releases, or an empty tuple if there is no such page.
+
+    Args:
+        page: URL of the page, or "".
+    """
     if not page:
         return ()
     return (
@@ -421,4 +425,4 @@ ARGUMENT_COMMANDS: tuple[ArgumentCommand[Handlers], ...] = (
         _fix_blocks, ("limit", "define", "add", "after", "begin", "receive")
     ),  # for buttons of problems (`app.blocks.fixes.fixes`)
 )
-"""Commands that are run as ``id:argument``; a tab is identified by the key of its document."""
+"""Commands that are run as ``id:argument``; tabs are identified by the key of their document."""

@@ -24,16 +24,21 @@ MAX_NAME_LENGTH = 60
 
 @runtime_checkable
 class SupportsVariables(Protocol):
-    """Panel in which variables can be edited."""
+    """Interface of a panel in which variables can be edited."""
 
     def edit_variable(self, edit: Mapping[str, object]) -> None:
-        """Create, rename, delete or watch a variable as one undoable edit."""
+        """Apply an edit of a variable as one step on the undo stack.
+
+        Args:
+            edit: Edit for the page of the block editor: "do" with "new", "rename", "delete", "watch",
+                "show" or "undo", and the arguments.
+        """
 
 
 class VariableCommands:
-    """Implements the commands for variables.
+    """Handlers of the commands for variables.
 
-    Names are asked for and results are shown in toasts here; the block editor makes the edits.
+    The handlers ask for names and show toasts; the block editor applies the edits.
     """
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController) -> None:
@@ -42,7 +47,7 @@ class VariableCommands:
         self._used_before: dict[str, str] = {}  # id of the block found last, by variable
 
     def new(self, *, is_list: bool) -> None:
-        """Ask for a name, then create a variable or list."""
+        """Ask for a name, then create a variable, or a list if `is_list`."""
         question = _("New list") if is_list else _("New variable")
         verb = _("Create")
 
@@ -62,7 +67,7 @@ class VariableCommands:
         )
 
     def ask_rename(self, id: str) -> None:
-        """Ask for a new name of a variable, or for the first name of an unnamed variable."""
+        """Ask for a new name and rename the variable with this id."""
 
         def ask_name() -> None:
             workspace = self._workspace()
@@ -81,7 +86,7 @@ class VariableCommands:
         self._after_flush(ask_name)
 
     def delete(self, id: str) -> None:
-        """Delete a variable and the blocks that use it; the toast offers to undo it."""
+        """Delete a variable and the blocks that use it, and show a toast with an Undo button."""
 
         def delete() -> None:
             workspace = self._workspace()
@@ -101,11 +106,11 @@ class VariableCommands:
         self._after_flush(delete)
 
     def watch(self, id: str) -> None:
-        """Show or hide the variable's value next to the blocks."""
+        """Show or hide the value of the variable with this id next to the blocks."""
         self._edit({"do": "watch", "id": id})
 
     def find(self, id: str) -> None:
-        """Show the next block that uses the variable."""
+        """Scroll to the next block that uses the variable with this id, wrapping around."""
 
         def show() -> None:
             uses = uses_of(self._workspace(), id)
@@ -118,7 +123,7 @@ class VariableCommands:
         self._after_flush(show)
 
     def ask_value(self, id: str) -> None:
-        """Ask for a new value of a variable while the program runs."""
+        """Ask for a value and assign it to a variable of the running program."""
         runs = self._session.runs
         name = self._workspace().variables.get(id)
         now = runs.values.get(id)
@@ -139,7 +144,12 @@ class VariableCommands:
         )
 
     def rejection_reason(self, name: str, own: str = "") -> str:
-        """Return the reason why a name is invalid, or "". ``own`` is the id of the variable to rename."""
+        """Return the reason why a variable name is invalid, as a sentence, or "".
+
+        Args:
+            name: Name to check.
+            own: Id of the variable that is renamed, which may keep its name; "" for a new variable.
+        """
         if not name:
             return _("Enter a name for the variable.")
         if len(name) > MAX_NAME_LENGTH:
@@ -168,7 +178,7 @@ class VariableCommands:
 
 
 def uses_of(workspace: Workspace, id: str) -> list[str]:
-    """Return the ids of the blocks that set, change or read a variable, in page order."""
+    """Return the ids of the blocks that set, change or read a variable, in the order of the page."""
     found: list[str] = []
     waiting: list[PlacedBlock] = [
         placed for script in reversed(workspace.scripts) for placed in reversed(script)
@@ -186,7 +196,7 @@ def _refers_to(field: object, id: str) -> bool:
 
 
 def separator_problem(words: str) -> str:
-    """Return the reason why a number with several separators is not a valid value; "" for other text."""
+    """Return an error sentence if the text is a number with ambiguous separators, else ""."""
     try:
         parse_number(words)
     except TypedNumberError as error:
@@ -195,7 +205,12 @@ def separator_problem(words: str) -> str:
 
 
 def parse_value(words: str) -> str | float | bool:
-    """Parse a typed value: a number, yes or no (or "true" and "false"), else text."""
+    """Parse a typed value of a variable.
+
+    Returns:
+        A number, a boolean for "yes", "no" (in the user's language), "true" or "false", or else the
+        text.
+    """
     plain = words.strip()
     said = plain.casefold()
     if said in ("true", _("yes").casefold()):

@@ -1,6 +1,6 @@
-"""Commands for the window: palette, sheets, layouts, theme, text size, help.
+"""Commands for the window: palette, sheets, layouts, theme, text size and help.
 
-Sheets are created on first use so that they don't delay the startup.
+Sheets are created on first use, so that they don't delay the startup.
 """
 
 from __future__ import annotations
@@ -64,15 +64,15 @@ MAX_NAMED = 4
 
 @runtime_checkable
 class SupportsRobotChoice(Protocol):
-    """Panel that can show one of several robots."""
+    """Interface of a panel that shows one of several robots."""
 
     def select_robot(self, name: str) -> None:
-        """Select the robot of this name."""
+        """Select the robot with this name."""
 
 
 @runtime_checkable
 class SupportsDiagnosis(Protocol):
-    """Panel of the connection doctor."""
+    """Interface of the panel of the connection doctor."""
 
     def check_panel(self, asker: PanelWidget | None) -> None:
         """Set the panel whose missing data is to be diagnosed; None for a general check."""
@@ -80,23 +80,28 @@ class SupportsDiagnosis(Protocol):
 
 @runtime_checkable
 class SupportsAlarms(Protocol):
-    """Panel of alarms."""
+    """Interface of the panel of alarms."""
 
     def add_alarm(self) -> None:
-        """Start to create an alarm."""
+        """Show the choices for a new alarm."""
 
     def edit(self, rule_id: str, slot: str) -> None:
-        """Show an alarm and open one of its slots, unless `slot` is ""."""
+        """Show an alarm, and open one of its slots for editing.
+
+        Args:
+            rule_id: Id of the alarm's rule.
+            slot: Name of the slot to open, such as "limit", or "" for none.
+        """
 
 
 def read_value(text: str) -> tuple[str, str]:
-    """Parse "/odom pose.x" to topic and field path. Topics contain no spaces."""
+    """Split a text such as "/odom pose.x" at the first space into topic and field path."""
     topic, _blank, path = text.partition(" ")
     return topic, path
 
 
 class ViewCommands:
-    """Implements the commands for the window's contents and sheets. Call `use` before any command."""
+    """Handlers of the commands for layouts, sheets and the theme; call `set_actions` before any of them."""
 
     def __init__(self, shell: Shell, session: Session, files: DocumentController, keys: Shortcuts) -> None:
         self._shell, self._session, self._files = shell, session, files
@@ -109,7 +114,10 @@ class ViewCommands:
         self._guide: guide.GuideSheet | None = None
 
     def set_actions(self, actions: Actions, entries: PaletteEntries) -> None:
-        """Set the actions to keep up to date, and the entries of the palette."""
+        """Connect the actions and the command palette.
+
+        The shortcuts and check marks of the actions are updated from now on.
+        """
         self._actions, self._entries = actions, entries
         self.shortcuts.changed.connect(self.show_keys)
         self._shell.theme.changed.connect(self._update_theme_actions)
@@ -117,21 +125,22 @@ class ViewCommands:
         self._update_theme_actions()
 
     def show_keys(self) -> None:
-        """Update the keys of all actions.
+        """Update the shortcuts of all actions.
 
-        Find has its key only in the Behaviour layout; in other layouts, panels use the key themselves.
+        The command "Find" has its shortcut only in the Behaviour layout; elsewhere the panels handle
+        the key.
         """
         here = self._shell.current_layout == "behaviour" and self._shell.bench is not None
         of = self.shortcuts.keys_of
         self._actions.set_keys(lambda name: of(name) if here or name != "blocks.find" else ())
 
     def run_key(self, key: str) -> bool:
-        """Run the command that has a key. Return False if there is none."""
+        """Run the command to which a shortcut is assigned; return False if none is available."""
         holder = self.shortcuts.command_for(key)
         return bool(holder) and self._actions.run(holder)
 
     def open_palette(self) -> None:
-        """Open or close the command palette."""
+        """Open the command palette, or close it if it is open."""
         if self._palette is None:
             shell = self._shell
             self._palette = command_palette.Palette(
@@ -143,7 +152,7 @@ class ViewCommands:
         self._palette.open()
 
     def run_entry(self, entry: Entry) -> None:
-        """Run an entry of the palette."""
+        """Run the command of a palette entry, or show the object that the entry stands for."""
         kind, name, shell = entry.kind, entry.name, self._shell
         if kind == "command":
             self._actions.run(name)
@@ -170,7 +179,7 @@ class ViewCommands:
             self._shell.bench.focus_panel(dock)
 
     def inspect(self, topic: str) -> None:
-        """Show a topic in the Inspector."""
+        """Show a topic in the Inspector of the Developer layout."""
         self.show_layout("developer")
         bench = self._shell.bench
         dock = bench.open_latest("inspector") if bench is not None else None
@@ -179,7 +188,11 @@ class ViewCommands:
             self._select_topic(topic)
 
     def new_alarm(self, about: AlarmCondition | None = None) -> None:
-        """Create an alarm with a condition and open it for editing."""
+        """Create an alarm and open it for editing.
+
+        Args:
+            about: Condition of the alarm; None lets the user choose one.
+        """
         dock = self._shell.open_panel("alarms")
         if dock is None or not isinstance(dock.panel, SupportsAlarms):
             return
@@ -193,9 +206,12 @@ class ViewCommands:
         dock.panel.edit(rule.id, "limit" if waits else "")
 
     def new_value_alarm(self, about: tuple[str, str]) -> None:
-        """Create an alarm on a value of a topic.
+        """Create an alarm on a field of a topic.
 
-        If the value is a number, the user has to enter the limit.
+        For a number, the alarm stays off until the user has confirmed the limit.
+
+        Args:
+            about: Topic and field path.
         """
         topic, path = about
         known = self._session.topics.get(topic)
@@ -228,7 +244,7 @@ class ViewCommands:
         self._get_shortcut_sheet().open_for(command)
 
     def open_settings(self) -> None:
-        """Open the settings."""
+        """Open the sheet with the settings."""
         if self._settings_sheet is None:
             shell = self._shell
             self._settings_sheet = settings_sheet.SettingsSheet(
@@ -253,7 +269,7 @@ class ViewCommands:
         return voice_text(self._session.voices.problem, has_engine=has_voice_engine())
 
     def show_start_page(self) -> None:
-        """Show the start page, now and after the next start."""
+        """Show the start page, and save that it is shown at the next start too."""
         self._shell.show_start()
         self._shell.state.save_layout(START_PAGE)
 
@@ -263,17 +279,17 @@ class ViewCommands:
             self.show_layout(self._shell.left)
 
     def show_layout(self, layout: str) -> None:
-        """Show Behaviour or Developer in its last state."""
+        """Show the layout "behaviour" or "developer" with its last arrangement."""
         self._shell.show_layout(layout)
         self._actions.select(f"layout.{layout}")
 
     def show_built_in_layout(self, layout: str) -> None:
-        """Show the built-in arrangement of a layout in place of a custom one."""
+        """Show a layout with its built-in arrangement instead of a custom layout."""
         self._shell.saved_layouts.switch(self._shell.show_layout(layout), layout, "")
         self._actions.select(f"layout.{layout}")
 
     def show_own_layout(self, name: str) -> None:
-        """Show a custom layout by name."""
+        """Show the custom layout with this name, if it exists."""
         own = self._shell.saved_layouts.named(name)
         if own is not None:
             bench = self._shell.show_layout(own.base)
@@ -281,7 +297,7 @@ class ViewCommands:
             self._actions.select(f"layout.{own.base}")
 
     def reset_layout(self) -> None:
-        """Restore the default arrangement of the current layout's panels."""
+        """Restore the default arrangement of the panels in the current layout."""
         if self._shell.bench is not None:
             self._shell.bench.reset_layout()
 
@@ -309,7 +325,7 @@ class ViewCommands:
         self._get_name_sheet().ask(_("Save layout as"), _("Keep"), arrangements.rejection_reason, save)
 
     def rename_layout(self) -> None:
-        """Ask for a new name for the current custom layout."""
+        """Ask for a new name and rename the current custom layout."""
         arrangements = self._shell.saved_layouts
         old = arrangements.custom_name(self._shell.current_layout)
         if old:
@@ -322,7 +338,7 @@ class ViewCommands:
             )
 
     def delete_layout(self) -> None:
-        """Delete the current custom layout; the toast offers to undo it."""
+        """Delete the current custom layout and show a toast with an Undo button."""
         arrangements, shell = self._shell.saved_layouts, self._shell
         name = arrangements.custom_name(shell.current_layout)
         if name:
@@ -360,7 +376,7 @@ class ViewCommands:
         self._files.asks.open_layout(str(Path.home()), self.open_layout)
 
     def open_layout(self, path: Path) -> None:
-        """Import a layout file and show the layout. Errors are shown in a toast."""
+        """Import a layout file and show the layout; an error is shown in a toast."""
         shell = self._shell
         try:
             found = read_layout(read_regular_file(path, MAX_BYTES), path.stem, shell.panels)
@@ -401,33 +417,33 @@ class ViewCommands:
         self._actions["theme.contrast"].setChecked(theme.high_contrast)
 
     def set_theme(self, mode: Mode) -> None:
-        """Set the colour theme: light, dark or the system's."""
+        """Set and save the theme mode: "light", "dark" or "system"."""
         self._shell.theme.set_mode(mode)
         self._shell.state.save_theme(self._shell.theme)
 
     def update_motion(self) -> None:
-        """Turn reduced motion on or off, to match the state of its action."""
+        """Set and save reduced motion according to the check mark of its action."""
         self._shell.theme.set_motion(_preference(self._actions["theme.motion"]))
         self._shell.state.save_theme(self._shell.theme)
 
     def update_contrast(self) -> None:
-        """Turn high contrast on or off, to match the state of its action."""
+        """Set and save high contrast according to the check mark of its action."""
         self._shell.theme.set_contrast(_preference(self._actions["theme.contrast"]))
         self._shell.state.save_theme(self._shell.theme)
 
     def set_text_size(self, percent: int) -> None:
-        """Set the text size in percent."""
+        """Set and save the text size in percent."""
         self._shell.theme.set_text_percent(percent)
         self._shell.state.save_theme(self._shell.theme)
 
     def show_first_steps(self) -> None:
-        """Show the card with the first steps next to the blocks."""
+        """Show the panel with the first steps next to the blocks."""
         self.show_layout("behaviour")
         self._shell.open_panel("behaviour")
         self._shell.panel_focus.focus(self._shell.open_panel("first_steps"))
 
     def open_guide(self) -> None:
-        """Open the guide at the page that was shown last."""
+        """Open the guide at the last viewed page."""
         if self._guide is None:
             shell = self._shell
             self._guide = guide.GuideSheet(shell.theme, shell.surface, self._guide_pages)
@@ -442,13 +458,18 @@ class ViewCommands:
         self._shell.show_examples()
 
     def point_at(self, command: str) -> bool:
-        """Highlight the button of a command. Return False if no such button is visible."""
+        """Highlight the button of a command; return False if no such button is visible."""
         if self._ring is None:
             self._ring = HintRing(self._shell.theme, self._shell.surface)
         return self._ring.point_at(command)
 
     def open_doctor(self, asker: PanelWidget | None = None, topic: str = "") -> None:
-        """Run the connection doctor, first for the topic whose messages ``asker`` doesn't receive."""
+        """Run the connection doctor and show its panel.
+
+        Args:
+            asker: Panel whose missing data is to be diagnosed, or None.
+            topic: Topic to check first, or "".
+        """
         self._session.doctor.expect_topic(topic)
         if self._shell.bench is None:
             self.show_layout("developer")
@@ -469,7 +490,7 @@ class ViewCommands:
             self._shell.show_toast(_("The log files are in {folder}").format(folder=folder))
 
     def about(self) -> None:
-        """Show the About dialog."""
+        """Open the About sheet."""
         AboutSheet(self._shell.theme, self._shell.surface, self._shell.show_toast).open()
 
 

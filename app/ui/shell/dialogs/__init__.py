@@ -1,4 +1,4 @@
-"""Sheets and dialogs over the window: palette, settings, shortcuts and questions.
+"""Sheets over the window: palette, settings, shortcuts, file dialogs and questions.
 
-They aren't modal: each is an `Overlay`, or leaves Stop accessible in another way.
+No sheet is modal: each is an `Overlay`, or leaves Stop accessible in another way.
 """

@@ -1,4 +1,4 @@
-"""About sheet: versions, licences and system information, with a button to copy them."""
+"""About sheet: versions, licences and system information, which can be copied."""
 
 from __future__ import annotations
 
@@ -25,10 +25,7 @@ WIDTH = 460
 
 
 def versions() -> tuple[tuple[str, str], ...]:
-    """Return the names and versions of Studio, its libraries and the system.
-
-    Names of programs aren't translated.
-    """
+    """Return pairs of name and version for Studio, its libraries and the system."""
     return (
         ("NEP Studio", __version__),
         ("nep", __version__),
@@ -39,7 +36,7 @@ def versions() -> tuple[tuple[str, str], ...]:
 
 
 class AboutSheet(Overlay):
-    """Sheet with versions and licences; deleted when it is closed."""
+    """Sheet with versions and licences, which is deleted when it is closed."""
 
     top = 96
 

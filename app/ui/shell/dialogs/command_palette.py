@@ -1,4 +1,4 @@
-"""Command palette (Ctrl+K) to search commands, panels, topics, robots, layouts and recent files."""
+"""Command palette (Ctrl+K) to search commands, panels, topics, robots, layouts, files and examples."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MAX_RESULTS, MAX_RESULTS_EMPTY, MAX_LAST_SHOWN, MAX_LAST_SAVED = 40, 8, 5, 12
 
 
 class _Field(QLineEdit):
-    """Frameless search field with an icon at the left and "Esc" at the right."""
+    """Frameless search field with an icon on the left and the key cap "Esc" on the right."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -101,9 +101,14 @@ class _Foot(QWidget):
 
 
 class Palette(Overlay):
-    """Command palette, 640 px wide and 128 px below the window's top.
+    """Command palette, 640 px wide and 128 px below the top of the window.
 
-    ``run`` runs an entry; ``rebind`` asks for a new key for a command.
+    Args:
+        theme: Theme.
+        window: Window that the palette covers.
+        offers: Returns the entries; called whenever the palette opens.
+        run: Runs an entry.
+        rebind: Asks for a new shortcut for a command, given by its name.
     """
 
     top = TOP
@@ -147,7 +152,7 @@ class Palette(Overlay):
         return self.field
 
     def open(self) -> None:
-        """Open the palette with all entries, the last used ones first; close it if it is open."""
+        """Open the palette with all entries, recently used ones first; if it is open, close it."""
         if self.isVisible():
             self.dismiss()
             return
@@ -228,7 +233,7 @@ class Palette(Overlay):
         return super().eventFilter(watched, event)
 
     def run_selected(self) -> None:
-        """Run the selected entry if it is available."""
+        """Run the selected entry, unless it is unavailable."""
         entry = self.rows.entry
         if entry is None:
             return
@@ -241,7 +246,7 @@ class Palette(Overlay):
         self._run(entry)
 
     def rebind(self) -> None:
-        """Ask for a new key for the selected command."""
+        """Close the palette and ask for a new shortcut for the selected command."""
         entry = self.rows.entry
         if entry is not None and entry.kind == "command":
             self.dismiss()

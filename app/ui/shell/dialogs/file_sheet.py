@@ -1,6 +1,6 @@
-"""Sheet to choose a file or folder: places at the left, contents of the folder, name below.
+"""Sheet to choose a file or folder: locations on the left, contents of the folder, and name below.
 
-Stop stays accessible. The sheet stays open when Stop is pressed, so that no input is lost.
+Stop stays accessible. Pressing Stop doesn't close the sheet, so that no input is lost.
 """
 
 from __future__ import annotations
@@ -52,11 +52,17 @@ NAME, CHANGED, SIZE = range(3)
 
 @dataclass(frozen=True)
 class FileQuestion:
-    """Kind of file to choose: a file with one of the ``endings``, or a folder.
+    """Settings of the sheet for one kind of file or folder.
 
     Attributes:
-        empty: Text for a folder without matching files.
-        kinds: Formats for saving.
+        heading: Title of the sheet, wrapped in `lazy`.
+        verb: Text of the button, wrapped in `lazy`.
+        empty: Text that is shown in a folder without matching files.
+        suffixes: File extensions of the files to list.
+        icon: Icon of the files.
+        is_saving: True to ask for a name to save to.
+        selects_folder: True to select a folder instead of a file.
+        kinds: Formats that are offered for saving.
     """
 
     heading: str
@@ -80,7 +86,7 @@ FOLDER = FileQuestion(lazy("Choose a folder"), lazy("Use this folder"), "", suff
 
 @dataclass(frozen=True)
 class FolderLocation:
-    """Folder with a well-known name such as "Documents"."""
+    """Folder in the list of locations, with its name and icon."""
 
     name: str
     icon: str
@@ -88,7 +94,12 @@ class FolderLocation:
 
 
 def known_locations(studio: Path, recent: Iterable[Path]) -> tuple[FolderLocation, ...]:
-    """Return the user's standard folders as far as they exist, Studio's folder, and those of recent files."""
+    """Return the folders to list as locations, without missing ones and duplicates.
+
+    Args:
+        studio: Folder in which Studio stores backups.
+        recent: Recent files, whose folders are included.
+    """
     kinds = QStandardPaths.StandardLocation
     found = [
         FolderLocation(_("Home"), "house", Path.home()),
@@ -110,7 +121,7 @@ def _standard(kind: QStandardPaths.StandardLocation) -> Path:
 
 
 class _Row(QTreeWidgetItem):
-    """Row of a file or folder. Folders come first in every sort order."""
+    """Row of a file or folder. Folders precede files in every sort order."""
 
     def __init__(self, theme: Theme, entry: FolderEntry, now: dt.datetime, icon: str) -> None:
         then = dt.datetime.fromtimestamp(entry.changed_s, tz=now.tzinfo)
@@ -139,9 +150,9 @@ class _Row(QTreeWidgetItem):
 
 
 class FileSheet(Overlay):
-    """Sheet to choose a file to open or save.
+    """Sheet to choose a file or folder to open, or a file to save to.
 
-    The path is passed to ``take``, which isn't called on cancel.
+    The methods that ask for a path pass the result to a callback, which isn't called on cancel.
     """
 
     top = 56
@@ -249,19 +260,25 @@ class FileSheet(Overlay):
         column.addLayout(middle, 1)
 
     def ask_open(self, folder: Path, take: Callable[[Path], object], question: FileQuestion = OPEN) -> None:
-        """Ask for a file to open, a behaviour unless `question` says otherwise."""
+        """Ask for a file to open.
+
+        Args:
+            folder: Folder to show first.
+            take: Called with the path.
+            question: Kind of file, by default a behaviour.
+        """
         self._ask(question, folder, take)
 
     def ask_picture(self, folder: Path, take: Callable[[Path], object]) -> None:
-        """Ask for an image file."""
+        """Ask for an image file to open."""
         self._ask(PICTURE, folder, take)
 
     def ask_folder(self, folder: Path, take: Callable[[Path], object]) -> None:
-        """Ask for a folder: the one selected in the list, else the current one."""
+        """Ask for a folder, which is the selected one or else the displayed one."""
         self._ask(FOLDER, folder, take)
 
     def ask_save(self, suggestion: Path, take: Callable[[Path], object]) -> None:
-        """Ask where and under which name to save a behaviour."""
+        """Ask for the folder and name to save a behaviour."""
         self._ask_name(SAVE, suggestion, take)
 
     def ask_save_as(
@@ -271,7 +288,14 @@ class FileSheet(Overlay):
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], object],
     ) -> None:
-        """Ask for place, name and format to save another kind of file."""
+        """Ask for folder, name and format to save a file other than a behaviour.
+
+        Args:
+            title: Title of the sheet.
+            suggestion: Suggested path, without extension.
+            kinds: Formats that are offered.
+            take: Called with the path and the format.
+        """
         endings = tuple(dict.fromkeys(each.suffix for each in kinds))
         question = FileQuestion(
             title, SAVE.verb, SAVE.empty, suffixes=endings, icon="image", is_saving=True, kinds=tuple(kinds)
@@ -317,7 +341,7 @@ class FileSheet(Overlay):
 
     @property
     def is_saving(self) -> bool:
-        """True if the sheet asks for a name."""
+        """True if the sheet asks for a name to save to."""
         return self.question.is_saving
 
     @property
@@ -349,7 +373,10 @@ class FileSheet(Overlay):
         self.places.setFixedWidth(round(self.theme.scaled(PLACES_WIDTH)))
 
     def go_to(self, folder: Path) -> None:
-        """Show a folder. On an error, show the reason and stay in the current folder."""
+        """Show the contents of a folder.
+
+        If the folder can't be read, the reason is shown and the current folder stays.
+        """
         try:
             found = entries_of(folder, self.question.suffixes)
         except OSError as error:
@@ -384,7 +411,7 @@ class FileSheet(Overlay):
 
     @property
     def selected_entry(self) -> FolderEntry | None:
-        """File or folder selected in the list, or None."""
+        """Selected file or folder in the list, or None."""
         row = self.list.currentItem()
         # QTreeWidget makes the first row current when it gets the focus, which isn't a selection.
         meant = row is not None and (row.isSelected() or not self.question.selects_folder)
@@ -436,7 +463,7 @@ class FileSheet(Overlay):
 
     @property
     def target(self) -> Path | None:
-        """File or folder that the button would use, or None."""
+        """Path that the primary button passes to the callback, or None if the button is disabled."""
         chosen = self.selected_entry
         if self.question.selects_folder:
             return chosen.path if chosen is not None else self.folder
@@ -528,7 +555,7 @@ class FileSheet(Overlay):
             self.go_to(self.folder)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Open the parent folder on Backspace in the list."""
+        """Open the parent folder when Backspace is pressed in the list."""
         if (
             watched is self.list
             and event.type() == QEvent.Type.KeyPress

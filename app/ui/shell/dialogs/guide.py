@@ -1,8 +1,8 @@
 """Guide with searchable help pages in the user's language.
 
-The pages are Markdown in ``resources/guide``, with a folder per language. ``{key:run.stop}`` is replaced with
-the current keys of a command. ``![words](name)`` includes an image: ``light/name.png`` or ``dark/name.png``
-in the folder of the language, by the current theme; the words are its alternative text.
+The pages are Markdown files in ``resources/guide``, with one folder per language. ``{key:run.stop}`` is
+replaced by the current shortcut of a command. ``![words](name)`` includes the image ``light/name.png``
+or ``dark/name.png``, depending on the theme; the words are its alternative text.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from nep.i18n import ENGLISH, _, ngettext
 WIDE, HIGH, LIST_WIDTH = 920, 640, 220
 LINE_PERCENT = 115.0
 PICTURE_RATIO = 1.5
-"""Image file pixels per window pixel at 100 %; more than 1, so that images are sharp on high-DPI screens."""
+"""Pixels of an image file per logical pixel; greater than 1 for sharp images on high-DPI screens."""
 _PICTURE = re.compile(r"!\[([^\]]*)\]\(([a-z-]+)\)")
 _KEY = re.compile(r"\{key:([a-z_.]+)\}")
 _MARKS = re.compile(r"[*#|`_-]+")
@@ -58,33 +58,41 @@ _MARKS = re.compile(r"[*#|`_-]+")
 
 @dataclass(frozen=True)
 class GuidePage:
-    """Page of the guide: title, Markdown text, and folders of its images in order of preference."""
+    """Page of the guide.
+
+    Attributes:
+        title: Title of the page.
+        text: Contents, as Markdown.
+        folders: Folders in which images are searched, in order of preference.
+    """
 
     title: str
     text: str
     folders: tuple[Path, ...] = ()
 
     def matches(self, words: str) -> bool:
-        """Return True if the page, with the alternative texts of images, contains all of these words."""
+        """Return True if the page contains all words of a query, also in alternative texts of images."""
         said = _MARKS.sub(" ", _PICTURE.sub(r"\1", self.text)).casefold()
         return all(word in said for word in words.casefold().split())
 
     @property
     def pictures(self) -> tuple[tuple[str, str], ...]:
-        """Name and alternative text of each image on the page."""
+        """Images of the page, as pairs of name and alternative text."""
         return tuple((name, words) for words, name in _PICTURE.findall(self.text))
 
     def picture(self, name: str, *, dark: bool) -> Path | None:
-        """Return the file of an image in its light or dark variant, or None."""
+        """Return the file of an image for the dark or the light theme, or None if it doesn't exist."""
         files = (folder / ("dark" if dark else "light") / f"{name}.png" for folder in self.folders)
         return next((file for file in files if file.is_file()), None)
 
 
 def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tuple[GuidePage, ...]:
-    """Return the pages in file order, in this language, or in English where a translation is missing.
+    """Return all pages, sorted by file name. A page that isn't translated is in English.
 
     Args:
-        key_of: Returns the first key of a command, or "".
+        folder: Folder of the guide, with one subfolder per language.
+        language: Language code, such as "es".
+        key_of: Returns the first shortcut of a command by name, or "".
     """
     made = []
     own = folder / language.split("-", maxsplit=1)[0].split("_", maxsplit=1)[0]
@@ -98,7 +106,7 @@ def read_pages(folder: Path, language: str, key_of: Callable[[str], str]) -> tup
 
 
 class PageView(QTextBrowser):
-    """View of a page, with images scaled to the available width."""
+    """View of a page; images are scaled to the available width."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -114,7 +122,7 @@ class PageView(QTextBrowser):
         self._again.timeout.connect(self._fit_pictures)
 
     def show_page(self, page: GuidePage) -> None:
-        """Show a page, scrolled to its top."""
+        """Show a page and scroll to its start."""
         self._page = page
         self.setMarkdown(page.text)
         self.setAccessibleDescription(" ".join(words for _name, words in page.pictures))
@@ -174,9 +182,9 @@ class PageView(QTextBrowser):
 
 
 class GuideSheet(Overlay):
-    """Sheet with the pages and a search field at the left, and the current page at the right.
+    """Sheet with a search field and the list of pages on the left, and the current page on the right.
 
-    The sheet opens at the page that was shown last.
+    The sheet opens at the last viewed page.
     """
 
     top = 64
@@ -306,7 +314,7 @@ class GuideSheet(Overlay):
             block = block.next()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Move the focus from the list to the search field on "/", and back on Down."""
+        """Move the focus from the list to the search field on "/", and from there to the list on Down."""
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
             if watched is self.list and event.text() == "/":
                 self.search.setFocus(Qt.FocusReason.ShortcutFocusReason)

@@ -1,4 +1,4 @@
-"""Card that asks once for each real robot whether it may move. Stop stays accessible."""
+"""Card that asks for permission before a real robot moves for the first time. Stop stays accessible."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TILE, EDGE, BETWEEN = 40, 20, 10
 
 
 class _Tile(QWidget):
-    """Decorative icon of the card."""
+    """Icon of the card on a coloured background."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -40,9 +40,10 @@ class _Tile(QWidget):
 
 
 class MotionQuestion(QWidget):
-    """Card with the pending question of `MotionPermission`. Escape answers "Not now".
+    """Card that shows the pending question of `MotionPermission`. Esc cancels.
 
-    "Not now" has the initial focus, so that an Enter that was meant for something else moves nothing.
+    "Cancel" has the initial focus, so that an Enter that was typed for another widget doesn't allow
+    motion.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Sheet that asks for a name, with the reason if the typed name is invalid."""
+"""Sheet that asks for a name and shows an error if the typed name is invalid."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ WIDTH = 420
 
 
 class NameSheet(Overlay):
-    """Sheet with a text field and a button; `ask` opens it."""
+    """Sheet with a text field and a button, opened by `ask`."""
 
     top = 128
 
@@ -55,14 +55,14 @@ class NameSheet(Overlay):
         take: Callable[[str], object],
         name: str = "",
     ) -> None:
-        """Open the sheet for a question.
+        """Open the sheet to ask for a name.
 
         Args:
             question: Title of the sheet.
             verb: Text of the button.
-            refusal: Returns why a name is invalid, or "".
-            take: Called with a valid name.
-            name: Initial name.
+            refusal: Returns the reason why a name is invalid, as a sentence, or "".
+            take: Called with the name if it is valid.
+            name: Initial text.
         """
         self._refusal, self._take = refusal, take
         self.setAccessibleName(question)

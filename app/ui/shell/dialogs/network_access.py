@@ -1,4 +1,4 @@
-"""Sheet to let other computers connect: address, consequences, and the address to type on them."""
+"""Sheet to let other computers connect: consequences, address, and the setting for those computers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WARNING = lazy(
 
 
 class NetworkAccessSheet(Overlay):
-    """Sheet of the command "Let other computers connect", also opened from the status bar."""
+    """Sheet of the command "Let other computers connect", which the status bar opens too."""
 
     top = 128
 
@@ -79,7 +79,7 @@ class NetworkAccessSheet(Overlay):
         return QSize(wide, min(room.height(), high))
 
     def open(self) -> None:
-        """Open the sheet with the current settings."""
+        """Update the sheet to the current settings and open it."""
         self._show()
         super().open()
 

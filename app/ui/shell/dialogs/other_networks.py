@@ -1,4 +1,4 @@
-"""Sheet to monitor other networks: for each a switch, an address and its state."""
+"""Sheet to monitor other networks: a switch, an address and the state of each."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ INTRODUCTION = lazy(
 
 
 class OtherNetworksSheet(Overlay):
-    """Sheet whose changes are applied and saved at once, without confirmation."""
+    """Sheet of other networks. Changes are applied and saved immediately."""
 
     top = 96
 
@@ -78,7 +78,7 @@ class OtherNetworksSheet(Overlay):
         return QSize(wide, min(room.height(), high + self._head.sizeHint().height() + 14 + 10 + 16 + 4))
 
     def open(self) -> None:
-        """Open the sheet; the states are updated until it is closed."""
+        """Open the sheet and update the states until it is closed."""
         for row in self.rows:
             row.show_setting()
         self.show_states()
@@ -86,19 +86,22 @@ class OtherNetworksSheet(Overlay):
         super().open()
 
     def dismiss(self) -> None:
-        """Apply typed addresses and close the sheet."""
+        """Apply changed addresses and close the sheet."""
         for row in self.rows:
             row.apply()
         super().dismiss()
 
     def show_states(self) -> None:
-        """Update the state of each network."""
+        """Update the displayed states of all networks."""
         for row in self.rows:
             row.show_state()
 
 
 class NetworkRow(QWidget):
-    """Row of a network: switch, address and state. `changed` is emitted when its height may differ."""
+    """Row with the switch, the address and the state of a network.
+
+    `changed` is emitted when the text of the state changes, which can change the row's height.
+    """
 
     changed = Signal()
 
@@ -128,12 +131,12 @@ class NetworkRow(QWidget):
         self.address.editingFinished.connect(self.apply)
 
     def height_for(self, width: int) -> int:
-        """Return the height in px that is needed for a width."""
+        """Return the height in px that the row needs at a width in px."""
         self._lines.invalidate()
         return self._lines.totalHeightForWidth(width)
 
     def show_setting(self) -> None:
-        """Show the saved setting."""
+        """Update the switch and the address to the saved settings."""
         network = self._network
         self.switch.setChecked(network.is_selected)
         if network.is_selected:
@@ -141,7 +144,7 @@ class NetworkRow(QWidget):
         self._show_error("")
 
     def show_state(self) -> None:
-        """Show the state: connected, searching or the error. While off, explain the address."""
+        """Update the text of the state, which shows an error if the last change failed."""
         words = self._wrong or state_text(self._network)
         role = "error" if self._wrong else "warn" if self._network.state == "lost" else "textSecondary"
         set_role(self.state, role)
@@ -158,7 +161,7 @@ class NetworkRow(QWidget):
             self._apply_change(lambda: self._networks.deselect(self._network.kind.name))
 
     def apply(self) -> None:
-        """Apply a changed address if the network is switched on."""
+        """Apply the address if it was changed and the network is switched on."""
         network = self._network
         if network.is_selected and self.address.text().strip() != network.address:
             self._apply_change(lambda: self._networks.select(network.kind.name, self.address.text()))
@@ -182,7 +185,7 @@ class NetworkRow(QWidget):
 
 
 class AddressField(QLineEdit):
-    """Text field for an address. Return applies the address and keeps the focus."""
+    """Text field for an address. Enter applies the address without moving the focus."""
 
     def __init__(self, theme: Theme, name: str, example: str, take: Callable[[], object]) -> None:
         super().__init__()
@@ -195,7 +198,7 @@ class AddressField(QLineEdit):
         EditMenu(theme, self)
 
     def set_invalid(self, *, wrong: bool) -> None:
-        """Set or remove the style of an invalid value."""
+        """Show the address as invalid if `wrong`, else as valid."""
         self.setProperty("wrong", "true" if wrong else "false")
         self.style().unpolish(self)
         self.style().polish(self)
@@ -208,7 +211,7 @@ class AddressField(QLineEdit):
 
 
 def state_text(network: OtherNetwork) -> str:
-    """Describe the state of a network in a sentence. While the network is off, explain its address."""
+    """Return a sentence about the state of a network, or about its address while it is switched off."""
     if network.state == "lost":
         return f"{network.sentence[:1].upper()}{network.sentence[1:]}."
     if network.state == "looking":

@@ -32,14 +32,15 @@ STOP_INSET = 4  # margin in px of the button around its body, for the focus ring
 
 
 def stop_buttons_in(window: QWidget) -> list[StopButton]:
-    """Return all visible Stop buttons of a window."""
+    """Return the visible Stop buttons of a window."""
     return [stop for stop in window.findChildren(StopButton) if stop.isVisible() and stop.window() is window]
 
 
 class StopButtonWatcher(QObject):
-    """Emits `changed` when a Stop button of a window is shown, hidden, moved or resized, also by its parents.
+    """Observer of the geometry of all Stop buttons in a window.
 
-    Needed because a change of text size lays out the bars several times after all widgets were notified.
+    `changed` is emitted when a Stop button or one of its parents is shown, hidden, moved or resized. A
+    signal is needed because a change of the text size causes several layout passes.
     """
 
     changed = Signal()
@@ -51,7 +52,7 @@ class StopButtonWatcher(QObject):
         self._watched: list[QWidget] = []
 
     def watch(self) -> None:
-        """Watch all Stop buttons, also hidden ones, until `rest` is called."""
+        """Observe all Stop buttons, including hidden ones, until `unwatch` is called."""
         self.unwatch()
         for stop in self._window.findChildren(StopButton):
             widget: QWidget | None = stop
@@ -61,7 +62,7 @@ class StopButtonWatcher(QObject):
                 widget = widget.parentWidget()
 
     def unwatch(self) -> None:
-        """Stop watching the buttons."""
+        """Stop observing the buttons."""
         watched, self._watched = self._watched, []
         for widget in watched:
             if isValid(widget):
@@ -74,9 +75,9 @@ class StopButtonWatcher(QObject):
 
 
 class Scrim(QWidget):
-    """Dims a window except for its Stop buttons, which can be clicked.
+    """Translucent layer that dims a window except for its Stop buttons, which stay clickable.
 
-    Emits `pressed` for clicks elsewhere.
+    `pressed` is emitted on a click elsewhere.
     """
 
     pressed = Signal()
@@ -89,7 +90,7 @@ class Scrim(QWidget):
         self.hide()
 
     def cover(self) -> None:
-        """Cover the whole window, with a hole for each visible Stop button."""
+        """Resize to the whole window and cut a hole for each visible Stop button."""
         window = self.parentWidget()
         if window is None:
             return
@@ -103,7 +104,7 @@ class Scrim(QWidget):
         self.update()
 
     def set_strength(self, strength: float) -> None:
-        """Set the opacity of the scrim (0 to 1)."""
+        """Set the opacity, from 0 (transparent) to 1."""
         self.strength = strength
         self.update()
 
@@ -133,17 +134,18 @@ class Scrim(QWidget):
 
 
 class Overlay(QWidget):
-    """Sheet over a window. It takes the focus; Esc or a click outside closes it and restores the focus.
+    """Base class of sheets over a window.
 
-    Subclasses define the size in `wanted_size`, and the widget that gets the focus in `first`.
+    An open sheet has the focus. Esc or a click outside closes the sheet and restores the previous
+    focus. Subclasses implement `preferred_size` and `first`.
     """
 
     closed = Signal()
     top = EDGE
     is_docked_right = False
-    """True for sheets that are docked at the right edge of the window; toasts then appear left of them."""
+    """True if the sheet is docked at the right edge of the window; toasts are placed to its left."""
     is_nested = False
-    """True for sheets opened from another sheet, which stays open below and gets the focus back."""
+    """True if the sheet is opened from another sheet, which stays open below it and gets the focus back."""
 
     def __init__(self, theme: Theme, window: QWidget, name: str) -> None:
         # `name` is read by screen readers. `open` shows the sheet.
@@ -166,7 +168,11 @@ class Overlay(QWidget):
         self.hide()
 
     def preferred_size(self, room: QSize) -> QSize:
-        """Return the size of the sheet for the space available in the window."""
+        """Return the preferred size of the sheet.
+
+        Args:
+            room: Maximum size that fits into the window.
+        """
         return self.sizeHint().boundedTo(room)
 
     def first(self) -> QWidget:
@@ -174,7 +180,7 @@ class Overlay(QWidget):
         return self
 
     def open(self) -> None:
-        """Open the sheet, without animation if motion is reduced."""
+        """Open the sheet, animated unless motion is reduced."""
         if self.isVisible():
             return
         self._before = QApplication.focusWidget()
@@ -200,7 +206,7 @@ class Overlay(QWidget):
             application.focusChanged.connect(self._focus_changed)
 
     def make_header(self, heading: QWidget) -> QHBoxLayout:
-        """Return a layout with the heading and a close button, for the top of the sheet."""
+        """Return a layout for the top of the sheet, with a heading and a close button."""
         close = IconButton(self.theme, "x", _("Close"), "Esc")
         close.clicked.connect(self.dismiss)
         row = QHBoxLayout()
@@ -209,7 +215,7 @@ class Overlay(QWidget):
         return row
 
     def dismiss(self) -> None:
-        """Close the sheet and restore the focus."""
+        """Close the sheet and restore the previous focus."""
         if not self.isVisible():
             return
         inside = self._has_focus()
@@ -233,7 +239,10 @@ class Overlay(QWidget):
         return parent if parent is not None else self
 
     def place(self) -> None:
-        """Centre the sheet `top` px below the window's upper edge, or lower if it would cover Stop."""
+        """Set the geometry of the sheet, horizontally centred and `top` px below the top of the window.
+
+        The sheet is moved further down if it would cover Stop.
+        """
         window = self.covered_window()
         place = self._geometry_at(self.top)
         stops = [QRect(stop.mapTo(window, QPoint()), stop.size()) for stop in stop_buttons_in(window)]
@@ -270,7 +279,7 @@ class Overlay(QWidget):
         event.accept()  # keys must not reach the window below
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Keep the focus within the sheet."""
+        """Move the focus by Tab within the sheet only."""
         focus = QApplication.focusWidget()
         step: QWidget = focus if focus is not None and self.isAncestorOf(focus) else self
         stop = next(tab_stops(self, step, forward=forward), None)

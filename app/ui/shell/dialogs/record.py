@@ -1,4 +1,4 @@
-"""Sheet "Record": topics to record, progress of the recording, and the flight recorder."""
+"""Sheet "Record": topics and settings, progress of the recording, and the flight recorder."""
 
 from __future__ import annotations
 
@@ -56,12 +56,12 @@ REFRESH_MS = 300
 MIN_TABLE_HEIGHT = 170
 LABEL_WIDE, NUMBER_WIDE, BAR_WIDE = 80, 84, 120
 MAX_DISPLAYED_S = 2 * 86_400.0
-"""Remaining time in s above which the disk's remaining recording time isn't shown."""
+"""Threshold in s; if the disk has space for a longer recording, the remaining time is not shown."""
 _GB = 1e9
 
 
 class RecordMeter(QWidget):
-    """Number with a title above and a note below; blank if unknown."""
+    """Labelled value with a note below it; blank if the value is unknown."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -75,7 +75,13 @@ class RecordMeter(QWidget):
         column.addWidget(self.note)
 
     def set_value(self, value: str, note: str = "", role: str = "textSecondary") -> None:
-        """Set the number and the note."""
+        """Set the value and the note.
+
+        Args:
+            value: Formatted value, or "" if it is unknown.
+            note: Text below the value.
+            role: Colour role of the note.
+        """
         self.value.setText(value)
         self.note.setText(note)
         set_role(self.note, role)
@@ -83,9 +89,10 @@ class RecordMeter(QWidget):
 
 
 class RecordSheet(Overlay):
-    """Sheet with the settings of the next recording, which are saved, and the flight recorder.
+    """Sheet with the settings of recordings and of the flight recorder.
 
-    Settings of the flight recorder are applied at once.
+    Settings of recordings are saved for the next one; settings of the flight recorder are applied
+    immediately.
     """
 
     def __init__(
@@ -312,7 +319,7 @@ class RecordSheet(Overlay):
             super()._focus_changed(old, new)
 
     def open(self) -> None:
-        """Open the sheet; the progress is updated until it is closed."""
+        """Open the sheet and update the progress until it is closed."""
         self._show_settings()
         self.show_state()
         self._timer.start()
@@ -360,7 +367,7 @@ class RecordSheet(Overlay):
 
     @property
     def choice(self) -> RecordingChoice:
-        """Topics and limits of the current recording, or of the next one."""
+        """Topics and limits of the current recording or, if there is none, of the next one."""
         recordings = self._recordings
         return recordings.recorded if recordings.is_recording else recordings.choice
 
@@ -402,7 +409,7 @@ class RecordSheet(Overlay):
         self.patterns.set_invalid(bool(problem))
 
     def show_state(self) -> None:
-        """Show the progress of the recording."""
+        """Update the sheet to the state of the recording and of the flight recorder."""
         recordings = self._recordings
         going = recordings.is_recording
         self.record.set_label(_("Stop recording") if going else _("Record"))

@@ -1,4 +1,4 @@
-"""Sheet "Report a problem": preview of the report file, parts that it leaves out, and a description.
+"""Sheet "Report a problem": preview of the report file, omitted parts, and a description field.
 
 Nothing is uploaded.
 """
@@ -59,9 +59,9 @@ def documents_folder() -> Path:
 
 
 class ReportSheet(Overlay):
-    """Sheet to write a report file, opened by a command or by the banner after a crash.
+    """Sheet to write a report file, opened by a command or from the banner after a crash.
 
-    Typed text is kept until the report is written.
+    The typed description is preserved until the report is written, even if the sheet is closed.
     """
 
     top = 72
@@ -154,8 +154,10 @@ class ReportSheet(Overlay):
         """Open the sheet.
 
         Args:
+            parts: Sources of the report's contents.
             names: Names of the open behaviours.
-            behaviours: Returns the contents of the behaviours, called if the user includes them.
+            behaviours: Returns the open behaviours with their contents; called only if the user
+                includes them.
         """
         self._parts, self._behaviours = parts, behaviours
         while (item := self.list.takeAt(0)) is not None:
@@ -245,7 +247,7 @@ class ReportSheet(Overlay):
 
 
 class _Line(QWidget):
-    """Line about a part that is included in the report or left out."""
+    """Line that names a part of the report, with an icon for included or omitted."""
 
     def __init__(self, theme: Theme, words: str, icon: str) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Sheet with the settings: language, theme, text, contrast, motion, robots, shortcuts, image folder."""
+"""Sheet with the settings of Studio."""
 
 from __future__ import annotations
 
@@ -29,11 +29,14 @@ MODE_LABELS = {
 PREFERENCE_LABELS = {"system": lazy("Match system"), "on": lazy("On"), "off": lazy("Off")}
 TEXT_SIZES = ("100", "125", "150", "175", "200")
 MAX_SEGMENTS = 3
-"""Maximum number of languages shown side by side; more are shown in a drop-down list."""
+"""Maximum number of languages in a segmented control; for more, a combo box is used."""
 
 
 class SettingsSheet(Overlay):
-    """Sheet with the settings. Changes are applied and saved at once; the language needs a restart."""
+    """Sheet with the settings of Studio.
+
+    Changes are applied and saved immediately, except for the language, which requires a restart.
+    """
 
     top = 72
 
@@ -157,7 +160,7 @@ class SettingsSheet(Overlay):
         return QSize(min(room.width(), wide), min(room.height(), high))
 
     def open(self) -> None:
-        """Open the sheet with the current settings."""
+        """Update the sheet to the current settings and open it."""
         self.voice.setText(self._voice())
         self._show()
         super().open()

@@ -1,4 +1,4 @@
-"""Sheet with all shortcuts, to search, change, swap and reset keys."""
+"""Sheet with all keyboard shortcuts, to search, change, swap and reset them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,10 @@ HINT = lazy("Press Enter or click to change a shortcut. Press Delete to remove i
 
 
 class ShortcutSheet(Overlay):
-    """Table of shortcuts. While it records a new shortcut, it accepts every key except F12 and Esc."""
+    """Sheet with a table of shortcuts.
+
+    While a new shortcut is recorded, all keys except F12 and Esc are accepted.
+    """
 
     top = 72
 
@@ -87,14 +90,14 @@ class ShortcutSheet(Overlay):
         return QSize(min(room.width(), round(scaled(WIDE))), min(room.height(), round(scaled(HIGH))))
 
     def open(self) -> None:
-        """Open the sheet with all shortcuts."""
+        """Open the sheet without a filter."""
         self.field.clear()
         self._stop_recording()
         self._show()
         super().open()
 
     def open_for(self, name: str) -> None:
-        """Open the sheet, select a command and record its new key."""
+        """Open the sheet, select a command by name, and start to record a new shortcut for it."""
         self.open()
         self._show(f"command:{name}")
         self.record()
@@ -145,7 +148,7 @@ class ShortcutSheet(Overlay):
             paint.announce(self.field, str(self.rows.currentIndex().data(Qt.ItemDataRole.AccessibleTextRole)))
 
     def record(self) -> None:
-        """Start to record a new key for the selected command."""
+        """Start to record a new shortcut for the selected command."""
         entry = self.rows.entry
         if entry is None:
             return

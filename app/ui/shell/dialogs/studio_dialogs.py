@@ -1,4 +1,4 @@
-"""File dialogs of Studio, all shown in one sheet that is created on first use."""
+"""Studio's file dialogs, which share one sheet that is created on first use."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LAYOUT = FileQuestion(
 
 
 class StudioDialogs:
-    """Asks for files and folders in a `FileSheet`."""
+    """Implementation of `FileDialogs` with a `FileSheet`."""
 
     def __init__(self, theme: Theme, window: QWidget, settings: Settings) -> None:
         self._theme, self._window, self._settings = theme, window, settings
@@ -35,7 +35,7 @@ class StudioDialogs:
         self._get_sheet().ask_open(Path(folder or Path.home()), take)
 
     def save(self, suggestion: str, take: Callable[[Path], None]) -> None:
-        """Ask for place and name to save a behaviour."""
+        """Ask for the folder and name to save a behaviour."""
         self._get_sheet().ask_save(Path(suggestion), take)
 
     def save_as(
@@ -45,7 +45,7 @@ class StudioDialogs:
         kinds: Sequence[FileKind],
         take: Callable[[Path, FileKind], None],
     ) -> None:
-        """Ask for place, name and format to save another kind of file."""
+        """Ask for folder, name and format to save a file other than a behaviour."""
         self._get_sheet().ask_save_as(title, suggestion, kinds, take)
 
     def open_picture(self, folder: str, take: Callable[[Path], None]) -> None:

@@ -1,4 +1,4 @@
-"""Sheet with the earlier versions of a behaviour and their differences. A version can be opened as a copy."""
+"""Sheet with the version history of a behaviour; a version can be opened as a copy."""
 
 from __future__ import annotations
 
@@ -37,7 +37,10 @@ SAVE_FIRST = lazy(
 
 
 def difference_text(found: Difference) -> str:
-    """Format a difference, such as "14 blocks; since then 3 added, 1 removed"."""
+    """Format the difference of a version from the current blocks.
+
+    The text is such as "14 blocks; since then 3 added, 1 removed".
+    """
     counts = (
         (found.added, ngettext("{count} added", "{count} added", found.added)),
         (found.removed, ngettext("{count} removed", "{count} removed", found.removed)),
@@ -114,10 +117,14 @@ class VersionHistorySheet(Overlay):
         now: dt.datetime | None = None,
         title: str = "",
     ) -> None:
-        """Show the versions of a file, compared with the current blocks of the behaviour.
+        """Open the sheet with the versions of a file, compared with the current blocks.
 
         Args:
-            title: Name with folder, used if another open behaviour has the same name.
+            name: Name of the behaviour.
+            path: File of the behaviour, or None if it isn't saved to a file.
+            workspace: Current blocks.
+            now: Current time, for the formatted dates; default: the system time.
+            title: Name with folder, if another open behaviour has the same name.
         """
         self._name, self._now = name, workspace
         moment = now if now is not None else dt.datetime.now().astimezone()
@@ -180,7 +187,7 @@ class VersionHistorySheet(Overlay):
 
     @property
     def read(self) -> bool:
-        """True once all versions were compared."""
+        """True once all versions were read and compared."""
         return not self._unread
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
@@ -193,7 +200,7 @@ class VersionHistorySheet(Overlay):
         return super().eventFilter(watched, event)
 
     def open_selected(self) -> None:
-        """Open the selected version as a copy, unless it is unreadable."""
+        """Open the selected version as a copy, unless it can't be read."""
         entry = self.rows.entry
         if entry is None or entry.reason:
             return

@@ -1,4 +1,4 @@
-"""Dock: a panel with a title bar and a frame, which can be floated and closed."""
+"""Dock: a panel with a title bar and a frame, which can be moved, floated and closed."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ from nep.i18n import _
 
 MIN_BODY_SIZE = QSize(160, 60)
 SUSPEND_DELAY_S = 2.0
-"""Time in s after which a hidden panel is suspended, so that quick tab changes don't resubscribe."""
+"""Delay in s before a hidden panel is suspended, so that quick tab changes don't resubscribe to topics."""
 CAUGHT_ERRORS = (Exception, SystemExit)
-"""Exceptions of panels that are caught. A plug-in's panel may call `sys.exit`."""
+"""Exceptions of panels that are caught; SystemExit because a plug-in's panel may call `sys.exit`."""
 MAX_MESSAGE_LENGTH = 400
 
 _log = logging.getLogger(__name__)
 
 
 class _Corner(QWidget):
-    """Rounds a lower corner of a panel by painting over it."""
+    """Widget over a lower corner of a panel that paints the rounded corner of the frame."""
 
     def __init__(self, theme: Theme, parent: QWidget, right: bool) -> None:
         super().__init__(parent)
@@ -65,7 +65,7 @@ class _Corner(QWidget):
 
 
 class DockBody(QWidget):
-    """Lower part of the frame, which contains the panel or an error message."""
+    """Lower part of the frame, with the panel or, after a failure, an error message."""
 
     def __init__(self, theme: Theme, panel: PanelWidget) -> None:
         super().__init__()
@@ -91,7 +91,12 @@ class DockBody(QWidget):
         right.raise_()
 
     def show_error(self, sentence: str, again: Callable[[], object]) -> None:
-        """Show an error in place of the panel, with a button to try again."""
+        """Show an error in place of the panel.
+
+        Args:
+            sentence: Error message.
+            again: Callback of the button "Try again".
+        """
         if self._failure is None:
             self._failure = EmptyState(self._theme, "circle-x", _("This panel stopped"), sentence)
             self._stack.addWidget(self._failure)
@@ -100,7 +105,7 @@ class DockBody(QWidget):
         self._stack.setCurrentWidget(self._failure)
 
     def show_panel(self) -> None:
-        """Show the panel instead of the error."""
+        """Show the panel in place of the error message."""
         self._stack.setCurrentIndex(0)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -114,9 +119,10 @@ class DockBody(QWidget):
 
 
 class FailedPanel(PanelWidget):
-    """Placeholder for a panel whose creation failed. Keeps the state to restore.
+    """Placeholder for a panel that couldn't be created.
 
-    The first refresh raises the original error; later ones try to create the panel again.
+    The first refresh raises the original error, which the dock displays; later ones create the panel
+    again. The panel's saved state is stored until then.
     """
 
     def __init__(self, context: PanelContext, description: Panel, error: BaseException) -> None:
@@ -143,9 +149,15 @@ class FailedPanel(PanelWidget):
 
 
 class Dock(QDockWidget):
-    """Panel in a workbench that can be moved, floated, closed and tabbed.
+    """Dock widget of a panel in a workbench.
 
-    A `failed` panel is not refreshed.
+    Attributes:
+        description: Description of the kind of panel.
+        panel: Panel, or its placeholder if the panel couldn't be created.
+        number: Number among the docks of the same kind, counted from 1.
+        key: Unique name in the workbench.
+        failed: True after an exception of the panel, which is then not refreshed any more.
+        front: True if the dock isn't covered by another tab.
     """
 
     another_requested = Signal(str)
@@ -179,7 +191,7 @@ class Dock(QDockWidget):
         self.setWidget(body)
 
     def replace(self, panel: PanelWidget) -> None:
-        """Replace the placeholder by the panel."""
+        """Replace the placeholder by a panel."""
         old = (self.title, self.body)
         self._set_panel(panel)
         for each in old:
@@ -194,13 +206,19 @@ class Dock(QDockWidget):
         self.front = visible
 
     def is_displayed(self) -> bool:
-        """Return True if the panel is visible: open, in front, and in a window on the screen."""
+        """Return True if the panel is visible to the user: open, in front, and in a window on the screen."""
         return self.front and self.isVisible() and is_on_screen(self.window())
 
     def update_suspension(self, now: float) -> str | None:
-        """Suspend a panel that was hidden for two seconds, or resume a visible one; called on every tick.
+        """Suspend the panel if it has been hidden for `SUSPEND_DELAY_S`, or resume it.
 
-        ``now`` is monotonic time in s. Return the error message if the panel has just failed.
+        Called on every tick.
+
+        Args:
+            now: Monotonic time in s.
+
+        Returns:
+            The error message if the panel has just failed, else None.
         """
         if self.failed:
             return None
@@ -210,13 +228,20 @@ class Dock(QDockWidget):
         return self._try(self.panel.suspend) if now - self._seen_s >= SUSPEND_DELAY_S else None
 
     def refresh(self) -> str | None:
-        """Refresh the panel if it is visible. Return the error message if the panel has just failed."""
+        """Refresh the panel if it is visible.
+
+        Returns:
+            The error message if the panel has just failed, else None.
+        """
         if self.failed or not self.is_displayed():
             return None
         return self._try(self.panel.refresh)
 
     def badge(self) -> tuple[str, str] | None:
-        """Return the badge for the panel's tab while another panel covers it."""
+        """Return text and status of the badge on the panel's tab, or None.
+
+        There is no badge if the panel is in front, has failed, or has nothing new.
+        """
         if self.front or self.failed:
             return None
         found: list[tuple[str, str] | None] = []
@@ -239,15 +264,16 @@ class Dock(QDockWidget):
         return None
 
     def retry(self) -> None:
-        """Show a failed panel again, beginning with the next refresh. Has no effect on other panels."""
+        """Show a failed panel again and resume its refreshes. Has no effect on other panels."""
         if self.failed:
             self.failed = False
             self.body.show_panel()
 
     def saved_state(self) -> dict[str, object]:
-        """Return the panel's state for the next start, or {} if the panel raises an error.
+        """Return the state of the panel to save.
 
-        The state must be valid JSON, because settings are saved as a whole.
+        Returns:
+            The state, or {} if the panel raises an exception or the state can't be encoded as JSON.
         """
         try:
             found = self.panel.save_state()
@@ -258,21 +284,24 @@ class Dock(QDockWidget):
         return found
 
     def restore_state(self, state: Mapping[str, object]) -> None:
-        """Restore the panel's state. An error is logged, so that the rest of the layout is restored."""
+        """Restore the state of the panel.
+
+        An exception is logged and not raised, so that the rest of the layout is restored.
+        """
         try:
             self.panel.restore_state(state)
         except CAUGHT_ERRORS:
             _log.exception("restoring panel '%s' failed", self.description.name)
 
     def dispose(self) -> None:
-        """Close the panel before the window closes; an error is logged."""
+        """Release the resources of the panel before the window closes. An exception is logged."""
         try:
             self.panel.dispose()
         except CAUGHT_ERRORS:
             _log.exception("closing panel '%s' failed", self.description.name)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Focus the panel's filter on ``/``, and leave a field on Esc. Also works while the dock floats."""
+        """Move the focus to the panel's filter on "/", and from a field to the panel on Esc."""
         if event.text() == "/" and self.panel.focus_filter():
             event.accept()
         elif event.key() == Qt.Key.Key_Escape:
@@ -283,7 +312,7 @@ class Dock(QDockWidget):
             super().keyPressEvent(event)
 
     def menu(self) -> Menu:
-        """Return a menu with the panel's actions, then float and close."""
+        """Return a new menu with the actions of the panel, and with Float and Close."""
         menu = Menu(self._theme, self)
         own: list[QAction] = []
         try:
@@ -303,7 +332,7 @@ class Dock(QDockWidget):
         return menu
 
     def focus_target(self) -> QWidget:
-        """Return the widget that gets the focus: the panel's main widget, else its first focusable one."""
+        """Return the widget that gets the focus: the panel's focus proxy or its first tab stop."""
         about = focus_proxy(self.panel)
         if about is not None and about.isVisible():
             return about
@@ -342,12 +371,15 @@ class Dock(QDockWidget):
 
 
 def key_of(name: str, number: int) -> str:
-    """Return the key of a dock in a workbench, such as "plot" or "plot#2"."""
+    """Return the key of a dock from the name of the panel and the dock's number, such as "plot#2".
+
+    The first dock of a kind has the name as key.
+    """
     return name if number < 2 else f"{name}#{number}"
 
 
 def parse_key(key: str) -> tuple[str, int]:
-    """Split a key into name and number. Text in another format is a name with the number 1."""
+    """Split the key of a dock into name and number; a key in another format is a name with the number 1."""
     name, _sign, number = key.rpartition("#")
     if name and number.isascii() and number.isdigit() and key_of(name, int(number[:9])) == key:
         return name, int(number)
@@ -355,7 +387,7 @@ def parse_key(key: str) -> tuple[str, int]:
 
 
 def make_dock(description: Panel, context: PanelContext, density: Density, number: int = 1) -> Dock:
-    """Return a dock with a new panel, or with a `FailedPanel` if creating the panel failed."""
+    """Return a dock with a new panel, or with a `FailedPanel` if the panel raises an exception."""
     try:
         return Dock(context.theme, description, description.make(context), density, number)
     except CAUGHT_ERRORS as error:
@@ -367,12 +399,25 @@ def make_dock(description: Panel, context: PanelContext, density: Density, numbe
 
 
 def is_on_screen(window: QWidget) -> bool:
-    """Return False if a window is minimised, on another desktop, or (where known) completely covered."""
+    """Return True if a window is on the screen.
+
+    Returns:
+        False if the window is minimised, on another desktop or, where the system reports it, fully
+        covered.
+    """
     return not window.isMinimized() and window.windowHandle().isExposed()
 
 
 def dock_for_kinds(docks: Mapping[str, Dock], names: Iterable[str], kinds: set[str]) -> Dock | None:
-    """Return the first dock whose panel accepts one of the kinds. Specific panels precede general ones."""
+    """Return the first dock whose panel can show one of the kinds of topics, or None.
+
+    A panel that accepts one of the kinds takes precedence over one that accepts any type.
+
+    Args:
+        docks: Docks by key.
+        names: Keys of the docks to check, in order.
+        kinds: Message type and codec of a topic.
+    """
     there = [docks[name] for name in names]
     for wanted in (kinds, {ANY_TYPE}):
         for dock in there:

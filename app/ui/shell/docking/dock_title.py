@@ -1,4 +1,4 @@
-"""Title bar of a dock: name or tabs, subtitle, chips, the panel's buttons and the menu."""
+"""Title bar of a dock: name or tabs, subtitle, chips, buttons of the panel, and the menu."""
 
 from __future__ import annotations
 
@@ -24,8 +24,7 @@ MIN_NAME_WIDTH = 56  # px at 100 %; if there is less room, the front panel is sh
 class TitleTab(PaintedButton):
     """Tab of a panel that shares its place with others; a click brings the panel to the front.
 
-    In a narrow title bar only its icon is shown, with the name as tooltip. ``badge`` is a count and its
-    status.
+    In a narrow title bar only the icon is shown. A badge can show a count with a status.
     """
 
     elides_text = True
@@ -39,14 +38,14 @@ class TitleTab(PaintedButton):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def set_icon_only(self, bare: bool) -> None:
-        """Show only the icon if `bare`, else the name too."""
+        """Show only the icon if `bare`, else the icon and the name."""
         if bare != self._bare:
             self._bare = bare
             self.updateGeometry()
             self.update()
 
     def show_badge(self, badge: tuple[str, str] | None) -> None:
-        """Show the number of new items with the most severe status; None hides the badge."""
+        """Set the badge as (text, status); None hides it."""
         if badge != self.badge:
             self.badge = badge
             self.setAccessibleDescription(badge[0] if badge else "")
@@ -54,7 +53,7 @@ class TitleTab(PaintedButton):
             self.update()
 
     def full_width(self) -> int:
-        """Return the width in px with the name."""
+        """Return the width in px with icon and name."""
         return round(paint.width_of(self._theme.font("title"), self.text()) + 21 + self._badge_room())
 
     def _badge_room(self) -> float:
@@ -108,7 +107,7 @@ class TitleTab(PaintedButton):
 
 
 class DockTitle(QWidget):
-    """Title bar of a dock. Also paints the upper part of the panel's frame."""
+    """Title bar of a dock, which also paints the upper part of the panel's frame."""
 
     menu_requested = Signal(object)
 
@@ -177,7 +176,7 @@ class DockTitle(QWidget):
         return QSize(80, self._height())  # doesn't call sizeHint, because this is called often
 
     def show_title(self) -> None:
-        """Update name and subtitle to those of the panel."""
+        """Update the name and the subtitle to those of the panel."""
         self.name.setText(self._panel.title())
         self._subtitle.setText(self._panel.subtitle())
         paint.show_when(self._subtitle, bool(self._panel.subtitle()) and self._whole is None)
@@ -186,11 +185,15 @@ class DockTitle(QWidget):
                 tab.setText(self._panel.title())
 
     def set_active(self, active: bool) -> None:
-        """Darken the name while the panel has the focus (`active`)."""
+        """Set whether the panel has the focus; the name is then painted darker."""
         set_role(self.name, "text" if active else "textSecondary")
 
     def set_tabs(self, names: Sequence[tuple[str, str, bool, Callable[[], object]]]) -> None:
-        """Set the tabs of a shared place, each as (name, icon, True for this panel, callback to show it)."""
+        """Replace the tabs of the panels that share this place.
+
+        Args:
+            names: Name, icon, True for this panel, and callback that shows the panel, for each tab.
+        """
         row = self._tab_row
         for old in self._tabs:
             row.removeWidget(old)
@@ -217,10 +220,10 @@ class DockTitle(QWidget):
         return self._row if self._whole is None else self._shared_row
 
     def fit_tabs(self) -> None:
-        """Fit the row to its width: first shorten the chips, then show tabs of hidden panels as icons.
+        """Shorten chips and tabs until the title bar fits into its width.
 
-        As a last step, the front panel is shown as an icon too. Chips with an unspecific icon keep their
-        text.
+        First the chips are reduced to icons, then the tabs of hidden panels, then the tab of the front
+        panel. Chips with a generic icon keep their text.
         """
         chips = [chip for chip in self._other_widgets() if isinstance(chip, Chip) and chip.status != "off"]
         if not self._tabs:
@@ -261,7 +264,7 @@ class DockTitle(QWidget):
         return self.width() - margins.left() - margins.right() - taken - gaps
 
     def show_badges(self, badges: Sequence[tuple[str, str] | None]) -> None:
-        """Set the badges of the panels in this place, one per tab."""
+        """Set the badges of the tabs, in the order of the tabs; None for no badge."""
         for tab, badge in zip(self._tabs, badges, strict=False):
             if badge != tab.badge:
                 tab.show_badge(badge)
@@ -272,7 +275,7 @@ class DockTitle(QWidget):
         self.fit_tabs()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Fit the tabs again when a chip or button changes its size."""
+        """Call `fit_tabs` when a chip or button changes its size."""
         if event.type() is QEvent.Type.LayoutRequest and watched is not self:
             self.fit_tabs()
         return super().eventFilter(watched, event)
@@ -284,7 +287,7 @@ class DockTitle(QWidget):
 
     @property
     def tabs(self) -> tuple[str, ...]:
-        """Names of the tabs; empty if the panel doesn't share its place."""
+        """Names of the tabs; empty if no other panel shares this place."""
         return tuple(tab.text() for tab in self._tabs)
 
     def contextMenuEvent(self, event: QContextMenuEvent) -> None:

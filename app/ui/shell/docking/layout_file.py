@@ -21,12 +21,19 @@ MAX_BYTES = 1_000_000
 
 
 class LayoutFileError(AppError):
-    """Raised if a file can't be used as a layout. The message is a phrase without a full stop."""
+    """Raised if a file isn't a valid layout. The message is a phrase without a full stop."""
 
 
 @dataclass(frozen=True, slots=True)
 class LayoutFile:
-    """Contents of a layout file; ``unknown`` lists its panels that aren't installed here."""
+    """Contents of a layout file.
+
+    Attributes:
+        name: Name of the layout.
+        base: Name of the built-in layout on which it is based.
+        saved: Arrangement, as returned by `Workbench.save`, without unknown panels.
+        unknown: Names of panels in the file that aren't installed.
+    """
 
     name: str
     base: str
@@ -35,7 +42,13 @@ class LayoutFile:
 
 
 def layout_bytes(name: str, base: str, saved: Mapping[str, object]) -> bytes:
-    """Return the contents of a file for an arrangement returned by `Workbench.save`."""
+    """Encode a layout file.
+
+    Args:
+        name: Name of the layout.
+        base: Name of the built-in layout on which it is based.
+        saved: Arrangement returned by `Workbench.save`.
+    """
     plain = {
         "format": FORMAT,
         "version": VERSION,
@@ -58,9 +71,9 @@ def read_layout(data: bytes, stem: str, panels: Collection[str]) -> LayoutFile:
     """Parse a layout file.
 
     Args:
-        data: Content of the file.
-        stem: Name for a layout without one.
-        panels: Names of the available panels.
+        data: Contents of the file.
+        stem: Name to use if the file contains none.
+        panels: Names of the installed panels.
 
     Raises:
         LayoutFileError: The file isn't a valid layout.

@@ -11,11 +11,13 @@ from nep.i18n import lazy
 
 @dataclass(frozen=True)
 class DockColumn:
-    """Column of panels.
+    """Column of docks in a layout.
 
-    Each row has the names of the panels that share a place, and a height. A ``width`` of 0 takes the
-    remaining space. The width grows with the text size up to the share ``most`` of the window's width; in a
-    large window it is ``share`` of it.
+    Attributes:
+        width: Width in px at 100 % text size; 0 takes the remaining space.
+        rows: Names of the panels that share a place, and height in px, for each row from top to bottom.
+        max_share: Maximum width as a share of the window's width.
+        share: Minimum width as a share of the window's width, for large windows.
     """
 
     width: int
@@ -26,9 +28,13 @@ class DockColumn:
 
 @dataclass(frozen=True)
 class Fold:
-    """Panels that become tabs of ``into`` below a width or height, in px at 100 % text.
+    """Rule that moves panels into the tabs of another panel in a small workbench.
 
-    The first panel identifies the fold within its layout.
+    Attributes:
+        target: Panel to whose tabs the panels are added.
+        panels: Panels to move; the first one identifies the rule in saved layouts.
+        below_width: Width in px at 100 % text size below which the rule applies.
+        below_height: Height in px at 100 % text size below which the rule applies.
     """
 
     target: str
@@ -37,20 +43,26 @@ class Fold:
     below_height: int = 0
 
     def applies(self, width: float, height: float) -> bool:
-        """Return True if the panels are folded in a workbench of this size (px at 100 % text)."""
+        """Return True if the rule applies to a workbench of this size, in px at 100 % text size."""
         return width < self.below_width or height < self.below_height
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Default arrangement of a layout: columns from the left, and ``folds`` for small windows.
+    """Default arrangement of the panels in a workbench.
 
     Attributes:
+        name: Unique name.
         title: Title, wrapped in `lazy`.
-        homes: Panel next to which another one opens as a tab; others open next to the last panel.
-        brings: Panel that opens together with another one, and isn't open by default.
-        taller: Minimum height of the place of a panel while it is open.
-        below: Heights of panels that open below all others with the window's full width.
+        icon: Name of the icon.
+        density: Row height and text size of the panels.
+        columns: Columns from left to right.
+        folds: Rules for small workbenches.
+        tab_targets: Panel to whose tabs another one is added when it is opened, by name of the latter;
+            the default is the last panel.
+        companions: Panel that is opened together with another one, by name of the latter.
+        min_heights: Minimum heights in px of the rows that contain certain open panels, by name.
+        bottom_heights: Heights in px of panels that are opened below all columns, by name.
     """
 
     name: str
@@ -66,13 +78,13 @@ class Layout:
 
     @property
     def default_panels(self) -> tuple[str, ...]:
-        """Panels that are open by default."""
+        """Names of the panels that are open by default."""
         names = (name for column in self.columns for names, _height in column.rows for name in names)
         return tuple(name for name in names if name not in self.deferred_panels)
 
     @property
     def deferred_panels(self) -> frozenset[str]:
-        """Panels whose rows don't exist by default."""
+        """Names of the panels whose rows are created only when they are opened."""
         return frozenset(self.companions.values())
 
 
@@ -148,5 +160,5 @@ LAYOUTS: tuple[Layout, ...] = (BEHAVIOUR, DEVELOPER)
 
 
 def layout_named(name: str) -> Layout:
-    """Return the layout with this name, or the first one if there is none."""
+    """Return the built-in layout with this name, or the first one if the name is unknown."""
     return next((layout for layout in LAYOUTS if layout.name == name), LAYOUTS[0])

@@ -1,7 +1,7 @@
-"""Saved layouts: the last states of Behaviour and Developer, and custom layouts.
+"""Saved layouts: the last arrangements of the built-in layouts, and custom layouts.
 
-A custom layout arranges the panels of Behaviour or Developer, its base. Like the built-in ones, it keeps its
-last state. Saved entries that no longer fit are skipped and reported in the Console.
+A custom layout is based on a built-in one and also has a last arrangement. Saved entries that are no
+longer valid are skipped and reported in the Console.
 """
 
 from __future__ import annotations
@@ -20,14 +20,17 @@ MAX_LENGTH = 40
 
 @dataclass(frozen=True, slots=True)
 class CustomLayout:
-    """Custom layout, with the built-in layout that it is based on."""
+    """Custom layout, with the name of the built-in layout on which it is based."""
 
     name: str
     base: str
 
 
 class SavedLayouts:
-    """Current arrangement of each workbench, and saved states of all layouts."""
+    """Store of the arrangements of all layouts, which also records the current layout of each workbench.
+
+    In its methods, ``base`` is the name of a workbench's built-in layout.
+    """
 
     def __init__(self, state: WindowState, complain: Callable[[str], object]) -> None:
         # `complain` is called with a sentence about damaged entries.
@@ -35,7 +38,7 @@ class SavedLayouts:
         self._current: dict[str, str] = {}
 
     def all(self) -> tuple[CustomLayout, ...]:
-        """Return the custom layouts, sorted by name."""
+        """Return all custom layouts, sorted by name."""
         bases = {layout.name for layout in LAYOUTS}
         found = []
         for key, kept in self._state.layouts().items():
@@ -56,7 +59,12 @@ class SavedLayouts:
         return chosen if found is not None and found.base == base else ""
 
     def rejection_reason(self, name: str, but: str = "") -> str:
-        """Return the reason why a name is invalid, as a sentence, or ""."""
+        """Return the reason why a name for a custom layout is invalid, as a sentence, or "".
+
+        Args:
+            name: Name to check.
+            but: Existing name that is allowed, because that layout is being renamed.
+        """
         name = name.strip()
         if not name:
             return _("Enter a name for the layout.")
@@ -67,7 +75,7 @@ class SavedLayouts:
         return _("“{name}” already exists.").format(name=name) if is_taken else ""
 
     def restore(self, bench: Workbench, base: str) -> None:
-        """Restore the last arrangement of a workbench, or the default if there is none or it is damaged."""
+        """Restore the last arrangement of a workbench; if there is none or it is invalid, use the default."""
         own = self.custom_name(base)
         saved = self._state.layout_state(CUSTOM_PREFIX + own if own else base)
         if not saved:
@@ -84,12 +92,18 @@ class SavedLayouts:
             self._complain(words.format(name=own or _(layout_named(base).title)))
 
     def save(self, bench: Workbench, base: str) -> None:
-        """Save the arrangement of a workbench under the name of its current layout."""
+        """Save the arrangement of a workbench for its current layout."""
         own = self.custom_name(base)
         self._state.save_layouts({CUSTOM_PREFIX + own if own else base: {**bench.save(), "base": base}})
 
     def switch(self, bench: Workbench, base: str, own: str) -> None:
-        """Save the current layout, then show another one ("" for the built-in one)."""
+        """Save the current layout of a workbench and switch to another one.
+
+        Args:
+            bench: Workbench.
+            base: Name of its built-in layout.
+            own: Name of the custom layout to show, or "" for the built-in one.
+        """
         if own == self.custom_name(base):
             return
         self.save(bench, base)
@@ -97,16 +111,22 @@ class SavedLayouts:
         self.restore(bench, base)
 
     def save_as(self, bench: Workbench, base: str, name: str) -> bool:
-        """Save the current arrangement as a new custom layout and show that. The old layout keeps its state.
+        """Save the current arrangement as a new custom layout and switch to it.
 
-        Return False if the layout couldn't be saved and will be lost when Studio ends.
+        The saved arrangement of the previous layout isn't changed.
+
+        Returns:
+            False if the layout can't be saved and exists only until Studio closes.
         """
         kept = self._state.save_layouts({CUSTOM_PREFIX + name.strip(): {**bench.save(), "base": base}})
         self._set_current(base, name.strip())
         return kept
 
     def can_restore(self, bench: Workbench, base: str, saved: Mapping[str, object]) -> bool:
-        """Return True if an imported arrangement can be restored; tries that before anything is saved."""
+        """Return True if a workbench can restore an imported arrangement.
+
+        The arrangement is restored on trial; afterwards the workbench is as before.
+        """
         self.save(bench, base)
         try:
             return bench.restore(saved)
@@ -117,9 +137,11 @@ class SavedLayouts:
             self.restore(bench, base)
 
     def import_layout(self, name: str, base: str, saved: Mapping[str, object]) -> tuple[str, bool]:
-        """Save an imported arrangement. Return its name, and False if it couldn't be saved.
+        """Save an imported arrangement as a custom layout.
 
-        A number is appended if the name is taken or invalid.
+        Returns:
+            The name of the layout, with a number appended if the name was taken or invalid, and True if
+            the layout was saved.
         """
         name = name.strip()[:MAX_LENGTH].strip()
         free, number = name, 2
@@ -129,7 +151,7 @@ class SavedLayouts:
         return free, self._state.save_layouts({CUSTOM_PREFIX + free: {**saved, "base": base}})
 
     def rename(self, old: str, new: str) -> None:
-        """Rename a custom layout."""
+        """Rename a custom layout. Has no effect if there is no layout with the old name."""
         found = self.named(old)
         if found is None or new.strip() == old:
             return
@@ -140,10 +162,14 @@ class SavedLayouts:
             self._set_current(found.base, new.strip())
 
     def delete(self, bench: Workbench | None, name: str) -> tuple[bool, Callable[[], None]]:
-        """Delete a custom layout; its workbench then shows the built-in layout.
+        """Delete a custom layout and show the built-in layout in its place.
+
+        Args:
+            bench: Workbench that shows the layout, or None.
+            name: Name of the layout.
 
         Returns:
-            True if the deletion was saved, and a function that restores the layout.
+            True if the deletion was saved, and a function that undoes the deletion.
         """
         found = self.named(name)
         if found is None:

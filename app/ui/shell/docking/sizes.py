@@ -1,8 +1,8 @@
 """Default sizes of panels, which apply until the user moves a separator.
 
-A column keeps its width, and the last panel of a column (before panels that open later) its height; the
-others share the additional space of a larger window. In a small window all shrink in proportion. Columns grow
-with the text size up to the limit of the layout.
+In a larger window, columns with a width and the last panel of each column keep their sizes; the others
+share the additional space. In a small window all panels shrink in proportion. Columns grow with the
+text size up to a limit of the layout.
 """
 
 from __future__ import annotations
@@ -18,10 +18,13 @@ MIN_SIZE_PX = 120
 
 
 def shares(wanted: Sequence[int], room: int, *, keep: Sequence[bool]) -> list[int]:
-    """Return sizes that fill ``room``.
+    """Distribute a length among widgets and return their sizes.
 
-    Sizes whose ``keep`` is True are unchanged, the others are scaled in proportion. If less than
-    `MIN_SIZE_PX` each were left for the others, all sizes are scaled with this minimum.
+    Args:
+        wanted: Default sizes in px.
+        room: Length in px to distribute.
+        keep: True for each widget whose size is fixed; the others are scaled in proportion. If this
+            left less than `MIN_SIZE_PX` for one of them, all widgets are scaled.
     """
     whole = max(1, sum(wanted))
     least = sum(size if kept else MIN_SIZE_PX for size, kept in zip(wanted, keep, strict=True))
@@ -50,9 +53,13 @@ def fit(
     """Resize all columns and panels to the layout's proportions in the available space.
 
     Args:
-        scale: Text size.
-        folded: Panels that are in another column.
-        below: Height in px at the bottom that belongs to a panel of full width.
+        bench: Window with the docks.
+        layout: Layout with the default sizes.
+        docks: Docks by key.
+        gap: Width of the separators in px.
+        scale: Text size, 1.0 for 100 %.
+        folded: Panels that were moved into the tabs of another panel.
+        below: Height in px that is reserved at the bottom for a panel of full width.
     """
     columns = []
     before: list[QDockWidget] = []
@@ -104,7 +111,15 @@ def shrink_above(
     *,
     below: int,
 ) -> None:
-    """Shrink the columns of an area to leave ``below`` px free at the bottom; proportions are kept."""
+    """Shrink the columns of an area in proportion, to free space at the bottom.
+
+    Args:
+        bench: Window with the docks.
+        docks: Docks of the window.
+        area: Dock area of the columns.
+        gap: Width of the separators in px.
+        below: Height in px to free at the bottom.
+    """
     columns: dict[int, list[QDockWidget]] = {}
     for dock in docks:
         is_seen = not dock.isFloating() and not dock.visibleRegion().isEmpty()

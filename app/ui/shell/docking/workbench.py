@@ -22,16 +22,19 @@ VERTICAL = Qt.Orientation.Vertical
 MAIN_AREA = Qt.DockWidgetArea.LeftDockWidgetArea
 BOTTOM_AREA = Qt.DockWidgetArea.BottomDockWidgetArea
 MAX_BELOW_SHARE = 0.42
-"""Maximum height of panels below all others, as a share of the window's height."""
+"""Maximum height of a panel below all columns, as a share of the workbench's height."""
 STATE_VERSION = 1  # when it changes, app.core.storage.settings.FORMAT must change, too
 MAX_PER_KIND = 8
 
 
 class Workbench(QMainWindow):
-    """Docks of one layout, by key. Panels are created when they are first opened.
+    """Window with the docks of one layout. Panels are created when they are first opened.
 
-    Closed panels are kept, except for additional panels of a kind, which are deleted to release their
-    resources.
+    A closed panel stays alive, except for the second and further panels of a kind, which are deleted to
+    release their resources. `panel_failed` is emitted with the key of a dock and the error message.
+
+    Attributes:
+        docks: Docks by key, in the order of their creation.
     """
 
     panel_failed = Signal(str, str)
@@ -80,14 +83,14 @@ class Workbench(QMainWindow):
         theme.changed.connect(self._text_changed)
 
     def preload(self, name: str) -> None:
-        """Create a panel before it is opened, to avoid a delay then. It is suspended until visible."""
+        """Create a panel in advance to avoid a delay when it is opened. The panel is suspended until then."""
         description = self._panels.get(name)
         if description is not None and name not in self.docks and name not in self._ahead:
             self._ahead[name] = made = make_dock(description, self._context, self._layout.density)
             made.update_suspension(0.0)
 
     def reset_layout(self) -> None:
-        """Restore the default arrangement and discard the user's changes."""
+        """Restore the default arrangement of the panels."""
         for old in list(self.docks.values()):
             old.setFloating(False)
             self.removeDockWidget(old)
@@ -205,9 +208,12 @@ class Workbench(QMainWindow):
         return dock
 
     def open(self, name: str) -> Dock | None:
-        """Show a panel in front at its last position. Return None if the name is unknown.
+        """Show a panel in front, at its last position; return None if the panel isn't available.
 
-        When opened for the first time, the panel opens its associated panel too.
+        When a panel is opened for the first time, its companion panel is opened too.
+
+        Args:
+            name: Key of the dock, which is the name of the panel for the first one of a kind.
         """
         brought = self._layout.companions.get(name, "")
         if brought and name not in self.docks and brought not in self.docks:
@@ -229,11 +235,18 @@ class Workbench(QMainWindow):
         return dock
 
     def open_latest(self, name: str) -> Dock | None:
-        """Show the last used open panel of a kind, or else the first one."""
+        """Show the most recently used open panel of a kind, or else the first one of the kind."""
         return self.open(next((key for key in self.recently_used() if parse_key(key)[0] == name), name))
 
     def open_another(self, key: str) -> Dock | None:
-        """Open an additional panel of a kind next to an existing one. Return None if the maximum is open."""
+        """Open an additional panel of a kind next to an existing one.
+
+        Args:
+            key: Key of the existing dock.
+
+        Returns:
+            The new dock, or None if the maximum number of panels is open.
+        """
         name = parse_key(key)[0]
         free = (number for number in range(1, MAX_PER_KIND + 1) if not self._is_open(key_of(name, number)))
         number = next(free, 0)
@@ -260,17 +273,17 @@ class Workbench(QMainWindow):
         return key in self.docks and not self.docks[key].isHidden()
 
     def notify_source_changed(self) -> None:
-        """Notify all panels, also closed ones, that the source has changed."""
+        """Notify all panels, including closed ones, that the source has changed."""
         for dock in (*self.docks.values(), *self._ahead.values()):
             dock.panel.source_changed()
 
     def record_use(self, dock: Dock) -> None:
-        """Record that a panel got the focus."""
+        """Mark a panel as the most recently used one."""
         if self._used[-1:] != [dock.key]:
             self._used = [*(key for key in self._used if key != dock.key), dock.key]
 
     def recently_used(self) -> tuple[str, ...]:
-        """Return the open panels, last focused first."""
+        """Return the keys of the open docks, most recently used first."""
         opened = self.open_names()
         return tuple(sorted(opened, key=lambda key: -self._used.index(key) if key in self._used else 1))
 
@@ -307,7 +320,7 @@ class Workbench(QMainWindow):
         dock.deleteLater()
 
     def open_names(self) -> tuple[str, ...]:
-        """Return the open panels, including those behind other tabs."""
+        """Return the keys of the open docks, including those behind other tabs."""
         return tuple(name for name, dock in self.docks.items() if not dock.isHidden())
 
     def _schedule_tabs(self, *_what: object) -> None:
@@ -419,21 +432,28 @@ class Workbench(QMainWindow):
     def update_suspension(self, now: float) -> None:
         """Suspend hidden panels and resume visible ones.
 
-        Called on every tick, even while the workbench is hidden.
+        Called on every tick, even if the workbench is hidden.
+
+        Args:
+            now: Monotonic time in s.
         """
         for name, dock in list(self.docks.items()):
             self._report_failure(name, dock.update_suspension(now))
 
     def visible_panels(self) -> list[PanelWidget]:
-        """Return the visible panels."""
+        """Return the panels that are visible to the user."""
         return [dock.panel for dock in self.docks.values() if dock.is_displayed()]
 
     def shows_video(self) -> bool:
-        """Return True if a panel with images is visible, which is refreshed at twice the rate."""
+        """Return True if a panel with video is visible; such panels are refreshed at twice the rate."""
         return any(dock.panel.shows_video and dock.is_displayed() for dock in self.docks.values())
 
     def refresh(self, *, pictures: bool = False) -> None:
-        """Refresh all visible panels, or with ``pictures`` only those with images."""
+        """Refresh the visible panels.
+
+        Args:
+            pictures: True to refresh only panels with video.
+        """
         for name, dock in list(self.docks.items()):
             if pictures and not dock.panel.shows_video:
                 continue
@@ -446,13 +466,13 @@ class Workbench(QMainWindow):
             self.panel_failed.emit(name, sentence)
 
     def focus_main_panel(self) -> None:
-        """Focus the main panel of the layout, which is the first open one."""
+        """Set the focus to the main panel of the layout, which is the first open one."""
         dock = next((dock for dock in self.docks.values() if not dock.isHidden()), None)
         if dock is not None:
             dock.focus_target().setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_panel(self, dock: Dock) -> None:
-        """Bring a panel to the front and focus it."""
+        """Bring a panel to the front and set the focus to it."""
         dock.show()
         dock.raise_()
         if dock.isFloating():
@@ -460,7 +480,7 @@ class Workbench(QMainWindow):
         dock.focus_target().setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def save(self) -> dict[str, object]:
-        """Return the arrangement in the format of `restore`."""
+        """Return the arrangement as a JSON-serializable dict for `restore`."""
         return {
             "open": [
                 name for name, dock in self.docks.items() if not dock.isHidden() or dock in self._floating
@@ -473,7 +493,11 @@ class Workbench(QMainWindow):
         }
 
     def restore(self, saved: Mapping[str, object]) -> bool:
-        """Restore an arrangement returned by `save`. If it doesn't fit, show the default and return False."""
+        """Restore an arrangement returned by `save`.
+
+        Returns:
+            False if the arrangement is invalid; the default arrangement is then shown.
+        """
         self.reset_layout()
         names, panels = saved.get("open"), saved.get("panels")
         if not isinstance(names, list):
@@ -503,7 +527,7 @@ class Workbench(QMainWindow):
         return tuple(fold for fold in self._layout.folds if fold.panels[0] in names)
 
     def dispose(self) -> None:
-        """Close all panels before the window closes."""
+        """Release the resources of all panels before the window closes."""
         for dock in (*self.docks.values(), *self._ahead.values()):
             dock.dispose()
 
@@ -517,7 +541,11 @@ def _raiser(dock: Dock) -> Callable[[], object]:
 
 
 def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock) -> None:
-    """Place a new panel: below the row above its own, as a tab of its home, or next to the last panel."""
+    """Insert a new dock into a workbench.
+
+    The dock is placed below the row above its own, as a tab of its tab target, or as a tab of the last
+    panel.
+    """
     name = dock.description.name
     placed = {
         other.key: other
@@ -542,7 +570,15 @@ def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], d
 def insert_beside(
     bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock, other: Dock | None
 ) -> None:
-    """Give a panel half the place of another one, split along the longer side, even if that has tabs."""
+    """Insert a dock that gets half the place of another one, which is split along its longer side.
+
+    Args:
+        bench: Window with the docks.
+        layout: Layout of the window.
+        docks: Docks by key.
+        dock: Dock to insert.
+        other: Dock to split; if it is None, closed or floating, the default position is used.
+    """
     if other is None or other.isHidden() or other.isFloating():
         insert_dock(bench, layout, docks, dock)
         return
@@ -578,12 +614,12 @@ def _above(layout: Layout, name: str) -> str:
 
 
 def encode_state(state: QByteArray) -> str:
-    """Encode Qt's dock state as text for the settings."""
+    """Encode Qt's dock state as Base64 text for the settings."""
     return base64.b64encode(state.data()).decode("ascii")
 
 
 def decode_state(text: object) -> QByteArray:
-    """Decode a state encoded by `state_text`; empty if the text is invalid."""
+    """Decode a dock state from Base64 text; empty if the text is invalid."""
     if not isinstance(text, str):
         return QByteArray()
     try:

@@ -18,7 +18,7 @@ ROOM_HEIGHT = 296  # height of the painted room; the card shows its upper part
 
 
 class Art(QWidget):
-    """Illustration at the top of a card, clipped to its round corners. Subclasses implement `picture`."""
+    """Base class of illustrations at the top of a card, clipped to the card's round corners."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -29,7 +29,7 @@ class Art(QWidget):
         return QSize(300, ART_HEIGHT)
 
     def picture(self, painter: QPainter, area: QRectF) -> None:
-        """Paint the illustration into ``area``."""
+        """Paint the illustration into a rectangle. Subclasses implement this."""
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = QPainter(self)
@@ -42,7 +42,7 @@ class Art(QWidget):
 
 
 def upper_corners(area: QRectF, radius: float) -> QPainterPath:
-    """Return the outline of a rectangle whose upper corners are round."""
+    """Return the outline of a rectangle with round upper corners."""
     path = QPainterPath()
     path.addRoundedRect(area.adjusted(0, 0, 0, 2 * radius), radius, radius)
     box = QPainterPath()
@@ -51,7 +51,7 @@ def upper_corners(area: QRectF, radius: float) -> QPainterPath:
 
 
 class RobotArt(Art):
-    """Illustration of the virtual robot at rest, as drawn by the Robot panel."""
+    """Illustration of the virtual robot at rest, painted as in the Robot panel."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__(theme)

@@ -26,9 +26,9 @@ TILE = 30
 
 
 class CardTitle(QLabel):
-    """Heading followed by a chip.
+    """Heading with a chip after it.
 
-    The heading is as wide as its text, and wraps if there is too little room.
+    The label is as wide as its text, and wraps the text if there is too little space.
     """
 
     def __init__(self, text: str) -> None:
@@ -77,13 +77,13 @@ class BigCard(Card):
         column.addLayout(body, 1)
 
     def set_texts(self, title: str, text: str) -> None:
-        """Set heading and text."""
+        """Set the heading and the text."""
         self.title.setText(title)
         self.text.setText(text)
 
 
 class ExampleCard(PaintedButton):
-    """Button for an example, painted as a card with a preview of its blocks, its name and description."""
+    """Button for an example, painted as a card with a preview, the name and a description."""
 
     def __init__(self, theme: Theme, path: Path, name: str, text: str, rows: tuple[Row, ...]) -> None:
         super().__init__(theme, radius="card")
@@ -120,7 +120,7 @@ class ExampleCard(PaintedButton):
 
 
 class RecentRow(PaintedButton):
-    """Row of a recent file: icon, name and time."""
+    """Button for a recent file, painted as a row with icon, name and time."""
 
     def __init__(self, theme: Theme, recent: RecentFile, now: dt.datetime) -> None:
         super().__init__(theme, radius="panel")
@@ -151,7 +151,7 @@ class RecentRow(PaintedButton):
 
 
 class _Key(QWidget):
-    """Shell command with the background of a key cap."""
+    """Label for a shell command, painted like a key cap."""
 
     def __init__(self, theme: Theme, text: str) -> None:
         super().__init__()
@@ -173,7 +173,7 @@ class _Key(QWidget):
 
 
 class DevelopersLine(QWidget):
-    """Last line of the page, with instructions for programmers."""
+    """Line at the bottom of the page with a command and a link for programmers."""
 
     developer_pressed = Signal()
 

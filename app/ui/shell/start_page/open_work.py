@@ -1,4 +1,4 @@
-"""List of the open behaviours on the start page."""
+"""Section of the start page with the open behaviours."""
 
 from __future__ import annotations
 
@@ -24,7 +24,15 @@ DOT = 7.0
 
 @dataclass(frozen=True)
 class OpenWork:
-    """Open behaviour; ``key`` is the key of its tab, and the path of its file is "" if it has none."""
+    """Open behaviour, as shown on the start page.
+
+    Attributes:
+        key: Key of its document.
+        name: Name of the behaviour.
+        is_unsaved: True if there are unsaved changes.
+        is_running: True while its program runs.
+        path: Path of its file, or "" if it has none.
+    """
 
     key: str
     name: str
@@ -34,7 +42,7 @@ class OpenWork:
 
 
 def open_work(session: Session) -> tuple[OpenWork, ...]:
-    """Return the open behaviours that aren't empty, with the current one first."""
+    """Return the open behaviours that aren't blank, the current one first."""
     current, runs = session.document, session.runs
     documents = sorted(session.documents, key=lambda each: each is not current)
     return tuple(
@@ -51,7 +59,7 @@ def open_work(session: Session) -> tuple[OpenWork, ...]:
 
 
 class OpenRow(PaintedButton):
-    """Row of an open behaviour: icon, name with a dot if it is unsaved, and "Continue"."""
+    """Button for an open behaviour, painted as a row with icon, name, state and "Resume"."""
 
     def __init__(self, theme: Theme, work: OpenWork) -> None:
         super().__init__(theme, radius="panel")
@@ -104,7 +112,7 @@ class OpenRow(PaintedButton):
 
 
 def state_text(work: OpenWork) -> str:
-    """Return the saved state as text. An unchanged example doesn't need to be saved."""
+    """Return the state of an open behaviour as text: running, saved or not saved."""
     if work.is_running:
         return _("running")
     if work.is_unsaved:
@@ -113,7 +121,7 @@ def state_text(work: OpenWork) -> str:
 
 
 class OpenWorkList(QWidget):
-    """Heading and rows of the open behaviours; hidden if there are none."""
+    """Section with a heading and a row for each open behaviour; hidden if there are none."""
 
     selected = Signal(str)
 
@@ -135,7 +143,7 @@ class OpenWorkList(QWidget):
         self.hide()
 
     def show_work(self, work: Sequence[OpenWork]) -> None:
-        """Set the rows. Has no effect if they are unchanged."""
+        """Set the open behaviours; unchanged rows are not recreated."""
         if tuple(work) == self._shown:
             return
         self._shown = tuple(work)

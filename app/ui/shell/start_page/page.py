@@ -52,7 +52,7 @@ ALL_EXAMPLES_TEXTS = {
     9: lazy("All nine examples"),
     10: lazy("All ten examples"),
 }
-"""Texts of the link to all examples, by their number, which is spelled out for readability."""
+"""Texts of the link to all examples, by the number of examples, which is spelled out."""
 MAX_RECENT = 3
 FIRST, OTHER = 408, 318  # relative widths of the first card and the others
 LEARN = (
@@ -67,7 +67,14 @@ OFFER = (
 
 @dataclass(frozen=True)
 class Example:
-    """Example shipped with Studio: file, name, description and first blocks."""
+    """Example that is shipped with Studio.
+
+    Attributes:
+        path: File of the example.
+        name: Translated name.
+        text: Translated description.
+        rows: First blocks, for the preview.
+    """
 
     path: Path
     name: str
@@ -76,7 +83,7 @@ class Example:
 
 
 def read_examples(folder: Path) -> tuple[Example, ...]:
-    """Return the examples in a folder, sorted by file name. Invalid files are skipped."""
+    """Return the examples in a folder, sorted by file name; invalid files are skipped."""
     found = []
     for path in sorted(folder.glob("*.nepb")) if folder.is_dir() else []:
         try:
@@ -92,14 +99,17 @@ def read_examples(folder: Path) -> tuple[Example, ...]:
 
 
 def all_examples_text(count: int) -> str:
-    """Return the text of the link that shows all examples."""
+    """Return the text of the link to all examples, such as "All six examples"."""
     if count in ALL_EXAMPLES_TEXTS:
         return _(ALL_EXAMPLES_TEXTS[count])
     return ngettext("The only example", "All {count} examples", count).format(count=count)
 
 
 class StartPage(QWidget):
-    """Page shown at startup, with ways to start or continue work."""
+    """Page that is shown at startup, with the ways to start or continue work.
+
+    Signals are emitted for the user's choices.
+    """
 
     virtual_robot_pressed = Signal()
     new_behaviour_pressed = Signal()
@@ -221,7 +231,7 @@ class StartPage(QWidget):
         whole.addWidget(line)
 
     def banner_area(self) -> QRect:
-        """Return the area for an alert: above the question, when the page is scrolled to the top."""
+        """Return the area for an alert, above the heading of the page."""
         high = TOP + self._banner_room.sizeHint().height() - 2 * BANNER_GAP
         return QRect(BANNER_GAP, BANNER_GAP, self.width() - 2 * BANNER_GAP, high)
 
@@ -263,11 +273,11 @@ class StartPage(QWidget):
 
     @property
     def offers_first_steps(self) -> bool:
-        """True if the first steps are the primary card."""
+        """True if the card with the first steps is the primary one."""
         return self._offers
 
     def offer_first_steps(self, offers: bool = True) -> None:
-        """Show the first steps as the primary card if `offers`, else as one of three cards."""
+        """Make the card with the first steps the primary one if `offers`, else one of three equal cards."""
         if offers == self._offers:
             return
         self._offers = offers
@@ -316,7 +326,7 @@ class StartPage(QWidget):
         return grid
 
     def show_all(self, shown: bool) -> None:
-        """Show all examples, or only their first row."""
+        """Show all examples if `shown`, else only the first row."""
         self._shows_all = shown
         for card in self.example_cards[EXAMPLES_PER_ROW:]:
             paint.show_when(card, shown)
@@ -338,7 +348,12 @@ class StartPage(QWidget):
             self._area.ensureWidgetVisible(card, 0, EXAMPLES_MARGIN)
 
     def show_recent(self, recent: Sequence[RecentFile], now: dt.datetime | None = None) -> None:
-        """Set the recent files; the section is hidden if there are none."""
+        """Set the recent files; the section is hidden if there are none.
+
+        Args:
+            recent: Recent files, the last opened one first.
+            now: Current time, for the formatted dates; default: the system time.
+        """
         moment = now if now is not None else dt.datetime.now().astimezone()
         layout = self._recent_box.layout()
         if layout is None:
@@ -370,20 +385,20 @@ class StartPage(QWidget):
         layout.addWidget(holder)
 
     def show_robot(self, chip: str, status: str) -> None:
-        """Set the chip on the card "Connect a robot" that shows the connected robot."""
+        """Set text and status of the chip on the card "Connect a robot"; an empty text hides the chip."""
         self.robot_card.chip.set(chip, status)
 
     def show_open(self, work: Sequence[OpenWork]) -> None:
         """Set the open behaviours; the section is hidden if there are none.
 
-        If there are open behaviours, the first steps are not the primary card.
+        If there are any, the card with the first steps is no longer the primary one.
         """
         self.open_work.show_work(work)
         if work:
             self.offer_first_steps(False)
 
     def focus_first(self) -> None:
-        """Focus the primary button and scroll to the top."""
+        """Set the focus to the primary button and scroll to the top."""
         self._area.verticalScrollBar().setValue(0)
         rows = self.open_work.rows
         first = self._learn if self._offers else self._use

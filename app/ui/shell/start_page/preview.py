@@ -1,4 +1,4 @@
-"""Preview of a behaviour, which shows its first blocks as coloured bars."""
+"""Preview of a behaviour, with its first blocks as coloured bars."""
 
 from __future__ import annotations
 
@@ -22,7 +22,14 @@ _CATEGORY_BY_WORD = {"do": "robot", "get": "sensors", "when": "events"}
 
 @dataclass(frozen=True)
 class Row:
-    """Block in a preview: nesting depth, category, and the numbers of words and values."""
+    """Block in a preview.
+
+    Attributes:
+        depth: Nesting depth.
+        category: Block category, which determines the colour.
+        text_length: Length of the text in characters.
+        values: Number of slots and fields, at most 3.
+    """
 
     depth: int
     category: str
@@ -39,7 +46,7 @@ def category_of(block_type: str) -> str:
 
 
 def rows(workspace: Mapping[str, object]) -> tuple[Row, ...]:
-    """Return the first rows of the largest script; empty for an empty workspace."""
+    """Return the first blocks of the largest script in a workspace; empty if there are no blocks."""
     blocks = workspace.get("blocks")
     tops = blocks.get("blocks") if isinstance(blocks, Mapping) else None
     if not isinstance(tops, list):
@@ -77,7 +84,13 @@ def _child(link: object) -> Mapping[str, object] | None:
 
 
 def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPainterPath:
-    """Return the outline of a block, with a notch at the top and a tab at the bottom."""
+    """Return the outline of a block, with a notch at the top and a matching tab at the bottom.
+
+    Args:
+        rect: Rectangle of the block; the tab extends below it.
+        radius: Radius of the corners in px.
+        notch: Distance of the notch from the left edge, and its width, in px.
+    """
     left, top, right, bottom = rect.left(), rect.top(), rect.right(), rect.bottom()
     wide, deep = notch, notch * 0.36
     path = QPainterPath(QPointF(left + radius, top))
@@ -102,7 +115,7 @@ def block_path(rect: QRectF, *, radius: float = 4.0, notch: float = 11.0) -> QPa
 
 
 def paint_rows(painter: QPainter, area: QRectF, theme: Theme, found: tuple[Row, ...]) -> None:
-    """Paint rows from the top of ``area``. The painter's clip must cut off those that don't fit."""
+    """Paint blocks from the top of an area. The painter must be clipped to the area."""
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     top = area.top()
     for row in found:
@@ -135,7 +148,7 @@ def _paint_content(painter: QPainter, rect: QRectF, theme: Theme, row: Row) -> N
 
 
 def paint_grid(painter: QPainter, area: QRectF, theme: Theme, step: float = 24.0) -> None:
-    """Paint the dot grid of the canvas."""
+    """Paint the dot grid of the canvas, with a distance of ``step`` px between dots."""
     painter.fillRect(area, theme.colour("workspace"))
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(theme.colour("grid"))

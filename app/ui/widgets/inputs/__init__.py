@@ -1,4 +1,4 @@
-"""Input widgets: fields, segments, combo box, slider, switch.
+"""Input widgets: fields, segments, combo box, slider and switch.
 
-Used by forms of robots, settings and filters.
+Used by the forms of robots, by settings and by filters.
 """

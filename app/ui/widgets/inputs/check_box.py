@@ -1,4 +1,4 @@
-"""Check box with a label, painted in Studio's style."""
+"""Painted check box with a label."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SIDE, GAP, MIN_HEIGHT = 18, 8, 26
 
 
 class CheckBox(PaintedButton):
-    """Box with a check mark if it is checked, and a label."""
+    """Check box with a label."""
 
     elides_text = True
 

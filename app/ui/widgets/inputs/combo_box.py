@@ -1,4 +1,4 @@
-"""Combo box with a custom arrow."""
+"""Combo box with a painted arrow."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_VISIBLE_ITEMS = 12
 
 
 class ComboBox(QComboBox):
-    """Combo box for texts. The wheel changes it only while it has the focus."""
+    """Combo box whose entries have a value and a label. Ignores the mouse wheel without focus."""
 
     def __init__(self, theme: Theme, options: Sequence[tuple[str, str]] = (), *, name: str = "") -> None:
         # `options` are (value, label).
@@ -35,12 +35,12 @@ class ComboBox(QComboBox):
 
     @property
     def value(self) -> str:
-        """Selected value, or ""."""
+        """Value of the selected entry, or "" if there is none."""
         data = self.currentData()
         return data if isinstance(data, str) else self.currentText()
 
     def set_value(self, value: str) -> None:
-        """Select one of the values; other values are ignored."""
+        """Select the entry with this value; an unknown value is ignored."""
         index = self.findData(value)
         if index >= 0:
             self.setCurrentIndex(index)

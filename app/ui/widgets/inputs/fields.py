@@ -1,4 +1,4 @@
-"""Text fields: search and filter, numbers with units, long texts."""
+"""Text fields for search, filters, numbers with units, and long texts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHEET_PADDING = 9  # padding of the style sheet above and below, and a pixel for
 
 
 class SearchField(QLineEdit):
-    """Search field with an icon inside and its shortcut at the right."""
+    """Search field with an icon on the left and its shortcut on the right."""
 
     icon_name = "search"
 
@@ -52,7 +52,10 @@ class SearchField(QLineEdit):
 
 
 class FilterField(SearchField):
-    """Filter of a list: Down and Return move the focus to the list (`leave`), Esc clears the filter."""
+    """Field to filter a list. Esc clears the field.
+
+    `exited` is emitted on Down and Enter, which move the focus to the list.
+    """
 
     exited = Signal()
 
@@ -73,9 +76,15 @@ class FilterField(SearchField):
 
 
 class NumberEdit(QLineEdit):
-    """Number field with its unit inside. Invalid text is kept and reported.
+    """Field for a number, with its unit inside. Invalid text stays in the field and is reported.
 
-    If the field may be ``empty``, `emptied` is emitted when the text is deleted.
+    Args:
+        theme: Theme.
+        minimum: Minimum, or None for no limit.
+        maximum: Maximum, or None for no limit.
+        unit: Unit, or "".
+        decimals: Number of decimals.
+        empty: True if the field may be empty; `cleared` is then emitted when the text is deleted.
     """
 
     number = Signal(float)
@@ -114,7 +123,7 @@ class NumberEdit(QLineEdit):
         self._set_problem("")
 
     def format_number(self, value: float) -> str:
-        """Format a number in the format of the field."""
+        """Format a number with the decimals of the field."""
         return number_text(value, f".{self._decimals}f")
 
     def _read(self) -> None:
@@ -162,7 +171,7 @@ class NumberEdit(QLineEdit):
 
 
 class _Text(QPlainTextEdit):
-    """Multi-line text edit that is left with Tab."""
+    """Multi-line text edit in which Tab moves the focus."""
 
     exited = Signal()
     entered = Signal()
@@ -195,7 +204,7 @@ class _Text(QPlainTextEdit):
 
 
 class LongText(QWidget):
-    """Multi-line text in the frame of a field; emits `finished` when it loses the focus."""
+    """Multi-line text field; `finished` is emitted when the field loses the focus."""
 
     changed = Signal()
     finished = Signal()
@@ -233,11 +242,11 @@ class LongText(QWidget):
 
     @property
     def is_invalid(self) -> bool:
-        """True if the text is shown as invalid."""
+        """True while the text is shown as invalid."""
         return self._wrong
 
     def set_invalid(self, *, wrong: bool) -> None:
-        """Show the text as invalid or valid."""
+        """Show the text as invalid if `wrong`, else as valid."""
         if wrong != self._wrong:
             self._wrong = wrong
             self.update()

@@ -1,4 +1,4 @@
-"""JSON editor with line numbers, syntax highlighting, and a mark at an invalid line."""
+"""JSON editor with line numbers, syntax highlighting, and a marker for an invalid line."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class _JsonColours(QSyntaxHighlighter):
 
 
 class _JsonLines(QWidget):
-    """Line numbers at the left of the text."""
+    """Line numbers to the left of the text."""
 
     def __init__(self, text: JsonLinesEdit) -> None:
         super().__init__(text)
@@ -68,7 +68,10 @@ class _JsonLines(QWidget):
 
 
 class JsonLinesEdit(QPlainTextEdit):
-    """Text edit for JSON. Enter keeps the indentation; Tab leaves; Ctrl+Enter emits `sent`."""
+    """Text edit for JSON, which keeps the indentation on Enter. Tab moves the focus.
+
+    `submitted` is emitted on Ctrl+Enter.
+    """
 
     submitted = Signal()
     focus_changed = Signal()
@@ -142,7 +145,7 @@ class JsonLinesEdit(QPlainTextEdit):
             self.ensureCursorVisible()
 
     def mark(self, line: int) -> None:
-        """Show a line as invalid, counted from 1; 0 for none."""
+        """Mark a line, counted from 1, as invalid; 0 removes the marker."""
         self.wrong_line = line
         marks = []
         if line:
@@ -155,7 +158,12 @@ class JsonLinesEdit(QPlainTextEdit):
         self._numbers.update()
 
     def paint_numbers(self, place: QWidget, rect: QRect) -> None:
-        """Paint the visible line numbers."""
+        """Paint the numbers of the visible lines.
+
+        Args:
+            place: Widget on which the numbers are painted.
+            rect: Rectangle to repaint.
+        """
         theme, painter = self._theme, QPainter(place)
         block = self.firstVisibleBlock()
         while block.isValid():
@@ -179,7 +187,10 @@ class JsonLinesEdit(QPlainTextEdit):
 
 
 class JsonEdit(QWidget):
-    """JSON editor in the frame of a field. Emits `changed` on each edit, and `sent` on Ctrl+Enter."""
+    """JSON editor in the frame of a field.
+
+    `changed` is emitted on every edit, and `submitted` on Ctrl+Enter.
+    """
 
     changed = Signal()
     submitted = Signal()
@@ -210,7 +221,7 @@ class JsonEdit(QWidget):
             self.edit.setPlainText(text)
 
     def replace(self, start: int, end: int, text: str) -> None:
-        """Replace a range of the text as an undoable edit."""
+        """Replace the characters from ``start`` to ``end`` as one undoable edit."""
         cursor = QTextCursor(self.edit.document())
         cursor.setPosition(start)
         cursor.setPosition(end, QTextCursor.MoveMode.KeepAnchor)
@@ -224,13 +235,13 @@ class JsonEdit(QWidget):
         self.edit.setTextCursor(cursor)
 
     def set_coloured(self, is_json: bool) -> None:
-        """Set whether the text is JSON, which is highlighted."""
+        """Enable syntax highlighting if the text is JSON, else disable it."""
         if self.edit.colours.is_on != is_json:
             self.edit.colours.is_on = is_json
             self.edit.colours.rehighlight()
 
     def mark(self, line: int) -> None:
-        """Show a line as invalid, counted from 1; 0 for none."""
+        """Mark a line, counted from 1, as invalid; 0 removes the marker."""
         if line != self.edit.wrong_line or bool(line) != self._is_wrong:
             self._is_wrong = bool(line)
             self.edit.mark(line)
@@ -238,7 +249,7 @@ class JsonEdit(QWidget):
 
     @property
     def wrong_line(self) -> int:
-        """Line that is shown as invalid, or 0."""
+        """Number of the line that is marked as invalid, or 0."""
         return self.edit.wrong_line
 
     def _height_for(self, lines: int) -> int:

@@ -1,4 +1,4 @@
-"""Field for topic patterns as tokens. Excluded patterns are preceded by "not"."""
+"""Token field for topic patterns; the keyword "not" precedes an excluded pattern."""
 
 from __future__ import annotations
 
@@ -10,20 +10,25 @@ from nep.i18n import _
 
 
 class PatternField(TokenField):
-    """Field for topic patterns.
+    """Token field for topic patterns.
 
-    `changed` is emitted on every change, also of unfinished text; `settled` if no text is unfinished.
+    `changed` is emitted on every change, and `settled` when no text is being typed.
     """
 
     def patterns(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the included and the excluded patterns."""
+        """Return the included and the excluded patterns, including the text being typed."""
         wanted = [each.entry for each in self._tokens if not each.is_left_out]
         unwanted = [each.entry for each in self._tokens if each.is_left_out]
         more, less = parse_patterns(self.edit.text())
         return tuple(dict.fromkeys((*wanted, *more))), tuple(dict.fromkeys((*unwanted, *less)))
 
     def show_patterns(self, wanted: Sequence[str], unwanted: Sequence[str]) -> None:
-        """Replace the tokens, unless they are the same already."""
+        """Set the tokens to the given patterns.
+
+        Args:
+            wanted: Included patterns.
+            unwanted: Excluded patterns.
+        """
         if (tuple(wanted), tuple(unwanted)) == self.patterns():
             return
         for each in list(self._tokens):

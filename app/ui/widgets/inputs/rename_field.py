@@ -1,4 +1,4 @@
-"""Overlay text field to rename an item in place."""
+"""Text field that is placed over an item to rename it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,16 @@ from app.ui.widgets.menus import EditMenu
 
 
 class RenameField(QLineEdit):
-    """Text field for a name. ``take`` is called with the new name and returns False to reject it."""
+    """Text field over an item to edit its name; `closed` is emitted at the end.
+
+    Args:
+        theme: Theme.
+        place: Widget that contains the item.
+        rect: Rectangle of the item.
+        name: Current name.
+        take: Called with the new name; returns False to reject it.
+        said: Accessible name of the field.
+    """
 
     closed = Signal()
 
@@ -48,7 +57,7 @@ class RenameField(QLineEdit):
             self.close_field()
 
     def close_field(self) -> None:
-        """Close the field. The last accepted name is kept."""
+        """Close and delete the field without applying the text."""
         if not self._is_over:
             self._is_over = True
             self.hide()

@@ -1,4 +1,4 @@
-"""Segmented control with up to four options."""
+"""Segmented control for up to four options."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class _Segment(PaintedButton):
         self.update()
 
     def set_dot(self, shown: bool) -> None:
-        """Show or hide a dot after the text, which means that the option is active."""
+        """Show or hide the dot after the text, which marks an option that is in use."""
         if shown != self._dot:
             self._dot = shown
             words = _("{choice}, on") if shown else "{choice}"
@@ -101,7 +101,7 @@ class _Segment(PaintedButton):
 
 
 class Segments(QWidget):
-    """Up to four segments, one of which is selected. Emits `changed` when the user selects another one."""
+    """Segmented control for up to four options; `changed` is emitted with the value that the user selects."""
 
     changed = Signal(str)
 
@@ -141,30 +141,35 @@ class Segments(QWidget):
         self.set_value(value if value is not None else next(iter(self._segments), ""))
 
     def set_icon_only(self, bare: bool) -> None:
-        """Show only the icons if `bare`, where space is scarce."""
+        """Show only icons if `bare`, else icons and texts."""
         for segment in self._segments.values():
             segment.set_icon_only(bare)
 
     def set_dot(self, value: str, shown: bool) -> None:
-        """Show or hide a dot after the text of an option, which means that the option is active."""
+        """Show or hide a dot after the text of an option, which marks the option as in use.
+
+        Args:
+            value: Value of the option.
+            shown: True to show the dot.
+        """
         self._segments[value].set_dot(shown)
 
     @property
     def value(self) -> str:
-        """Selected value, or "" if there are no options."""
+        """Value of the selected option, or "" if none is selected."""
         return next((key for key, segment in self._segments.items() if segment.isChecked()), "")
 
     def selected_button(self) -> QAbstractButton | None:
-        """Return the selected segment, to give it the focus."""
+        """Return the button of the selected option, or None."""
         return self._segments.get(self.value)
 
     def set_value(self, value: str) -> None:
-        """Select a value without emitting `changed`; an unknown value is ignored."""
+        """Select an option by its value, without emitting `changed`; an unknown value is ignored."""
         if value in self._segments:
             self._segments[value].setChecked(True)
 
     def clear_selection(self) -> None:
-        """Deselect all segments until the user selects one."""
+        """Deselect all options until the user selects one."""
         for segment in self._segments.values():
             segment.setAutoExclusive(False)
             segment.setChecked(False)

@@ -1,4 +1,4 @@
-"""Slider with a number field that contains the unit."""
+"""Slider combined with a number field."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ PAGE_STEPS = 10
 
 
 class Track(QSlider):
-    """Slider with a 4 px track and a 20 px handle, which counts steps.
+    """Slider with a 4 px track and a 20 px handle; its values are numbers of steps.
 
-    The wheel works only with the focus.
+    Ignores the mouse wheel without focus.
     """
 
     reset = Signal()
@@ -44,7 +44,7 @@ class Track(QSlider):
         return QSize(80, self._theme.size("sliderHandle") + 4)
 
     def handle(self) -> QPointF:
-        """Return the centre of the handle."""
+        """Return the position of the handle's centre."""
         half = self._theme.size("sliderHandle") / 2
         span = max(1, self.maximum() - self.minimum())
         share = (self.sliderPosition() - self.minimum()) / span
@@ -98,12 +98,15 @@ class Track(QSlider):
 
 
 def decimals_of(step: float) -> int:
-    """Return the number of decimals of a step, at most 6."""
+    """Return the number of decimals, at most 6, that are needed for multiples of a step."""
     return next((digits for digits in range(7) if math.isclose(round(step, digits), step, rel_tol=1e-9)), 6)
 
 
 class SliderWithUnit(QWidget):
-    """Value between two limits, with slider and field. Emits `changed` when the user sets a value."""
+    """Input for a number between two limits, with a slider and a number field.
+
+    `changed` is emitted when the user sets a value.
+    """
 
     changed = Signal(float)
 

@@ -1,4 +1,4 @@
-"""Boolean switch."""
+"""Switch with two states."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.ui.widgets.buttons import PaintedButton
 
 
 class Switch(PaintedButton):
-    """Boolean switch with a label."""
+    """Switch with two states and a label."""
 
     TRACK = QSize(36, 20)
 

@@ -1,4 +1,4 @@
-"""Text field with completed entries as removable tokens, followed by the text being typed."""
+"""Text field that shows completed entries as removable tokens before the text being typed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,12 @@ MAX_LETTERS = 400
 
 
 class Token(PaintedButton):
-    """Token for a completed entry, with "not" if it is excluded. A click or Delete removes it."""
+    """Button for a completed entry, which removes the entry on a click or Delete.
+
+    Attributes:
+        entry: Text of the entry.
+        is_left_out: True for an excluded entry, which is shown with "not".
+    """
 
     def __init__(self, theme: Theme, entry: str, *, is_left_out: bool = False) -> None:
         super().__init__(theme)
@@ -70,7 +75,7 @@ class Token(PaintedButton):
 class _TokenEdit(QLineEdit):
     """Line edit for the text being typed.
 
-    Enter completes it, Backspace at its start removes the last token.
+    Enter and the loss of focus complete the text; Backspace in the empty field removes the last token.
     """
 
     completed = Signal()
@@ -106,21 +111,22 @@ class _TokenEdit(QLineEdit):
 
 
 class TokenField(QWidget):
-    """Base class of fields with tokens. Subclasses decide when typed text is complete.
+    """Base class of token fields. Subclasses decide when typed text becomes a token.
 
-    `changed` is emitted when tokens or the typed text change, `settled` when tokens change and no text is
-    unfinished.
+    `changed` is emitted when the tokens or the typed text change, and `settled` when the tokens have
+    changed and no text is being typed.
 
     Args:
+        theme: Theme.
+        name: Accessible name.
         example: Placeholder of the empty field.
-        add: Placeholder after tokens.
+        add: Placeholder after the tokens.
     """
 
     changed = Signal()
     settled = Signal()
 
     def __init__(self, theme: Theme, name: str, example: str, add: str = "") -> None:
-        """``example`` is the placeholder of the empty field, ``add`` the one after tokens."""
         super().__init__()
         self._add_words = add
         self._theme, self._example, self._is_wrong = theme, example, False
@@ -144,11 +150,11 @@ class TokenField(QWidget):
 
     @property
     def tokens(self) -> Sequence[Token]:
-        """Tokens of the completed entries, in their order."""
+        """Tokens in the order in which they are shown."""
         return tuple(self._tokens)
 
     def set_invalid(self, is_wrong: bool) -> None:
-        """Show or remove the outline of an invalid value."""
+        """Show the field as invalid if ``is_wrong``, else as valid."""
         self._is_wrong = is_wrong
         self.update()
 
@@ -158,7 +164,7 @@ class TokenField(QWidget):
         """Handle a change of the typed text."""
 
     def _end_typing(self) -> None:
-        """Complete the typed text after Enter was pressed or the focus left."""
+        """Complete the typed text, after Enter was pressed or the focus was lost."""
 
     def _remove_last(self) -> None:
         if self._tokens:

@@ -1,4 +1,1 @@
-"""Lists: entries with highlighted matches, fuzzy search, scroll areas.
-
-Used by the command palette and the table of shortcuts.
-"""
+"""Lists: entries with highlighted matches, fuzzy search, and scroll areas."""

@@ -1,4 +1,7 @@
-"""List of the command palette and the shortcuts: headings, and rows with highlighted matches and keys."""
+"""List with headings, and with entries that show highlighted matches and shortcuts.
+
+Used by the command palette and the sheet of shortcuts.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ Index = QModelIndex | QPersistentModelIndex
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """Heading of a group of rows."""
+    """Heading above a group of entries."""
 
     text: str
 
@@ -34,20 +37,26 @@ Line = Heading | Match
 
 
 class EntryModel(QAbstractListModel):
-    """List model of headings and entries. Headings can't be selected."""
+    """List model of headings and entries, of which only entries can be selected."""
 
     def __init__(self) -> None:
         super().__init__()
         self.lines: Sequence[Line] = ()
 
     def show_lines(self, lines: Sequence[Line]) -> None:
-        """Replace the lines."""
+        """Replace all headings and entries."""
         self.beginResetModel()
         self.lines = lines
         self.endResetModel()
 
     def update_entry(self, id: str, note: str, reason: str) -> None:
-        """Update the note and the reason of an entry in place."""
+        """Update an entry in place.
+
+        Args:
+            id: Id of the entry.
+            note: Text on the right.
+            reason: Reason why the entry is unavailable, or "".
+        """
         for row, line in enumerate(self.lines):
             if isinstance(line, Match) and line.entry.id == id:
                 updated = replace(line, entry=replace(line.entry, note=note, reason=reason))
@@ -83,7 +92,7 @@ def accessible_text(entry: Entry) -> str:
 
 
 class EntryDelegate(QStyledItemDelegate):
-    """Delegate that paints a heading or an entry."""
+    """Delegate that paints headings and entries."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -183,9 +192,10 @@ class EntryDelegate(QStyledItemDelegate):
 
 
 class EntryList(QListView):
-    """List with one selected row.
+    """List view with one selected entry.
 
-    Emits `moved` when the selection changes, and `pressed_row` on activation.
+    `selection_moved` is emitted when the selection changes, and `row_activated` when the selected entry
+    is activated.
     """
 
     selection_moved = Signal()
@@ -207,7 +217,12 @@ class EntryList(QListView):
         self.clicked.connect(self._clicked)
 
     def show_lines(self, lines: Sequence[Line], chosen: str = "") -> None:
-        """Replace the lines and select the entry with the id `chosen`, or the first entry."""
+        """Replace all headings and entries, and select an entry.
+
+        Args:
+            lines: Headings and entries.
+            chosen: Id of the entry to select; "" or an unknown id selects the first entry.
+        """
         self.lines.show_lines(lines)
         rows = [row for row, line in enumerate(lines) if isinstance(line, Match)]
         wanted = (row for row in rows if chosen and _id(lines[row]) == chosen)
@@ -216,7 +231,13 @@ class EntryList(QListView):
             self.scrollToTop()
 
     def update_entry(self, id: str, note: str, reason: str = "") -> None:
-        """Update note and reason of an entry."""
+        """Update an entry in place.
+
+        Args:
+            id: Id of the entry.
+            note: Text on the right.
+            reason: Reason why the entry is unavailable, or "".
+        """
         self.lines.update_entry(id, note, reason)
 
     @property
@@ -227,12 +248,12 @@ class EntryList(QListView):
         return line.entry if isinstance(line, Match) else None
 
     def content_height(self) -> int:
-        """Return the height in px of all lines."""
+        """Return the total height in px of all headings and entries."""
         heights = {Heading: self._theme.scaled(HEADING), Match: self._theme.scaled(ROW)}
         return sum(round(heights[type(line)]) for line in self.lines.lines)
 
     def step(self, steps: int) -> None:
-        """Move the selection by a number of rows; stops at the ends."""
+        """Move the selection by a number of entries, up to the first or last one."""
         rows = [row for row, line in enumerate(self.lines.lines) if isinstance(line, Match)]
         if rows:
             current = self.currentIndex().row()
@@ -240,7 +261,7 @@ class EntryList(QListView):
             self._select_row(rows[max(0, min(len(rows) - 1, place + steps))])
 
     def handle(self, key: int) -> bool:
-        """Handle Up, Down, Page up, Page down, Home and End. Return False for other keys."""
+        """Move the selection on Up, Down, Page Up, Page Down, Home and End; return False for other keys."""
         page = max(1, self.viewport().height() // round(self._theme.scaled(ROW)) - 1)
         far = len(self.lines.lines)
         steps = {

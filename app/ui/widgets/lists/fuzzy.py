@@ -1,8 +1,8 @@
 """Fuzzy search of the command palette, with scores and the positions of matching letters.
 
-A contiguous match scores higher than spread letters, and the start of a word higher than its middle. Letters
-in arbitrary places don't match at all, because the user would not understand why. A command's initials match
-that command best.
+A contiguous match scores higher than separate letters, and the start of a word higher than its middle.
+Letters at arbitrary positions don't match, because users wouldn't understand the result. A query that
+consists of the initials of a command matches that command best.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ Span = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Entry that can be found and run.
+    """Entry of the command palette.
 
     Attributes:
-        id: Kind and name, such as "command:file.save", "panel:topics", "topic:/faces" or "robot:Pepper".
-        words: Text that is searched.
-        note: Text shown at the right.
+        id: Kind and name, such as "command:file.save", "panel:topics", "topic:/faces" or
+            "robot:Pepper".
+        text: Text to search.
+        icon: Name of the icon.
+        note: Text on the right.
         key: Shortcut.
         reason: Reason why the entry is unavailable, or "".
     """
@@ -41,18 +43,24 @@ class Entry:
 
     @property
     def kind(self) -> str:
-        """Kind of the entry: "command", "panel", "topic", "robot", "file" or "example"."""
+        """Kind of the entry, such as "command", "panel", "topic", "robot", "layout", "file" or "example"."""
         return self.id.partition(":")[0]
 
     @property
     def name(self) -> str:
-        """Part of the id after the kind."""
+        """Name of the entry: the part of the id after the kind."""
         return self.id.partition(":")[2]
 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """Matching entry with its score (higher is better) and the spans of matching letters as (from, to)."""
+    """Entry that matches a query.
+
+    Attributes:
+        entry: Entry.
+        score: Score, higher for a better match.
+        spans: Ranges of matching letters, as (start, end).
+    """
 
     entry: Entry
     score: float = 0.0
@@ -60,9 +68,14 @@ class Match:
 
 
 def match(query: str, words: str) -> tuple[float, tuple[Span, ...]] | None:
-    """Return score and matching spans of ``words`` for a query, or None if it doesn't match.
+    """Match a text with a query.
 
-    The query may consist of several parts, which match in any order.
+    Args:
+        query: Parts separated by spaces, all of which must match, in any order.
+        words: Text to search.
+
+    Returns:
+        The score and the ranges of matching letters, or None if the text doesn't match.
     """
     lower = words.lower()
     if len(lower) != len(words):  # lower case changes the length of some letters, which would shift positions
@@ -136,7 +149,7 @@ def _merge(spans: Iterable[Span]) -> tuple[Span, ...]:
 class Finder:
     """Search index of entries.
 
-    In kinds with many entries only contiguous matches are found, which is fast.
+    For kinds with many entries only contiguous matches are found, to keep the search fast.
     """
 
     def __init__(self, entries: Sequence[Entry]) -> None:
@@ -147,7 +160,15 @@ class Finder:
             self._kinds.setdefault(entry.kind, []).append((entry.text.lower(), entry))
 
     def find(self, query: str, most: int) -> tuple[list[Match], int]:
-        """Return the best matches (at most ``most`` per kind, best first) and the number of all."""
+        """Search the entries.
+
+        Args:
+            query: Query, as for `match`.
+            most: Maximum number of matches to return per kind.
+
+        Returns:
+            The matches, grouped by kind with the best ones first, and the number of all matches.
+        """
         pieces = query.lower().split()
         best: list[list[Match]] = []
         count = 0
@@ -183,7 +204,7 @@ def _matches_initials(query: str, found: Sequence[Match]) -> bool:
 
 
 def is_initials(query: str, words: str) -> bool:
-    """Return True if a query consists of initials of words, in order, including the first word's."""
+    """Return True if a query consists of initials of a text's words, starting with the first word."""
     wanted = query.lower().strip()
     firsts = [word[0] for word in "".join(c if c.isalnum() else " " for c in words.lower()).split()]
     if len(wanted) < 2 or not firsts or wanted[0] != firsts[0]:

@@ -1,4 +1,4 @@
-"""List with a filter beside the details of the selected entry, or above them if narrow."""
+"""View with a filtered list next to the details of the selected entry, or above them if narrow."""
 
 from __future__ import annotations
 
@@ -10,14 +10,18 @@ from app.ui.widgets.labels import Separator
 
 LIST_SHARE = 0.4
 NO_LIMIT = 16_777_215
-"""Qt's maximum widget size (QWIDGETSIZE_MAX)."""
+"""Qt's constant for an unlimited widget size (QWIDGETSIZE_MAX)."""
 
 
 class ListDetailView(QWidget):
-    """Widget with a list and the details of the selected entry.
+    """Widget with a filter, a list, and the details of the selected entry.
 
-    The list is ``list_px`` wide, at most two fifths of the width. In a widget narrower than ``narrow_px`` it
-    is above the details and ``list_high_px`` high.
+    Args:
+        theme: Theme.
+        parts: Filter, list and details.
+        list_px: Width of the list at 100 % text size, limited to two fifths of the widget's width.
+        list_high_px: Height of the list at 100 % text size if it is above the details.
+        narrow_px: Width at 100 % text size below which the list is above the details.
     """
 
     def __init__(
@@ -55,7 +59,7 @@ class ListDetailView(QWidget):
         self.fit()
 
     def fit(self) -> None:
-        """Update the sizes; call this after a change of the text size."""
+        """Update the arrangement, for example after a change of the text size."""
         beside = self.width() >= self._theme.scaled(self._narrow_px)
         way = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         self._sides.setDirection(way)

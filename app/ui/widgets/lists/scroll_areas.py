@@ -1,4 +1,4 @@
-"""Scroll areas for texts that don't fit, and for rows that fill a panel."""
+"""Scroll areas for long texts, and for rows that fill a panel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from app.ui.widgets.keyboard import tab_stops_of
 
 
 class ContentScrollArea(QScrollArea):
-    """Scroll area whose size hint is the height of its contents."""
+    """Scroll area that prefers the height of its contents."""
 
     def __init__(self, inside: QWidget) -> None:
         super().__init__()
@@ -52,7 +52,10 @@ class ContentScrollArea(QScrollArea):
 
 
 class RowsLayout(QVBoxLayout):
-    """Layout that keeps its rows in tab order. Qt appends later rows to the end of the window's tab order."""
+    """Vertical layout that keeps the tab order of its rows.
+
+    Qt appends inserted widgets to the end of the window's tab order.
+    """
 
     def __init__(self, inside: QWidget, before: QWidget) -> None:
         # `before` precedes the first row in the tab order.
@@ -74,7 +77,11 @@ class RowsLayout(QVBoxLayout):
 
 
 class ScrollColumn(QScrollArea):
-    """Scrolling column of rows. Add rows to `column`, which ends with a stretch."""
+    """Scroll area with a column of rows, aligned to the top.
+
+    Attributes:
+        column: Layout to insert rows into; its last item is a stretch.
+    """
 
     def __init__(self, name: str, *, margins: tuple[int, int, int, int] = (0, 0, 0, 0), gap: int = 0) -> None:
         # `name` is the accessible name; `margins` are left, top, right, bottom.
@@ -93,7 +100,7 @@ class ScrollColumn(QScrollArea):
 
 
 class PanelRows(QStackedWidget):
-    """Stack that shows ``empty`` until there are rows."""
+    """Stack of an empty state and a scrolling column of rows."""
 
     def __init__(self, empty: QWidget, name: str = "") -> None:
         # `name` is the accessible name of the rows.
@@ -104,7 +111,7 @@ class PanelRows(QStackedWidget):
         self.addWidget(scroll)
 
     def insert_row(self, place: int, row: QWidget) -> None:
-        """Show a row at a position; the row is moved if necessary."""
+        """Insert a row at a position, or move it there."""
         if self._column.indexOf(row) != place:
             self._column.insertWidget(place, row)
 
@@ -114,11 +121,11 @@ class PanelRows(QStackedWidget):
         row.deleteLater()
 
     def show_rows(self, shown: bool) -> None:
-        """Show the rows, or the empty state if not `shown`."""
+        """Show the rows if `shown`, else the empty state."""
         self.setCurrentIndex(1 if shown else 0)
 
     def fill(self, panel: QWidget) -> None:
-        """Fill a panel with this widget."""
+        """Add this widget to a panel as its only contents."""
         column = QVBoxLayout(panel)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self)

@@ -1,4 +1,4 @@
-"""Virtual table: model, view, cells, columns.
+"""Table for many rows: model, view, cells and columns.
 
-Panels describe `Column`s; cells are painted and are no widgets.
+Panels describe `Column` objects; cells are painted and are no widgets.
 """

@@ -24,7 +24,13 @@ LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
 class TableAppearance(Protocol):
-    """Interface of the table view that the painters use; rows may have any type."""
+    """Interface of the table view that the cell and header painters use.
+
+    Attributes:
+        row_height: Height of the rows in px.
+        hovered_row: Row under the mouse pointer, or -1.
+        last_shown: Index of the last visible column.
+    """
 
     row_height: int
     hovered_row: int
@@ -32,11 +38,11 @@ class TableAppearance(Protocol):
 
     @property
     def all_columns(self) -> Sequence[Column[Any]]:
-        """All columns."""
+        """All columns of the table, including hidden ones."""
 
     @property
     def sort_order(self) -> Order[Any]:
-        """Sort order."""
+        """Current sort order."""
 
     def cell_font(self, cell: Cell) -> QFont:
         """Return the font for a cell."""
@@ -49,7 +55,13 @@ class TableAppearance(Protocol):
 
 
 def padded_rect(rect: QRect, column: int, last: int) -> QRectF:
-    """Return the inner rectangle of a cell. The outer columns have more padding."""
+    """Return the rectangle of a cell without its padding, which is larger at the outer edges.
+
+    Args:
+        rect: Rectangle of the cell.
+        column: Index of the column.
+        last: Index of the last visible column.
+    """
     left = EDGE if column == 0 else PADDING
     right = EDGE if column == last else PADDING
     return QRectF(rect.adjusted(left, 0, -right, 0))
@@ -63,12 +75,12 @@ def head_font(theme: Theme) -> QFont:
 
 
 def head_width(theme: Theme, column: Column[Any]) -> int:
-    """Return the width in px that the header of a column needs, including the outer edge."""
+    """Return the width in px that the header of a column needs, including its padding."""
     return math.ceil(QFontMetricsF(head_font(theme)).horizontalAdvance(column.head)) + EDGE + PADDING + 1
 
 
 class CellDelegate(QStyledItemDelegate):
-    """Delegate that paints a `Cell`, and caches what was painted last at each position."""
+    """Delegate that paints cells, and caches the last painted contents to detect changes."""
 
     def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(parent)
@@ -77,7 +89,7 @@ class CellDelegate(QStyledItemDelegate):
         self._painted: dict[tuple[int, int], Cell] = {}
 
     def changed(self, row: int, columns: Sequence[int]) -> list[int]:
-        """Return the columns of a row whose contents differ from those painted last."""
+        """Return the columns of a row whose contents differ from the last painted ones."""
         if len(self._painted) > MAX_CACHED_CELLS:
             self._painted.clear()
         at = self._view.cell_at
@@ -171,7 +183,7 @@ class CellDelegate(QStyledItemDelegate):
 
 
 class TableHeader(QHeaderView):
-    """Table header with small text. The title of the sorted column is darker and has an arrow."""
+    """Table header with small text; an arrow and a darker title show the sorted column."""
 
     def __init__(self, theme: Theme, view: TableAppearance, parent: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal, parent)

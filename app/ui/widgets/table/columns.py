@@ -1,4 +1,4 @@
-"""Visible columns of a table: those that the user chose, then those that fit."""
+"""Visibility of table columns: those that the user has selected, and as many others as fit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nep.i18n import _
 
 
 class ColumnChoice:
-    """User's choice of columns; others have their default visibility."""
+    """Columns that the user has shown or hidden; all others have their default visibility."""
 
     def __init__(self, columns: Sequence[Column[Any]]) -> None:
         # The first column is always shown, because it identifies the row.
@@ -28,7 +28,7 @@ class ColumnChoice:
         return self._chosen.get(column.name, not column.is_hidden_by_default) or column is self._columns[0]
 
     def show(self, name: str, shown: bool) -> None:
-        """Show or hide a column."""
+        """Show a column if `shown`, else hide it. Has no effect on the first column."""
         for column in self._columns[1:]:
             if column.name == name:
                 self._chosen.pop(name, None)
@@ -41,13 +41,17 @@ class ColumnChoice:
 
     @property
     def changed(self) -> bool:
-        """True if the choice differs from the default."""
+        """True if the visibility of a column differs from its default."""
         return bool(self._chosen)
 
     def fitting_columns(self, widths: Sequence[int], room: int) -> set[int]:
-        """Return the indexes of the columns that fit into ``room`` px. Columns that yield are hidden first.
+        """Return the indexes of the columns to show in a given width.
 
-        Columns that the user chose are included even if they do not fit.
+        Columns that the user has shown are included even if they don't fit.
+
+        Args:
+            widths: Widths of all columns in px.
+            room: Available width in px.
         """
         shown = {place for place, column in enumerate(self._columns) if self.should_show(column)}
         yielding = sorted(
@@ -60,15 +64,17 @@ class ColumnChoice:
         return shown
 
     def menu(self, theme: Theme, parent: QWidget, changed: Callable[[], object]) -> Menu:
-        """Return a new menu with the entries of `fill`."""
+        """Return a new menu to show and hide columns, see `fill`."""
         menu = Menu(theme, parent, _("Columns"))
         self.fill(menu, changed)
         return menu
 
     def fill(self, menu: Menu, changed: Callable[[], object]) -> None:
-        """Fill a menu with an entry for each column but the first; visible columns are checked.
+        """Replace the entries of a menu by a checkable entry for each column except the first.
 
-        ``changed`` is called after each choice.
+        Args:
+            menu: Menu.
+            changed: Called after a column was shown or hidden.
         """
         menu.clear()
 
@@ -93,11 +99,11 @@ class ColumnChoice:
         again.triggered.connect(lambda _on=False: restore_defaults())
 
     def saved_state(self) -> dict[str, bool]:
-        """Return the choices as JSON values for a layout."""
+        """Return the visibility of the columns that the user has shown or hidden, for `restore`."""
         return dict(self._chosen)
 
     def restore(self, saved: object) -> None:
-        """Restore choices returned by `saved`; invalid values are ignored."""
+        """Restore the visibility of columns from a saved state; invalid entries are ignored."""
         self._chosen.clear()
         if isinstance(saved, Mapping):
             for name, shown in saved.items():

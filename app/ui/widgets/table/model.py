@@ -1,6 +1,7 @@
-"""Virtual table model based on `Column` descriptions: one signal per refresh, no widgets in cells.
+"""Table model based on `Column` descriptions, for many rows and frequent updates.
 
-Rows are filtered and sorted as Python lists, without a proxy model; values are read only for visible rows.
+Rows are filtered and sorted as Python lists, without a proxy model. Values are read only for visible
+rows, and one signal is emitted per refresh.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ _ROOT = QModelIndex()
 
 
 class CellMark(Protocol):
-    """Custom contents of a cell. Marks that look the same must be equal."""
+    """Interface of custom cell contents. Marks with the same appearance must be equal."""
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """Paint the mark inside a cell."""
+        """Paint the mark into the rectangle ``box``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +40,20 @@ class Cell:
     """Contents of a cell.
 
     Attributes:
-        role: Colour role of the text.
-        chip: Chip after the text, such as a state.
-        middle: True to elide a long text in its middle instead of its end.
+        text: Text.
+        icon: Name of the icon before the text, or None.
+        role: Colour role of text and icon.
+        mono: True for a monospaced font.
+        bold: True for a bold font.
+        struck: True for a strikethrough font.
+        chip: Text of the chip after the text, such as a state, or None.
+        elide_middle: True to elide a long text in its middle instead of its end.
         curve: Values of a sparkline, which replaces the text.
         indent: Indentation in px.
-        tint: Colour role of a box behind the text.
-        spills: True to extend a long text over blank cells at its left.
-        mark: Painted instead of the text.
-        said: Accessible text for a mark or an icon.
+        tint: Colour role of a box behind the text, or "" for none.
+        overflows_left: True to extend a long text over blank cells on its left.
+        mark: Custom contents, which replace the text.
+        accessible_text: Text for screen readers if there is only a mark or an icon.
     """
 
     text: str = ""
@@ -73,18 +79,24 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Column(Generic[Row]):
-    """Description of a column: title, width, and a function that returns the cell of a row.
+    """Description of a table column.
 
     Attributes:
-        title, words: Title, and name for a column with an empty title; wrapped in `lazy`.
-        key: Returns the sort key of a row (None is last in both directions); without it the column can't be
-            sorted.
-        stretch: True to take the remaining width.
-        tip: Returns the tooltip of a row's cell.
-        yields: If space is scarce, columns with this number are hidden, the largest number first.
-        off: True to hide the column by default.
-        when: Returns True while the column should be shown.
-        verbatim: True if the title is not translated.
+        name: Unique name.
+        title: Title in the header, wrapped in `lazy`.
+        width: Default width in px.
+        cell: Returns the contents of the cell in a row.
+        key: Returns the sort key of a row; rows with None are last. Without this function the column
+            can't be sorted.
+        is_numeric: True to align the contents to the right.
+        stretch: True to expand the column into the remaining width.
+        tip: Returns the tooltip of the cell in a row.
+        hide_order: Columns with the largest number are hidden first if there is too little space; 0 for
+            never.
+        is_hidden_by_default: True to hide the column until the user shows it.
+        label: Name for a column with an empty title, wrapped in `lazy`.
+        is_available: Returns False to hide the column regardless of the user's choice.
+        verbatim: True if the title isn't translated.
     """
 
     name: str
@@ -108,19 +120,24 @@ class Column(Generic[Row]):
 
     @property
     def display_name(self) -> str:
-        """Translated name, also for a column with an empty title."""
+        """Translated name, which columns with an empty title also have."""
         return _(self.label) if self.label else self.head
 
 
 @dataclass(slots=True)
 class Order(Generic[Row]):
-    """Sort order: column and direction. A column of None keeps the original order."""
+    """Sort order of a table.
+
+    Attributes:
+        column: Column to sort by, or None for the original order.
+        is_descending: True for descending order.
+    """
 
     column: Column[Row] | None = None
     is_descending: bool = False
 
     def sort(self, rows: list[Row]) -> list[Row]:
-        """Return the sorted rows. The sort is stable; rows with unknown values are last."""
+        """Return the sorted rows. The sort is stable; rows whose key is None are last."""
         key = self.column.key if self.column is not None else None
         if key is None:
             return rows
@@ -137,7 +154,7 @@ class _Rows(Generic[Row]):
 
 
 class TableModel(QAbstractTableModel, Generic[Row]):
-    """Qt model of the rows."""
+    """Qt model of a table with typed rows."""
 
     def __init__(self, columns: Sequence[Column[Row]], key: Callable[[Row], str]) -> None:
         # `key` identifies a row permanently, so that the selection survives changes of other rows.
@@ -188,24 +205,24 @@ class TableModel(QAbstractTableModel, Generic[Row]):
     # -- interface of panels --------------------------------------------------------------------------
 
     def row_at(self, index: Index) -> Row | None:
-        """Return the row of an index, or None."""
+        """Return the row at an index, or None if the index is invalid."""
         return self._rows.rows[index.row()] if index.isValid() else None
 
     def key_of(self, row: Row) -> str:
-        """Return the key of a row."""
+        """Return the key that identifies a row."""
         return self._key(row)
 
     def cell_at(self, row: int, column: int) -> Cell:
-        """Return a cell's contents directly, without Qt's roles."""
+        """Return the contents of a cell."""
         return self.columns[column].cell(self._rows.rows[row])
 
     def index_of(self, key: str) -> QModelIndex:
-        """Return the first cell of the row with this key; an invalid index if the row is not shown."""
+        """Return the index of the first cell in the row with a key; invalid if there is no such row."""
         keys = self._rows.keys
         return self.index(keys.index(key), 0) if key in keys else QModelIndex()
 
     def set_rows(self, rows: Sequence[Row]) -> None:
-        """Set the rows in this order. The selected row stays selected if it still exists."""
+        """Replace the rows; the selection is kept if the selected row still exists."""
         keys = [self._key(row) for row in rows]
         if keys == self._rows.keys:
             self._rows.rows = list(rows)
@@ -227,7 +244,7 @@ class TableModel(QAbstractTableModel, Generic[Row]):
         self._rows.rows = list(rows)
 
     def notify_changed(self, first: int, last: int) -> None:
-        """Emit one signal for changed values of these rows."""
+        """Emit one `dataChanged` signal for all cells of a range of rows."""
         last = min(last, len(self._rows.rows) - 1)
         if 0 <= first <= last:
             corner = self.index(last, len(self.columns) - 1)

@@ -15,14 +15,20 @@ ROW_PX = 50
 
 @dataclass(frozen=True, slots=True)
 class TwoLines:
-    """Cell with two lines. The name is ``mono`` for topics and services; the second line is plain text."""
+    """Cell contents with two lines, usable as a mark.
+
+    Attributes:
+        name: First line.
+        below: Second line, in a small font.
+        mono: True if the name is monospaced, as for topics and services.
+    """
 
     name: str
     below: str
     mono: bool = False
 
     def paint(self, painter: QPainter, box: QRectF, theme: Theme) -> None:
-        """Paint the two lines inside a cell."""
+        """Paint both lines into the rectangle ``box``."""
         name, below = (
             theme.font("code" if self.mono else "body"),
             theme.font("small" if self.mono else "mono"),

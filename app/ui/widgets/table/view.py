@@ -1,4 +1,4 @@
-"""Table view: rows without grid, plain header, bar at the selected row, numbers right-aligned."""
+"""Table view without a grid, with a plain header and a bar at the selected row."""
 
 from __future__ import annotations
 
@@ -55,10 +55,10 @@ KEYBOARD_REASONS = frozenset(
 
 
 class TableView(QTableView, Generic[Row]):
-    """Table of `Column`s.
+    """Table view of `Column` descriptions.
 
-    Emits `opened` with the key of a row that was clicked or activated by Enter, and `menu_wanted` with the
-    key and the screen position for a context menu.
+    `opened` is emitted with the key of a row that is clicked or activated by Enter, and
+    `menu_requested` with the key and the screen position for a context menu.
     """
 
     opened = Signal(str)
@@ -104,16 +104,21 @@ class TableView(QTableView, Generic[Row]):
 
     @property
     def all_columns(self) -> Sequence[Column[Row]]:
-        """All columns."""
+        """All columns of the table, including hidden ones."""
         return self.columns
 
     @property
     def sort_order(self) -> Order[Row]:
-        """Sort order."""
+        """Current sort order."""
         return self.order
 
     def set_row_height(self, height: int, *, large: bool) -> None:
-        """Set the height of all rows; ``large`` selects the text size of the comfortable density."""
+        """Set the height of all rows and the text size.
+
+        Args:
+            height: Height in px.
+            large: True for the text size of the comfortable density.
+        """
         self.row_height, self._large = height, large
         self._fonts.clear()
         rows = self.verticalHeader()
@@ -144,7 +149,7 @@ class TableView(QTableView, Generic[Row]):
         return self._model.cell_at(row, column)
 
     def visible_rows(self) -> tuple[int, int]:
-        """Return the first and the last visible row; the last is lower than the first if there is none."""
+        """Return the indexes of the first and last visible row; the last is smaller if no row is visible."""
         first = self.rowAt(0)
         if first < 0:
             return 0, -1
@@ -152,12 +157,12 @@ class TableView(QTableView, Generic[Row]):
         return first, last if last >= 0 else self._model.rowCount() - 1
 
     def refresh_visible(self) -> None:
-        """Repaint the visible cells whose values changed, with one signal."""
+        """Repaint the visible cells whose contents have changed."""
         first, last = self.visible_rows()
         self._model.notify_changed(first, last)
 
     def dataChanged(self, first: Index, last: Index, _roles: Sequence[int] = ()) -> None:
-        """Repaint only the changed cells; Qt would repaint all rows."""
+        """Repaint only cells whose contents have changed, whereas Qt would repaint all rows."""
         top, bottom = self.visible_rows()
         columns = [place for place in range(len(self.columns)) if not self.isColumnHidden(place)]
         dirty = QRegion()
@@ -183,12 +188,12 @@ class TableView(QTableView, Generic[Row]):
             QAccessible.updateAccessibility(event)
 
     def selected_key(self) -> str | None:
-        """Return the key of the selected row."""
+        """Return the key of the selected row, or None."""
         row = self._model.row_at(self.currentIndex())
         return self._model.key_of(row) if row is not None else None
 
     def select_key(self, key: str) -> None:
-        """Select the row with this key without opening it. Has no effect if the row is not shown."""
+        """Select the row with a key without opening it; an unknown key has no effect."""
         index = self._model.index_of(key)
         if index.isValid() and index.row() != self.currentIndex().row():
             self.setCurrentIndex(index)
@@ -236,7 +241,10 @@ class TableView(QTableView, Generic[Row]):
         self.fit_columns()
 
     def fit_columns(self) -> None:
-        """Give the stretch column the remaining width, but at least its own; columns may be hidden."""
+        """Update the visible columns and their widths.
+
+        The stretch column takes the remaining width, but is never narrower than its default.
+        """
         scaled = [round(self.theme.scaled(column.width)) for column in self.columns]
         room = self.viewport().width()
         shown = self.choice.fitting_columns(scaled, room)
@@ -256,11 +264,11 @@ class TableView(QTableView, Generic[Row]):
         self.setHorizontalScrollBarPolicy(policy)
 
     def column_menu(self) -> Menu:
-        """Return a menu to choose the visible columns."""
+        """Return a new menu to show and hide columns."""
         return self.choice.menu(self.theme, self, self.fit_columns)
 
     def fill_column_menu(self, menu: Menu) -> None:
-        """Fill a menu with the entries to choose the visible columns."""
+        """Replace the entries of a menu by entries to show and hide columns."""
         self.choice.fill(menu, self.fit_columns)
 
     def _show_columns(self, at: QPoint) -> None:
@@ -269,7 +277,7 @@ class TableView(QTableView, Generic[Row]):
         menu.popup(at)
 
     def saved_state(self) -> dict[str, object]:
-        """Return the sort order and the visible columns for a layout."""
+        """Return the sort order and the visibility of columns, for `restore`."""
         order = self.order
         return {
             "sort": order.column.name if order.column else "",

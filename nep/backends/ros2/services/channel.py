@@ -1,9 +1,9 @@
-"""ServiceChannel: the DDS writers and readers of a server or client, and their matches.
+"""DDS writers and readers of a server or client, and their matches.
 
-As in rmw_cyclonedds, requests are sent on `rq/NAMERequest` and responses on `rr/NAMEReply`; the client's id
-(u64) and the number of the call (i64) precede the fields. ROS 2 can't transfer a server's errors. nep
-programs therefore exchange them on a topic hidden from ROS 2: the same 16 bytes, the kind (u8), and the
-reason.
+As in rmw_cyclonedds, requests are sent on `rq/NAMERequest` and responses on `rr/NAMEReply`; the
+client's id (u64) and the number of the call (i64) precede the fields. ROS 2 can't transfer a server's
+errors. nep programs therefore exchange errors on a topic hidden from ROS 2: the same 16 bytes, the kind
+(u8), and the reason.
 """
 
 from __future__ import annotations
@@ -31,22 +31,33 @@ _FAILURE_TYPE = "std_msgs/msg/UInt8MultiArray"
 _FAILURE_HEADER = struct.Struct("<QqB")
 _BATCH_SIZE = 256
 _MAX_WRITERS = 1024
-"""Maximum number of clients that are tracked."""
+"""Maximum number of clients' request writers that are tracked."""
 _MAX_BLOCKING_NS = 100_000_000
 _READY_DELAY_S = 0.1
-"""Time in seconds that programs without nep need after discovery until they can receive."""
+"""Time in seconds after discovery until programs without nep are assumed to be ready to receive."""
 _FAILURE_KINDS = (CallKind.ERROR, CallKind.REFUSED)
 
 
 class CallId(NamedTuple):
-    """Client id and number of a call."""
+    """Id of a call in DDS.
+
+    Attributes:
+        guid: Id of the client.
+        number: Number of the call in the client.
+    """
 
     guid: int
     number: int
 
 
 class ReceivedSample(NamedTuple):
-    """Received request or response: its CDR without the call id, and its writer (None if unknown)."""
+    """Received request or response.
+
+    Attributes:
+        id: Id of the call.
+        cdr: CDR without the call id.
+        writer: Writer of the sample; None if unknown.
+    """
 
     id: CallId
     cdr: bytes
@@ -63,8 +74,8 @@ class ServiceChannel:
         kind: Service type.
         entry_id: Id of the server or client.
         guid: Client id in the calls of a client; None for a server.
-        on_part: Called with each request or response, in the participant's thread.
-        on_failure: Called with each error, in the participant's thread.
+        on_part: Called with each received request or response, in the participant's thread.
+        on_failure: Called with each received error, in the participant's thread.
     """
 
     def __init__(
@@ -204,7 +215,7 @@ class ServiceChannel:
     # ---- sending, without the participant's lock
 
     def send(self, call: CallId, cdr: bytes) -> None:
-        """Write a request or response. Raises `WireError`; `DDSException` after closing."""
+        """Write a request or response. Raises `WireError`, or `DDSException` if the channel is closed."""
         order = "<" if cdr[1] else ">"
         whole = cdr[:_CDR_BYTES] + struct.pack(f"{order}Qq", *call) + cdr[_CDR_BYTES:]
         codes = self.participant.dds.core.DDSException
@@ -216,7 +227,7 @@ class ServiceChannel:
             raise
 
     def send_failure(self, call: CallId, reply: Reply) -> None:
-        """Send an error to nep programs. Raises as `send` does."""
+        """Send an error to nep programs. Raises the same errors as `send`."""
         data = _FAILURE_HEADER.pack(*call, reply.kind) + bytes(reply.data)
         cdr = self.participant.types.encode(_FAILURE_TYPE, {"data": data})
         self._writers[1].write(create_sample(self._failure_class, cdr))
@@ -245,7 +256,10 @@ class ServiceChannel:
         return [self.participant.to_endpoint(data) for data in map(get_data, handles) if data is not None]
 
     def ready_servers(self) -> frozenset[bytes]:
-        """Return the response writers of servers that can be called. Used by clients."""
+        """Return the GUIDs of the response writers of all servers that are ready for calls.
+
+        Used by clients.
+        """
         if self.is_closed:
             return frozenset()
         found_here = self._match_handles()
@@ -300,7 +314,7 @@ class ServiceChannel:
         )
 
     def matched_servers(self) -> frozenset[bytes]:
-        """Return the response writers of all matched servers. Used by clients."""
+        """Return the GUIDs of the response writers of all matched servers. Used by clients."""
         return (
             frozenset()
             if self.is_closed
@@ -308,7 +322,7 @@ class ServiceChannel:
         )
 
     def can_reply_to(self, client: DdsEndpoint) -> bool:
-        """Return True if responses reach the client with this request writer. Used by servers."""
+        """Return True if a response reaches the client that owns this request writer. Used by servers."""
         found_here = [
             each
             for each in self._matched_endpoints(self._writers[0])
@@ -322,7 +336,7 @@ class ServiceChannel:
     # ---- closing
 
     def finish(self, timeout_s: float) -> None:
-        """Wait for acknowledgements. Call without the participant's lock."""
+        """Wait up to `timeout_s` seconds for acknowledgements. Call without the participant's lock."""
         if not self.is_closed and not has_forked() and timeout_s > 0.0 and not self.participant.has_closed():
             for writer in self._writers:  # `wait_for_acks` raises on timeout
                 writer._wait_for_acks(writer._ref, int(min(timeout_s, 3600.0) * 1e9))  # noqa: SLF001

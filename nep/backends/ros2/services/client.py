@@ -1,4 +1,4 @@
-"""Ros2Client: calls a ROS 2 service. If no type is given, the server's type is used.
+"""Client for ROS 2 services. Without a configured type, the server's type is used.
 
 DDS delivers a request to all servers of a service; the first response is used.
 """
@@ -48,7 +48,7 @@ class _Call:
 
 
 class Ros2Client(ClientCalls[_Call]):
-    """Client and its calls in flight. Raises `BadTopicError`, `NepError`.
+    """Client with its calls in flight. The constructor raises `BadTopicError` or `NepError`.
 
     Lock order: the participant's lock before `_lock`.
     """
@@ -121,7 +121,7 @@ class Ros2Client(ClientCalls[_Call]):
 
     @property
     def is_connected(self) -> bool:
-        """True if a server can be called."""
+        """True if a server is ready for calls."""
         with self._participant.changed:
             if self.is_closed:
                 return False
@@ -135,7 +135,7 @@ class Ros2Client(ClientCalls[_Call]):
     def start_call(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> OpenCall:
-        """Send a call. See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.start_call`."""
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         with self._lock:
             if self.is_closed:
@@ -216,7 +216,10 @@ class Ros2Client(ClientCalls[_Call]):
         self._run_callback(call, outcome)
 
     def expire(self, now: float) -> float:
-        """Send waiting calls; fail expired calls and those whose servers have disappeared."""
+        """Send waiting calls, fail expired ones, and return the next deadline. See `ExpiringClient.expire`.
+
+        Calls whose servers have disappeared fail as well.
+        """
         with self._lock:
             is_waiting = any(each.servers is None for each in self._calls.values())
         if is_waiting:

@@ -1,4 +1,4 @@
-"""ROS 2 service types: the common ones, and those of .srv files.
+"""ROS 2 service types: common types, and types of .srv files.
 
 `nep_msgs/srv/Call` is the type for calls between nep nodes, see `nep.backends.typed_services`.
 """
@@ -43,12 +43,12 @@ _MAX_FILE_BYTES = 2**20
 
 
 def request_type_of(service_type: str) -> str:
-    """Return the request type of a service type."""
+    """Return the name of a service type's request type."""
     return f"{service_type}_Request"
 
 
 def response_type_of(service_type: str) -> str:
-    """Return the response type of a service type."""
+    """Return the name of a service type's response type."""
     return f"{service_type}_Response"
 
 
@@ -69,7 +69,7 @@ class _BodyCodec:
 
 
 def find_service_type(types: MessageTypes, name: str) -> TypedService:
-    """Return a service type by its full name. Raises `NepError` if it is unknown."""
+    """Return a service type by its full name. Raises `NepError` if the type is unknown."""
     texts = _COMMON_TYPES.get(name) or _find_definition(name)
     if texts is None:
         raise NepError(
@@ -117,7 +117,10 @@ def _find_definition(name: str) -> tuple[str, str] | None:
 
 
 def service_type_for(types: MessageTypes, msg_type: str) -> TypedService:
-    """Return the service type that serves a server's or client's `msg_type`. Raises `NepError`."""
+    """Return the ROS service type for the `msg_type` of a server or client.
+
+    "json" and "msgpack" select `nep_msgs/srv/Call`. Raises `NepError` for other types.
+    """
     name = service_type_name(msg_type)
     if name is not None:
         return find_service_type(types, name)
@@ -131,5 +134,5 @@ def service_type_for(types: MessageTypes, msg_type: str) -> TypedService:
 
 
 def codec_of_calls(msg_type: str) -> Codec:
-    """Return the codec of a client's calls. ROS types use msgpack, which supports bytes and NaN."""
+    """Return the codec for a client's calls. ROS types use msgpack, which supports bytes and NaN."""
     return CODECS["msgpack"] if service_type_name(msg_type) is not None else codecs.codec_for(msg_type)

@@ -1,4 +1,4 @@
-"""Ros2Server: serves a ROS 2 service. Requests are read in the participant's thread."""
+"""Server for a ROS 2 service. Requests are read in the participant's thread."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from nep.protocol.service_wire import SERVICE_TYPE, CallKind, Reply, error_reply
 
 _logger = logging.getLogger("nep")
 _MATCH_TIMEOUT_S = 1.0
-"""Time in seconds that a response waits until the client's reader is matched."""
+"""Maximum time in seconds that a response waits for a match with the client's reader."""
 _POLL_S = 0.01
 
 
 class Ros2Server:
-    """Server with a call queue. Raises `BadTopicError`, `NepError`."""
+    """Server with a call queue. The constructor raises `BadTopicError` or `NepError`."""
 
     def __init__(
         self,

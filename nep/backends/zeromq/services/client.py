@@ -1,7 +1,7 @@
-"""SocketClient: sends calls, receives replies, and detects when its server disappears.
+"""Client that sends calls, receives replies, and detects when its server disappears.
 
-A client is connected to one server at a time. When a connection has ended and its last reply was read, all
-remaining calls that were sent over it fail.
+A client is connected to one server at a time. When a connection has ended and its last reply was read,
+all remaining calls that were sent over this connection fail.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ _logger = logging.getLogger("nep")
 _READ_MAX = 100
 _MIN_RETRY_S, _MAX_RETRY_S = 0.1, 2.0
 _PENDING_RETRY_S = 0.8
-"""Maximum interval in seconds between connection attempts while calls are pending."""
+"""Maximum interval in seconds between connection attempts while calls are waiting."""
 _HANDOVER_TIMEOUT_S = 2.0
-"""Time in seconds that new calls wait for the last replies of a closing server."""
+"""Maximum time in seconds that new calls wait for the last replies of a closing server."""
 
 OutcomeCallback = Callable[[Outcome], None]
 _Outcomes = list[tuple[OutcomeCallback, Outcome]]
@@ -60,20 +60,20 @@ class _Call:
 
 
 class Connection(Protocol):
-    """Connection to a server, as a client uses it. Guarded by the client's lock."""
+    """Interface of a connection to a server. Guarded by the client's lock."""
 
     endpoint: str
     is_open: bool
     reconnect_delay_s: float
-    """Time in seconds to wait before reconnecting after the connection has ended."""
+    """Delay in seconds before reconnecting after the connection has ended."""
 
     @property
     def is_over(self) -> bool:
-        """True if the connection was open and has ended. Replies received before can still be read."""
+        """True if the connection was open and has ended. Earlier replies can still be read."""
 
     @property
     def has_input(self) -> bool:
-        """True if a reply is available that the descriptor doesn't signal any more."""
+        """True if a reply is available that the file descriptor doesn't signal any more."""
 
     def update(self) -> None:
         """Update `is_open` and `is_over`."""
@@ -95,12 +95,14 @@ class SocketClient:
     """Client for services over sockets.
 
     Args:
-        connect_to: Creates a connection to an endpoint.
+        connect_to: Creates a connection; called with the endpoint and the function that serves the
+            connection.
         spec: Settings of the client.
         framing: Wire format.
         serve_soon: Asks the I/O thread to serve the client.
         closer: Closes the client.
-        known_services: Queries the master for the names of services; None without a master.
+        known_services: Queries the master for the names of services within a timeout in seconds; None
+            without a master.
         endpoint: Endpoint of the server without a master, or "".
     """
 
@@ -163,7 +165,10 @@ class SocketClient:
 
     @property
     def fd(self) -> int:
-        """-1, because the connections are polled; the client itself is served when a call is due."""
+        """-1, because the connections are polled instead of the client.
+
+        The client itself is served when the deadline of a call has passed.
+        """
         return -1
 
     @property
@@ -188,7 +193,7 @@ class SocketClient:
         return "" if connection is None else connection.endpoint
 
     def start_call(self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback) -> _Call:
-        """Send a call. See `ClientTransport.begin`."""
+        """Send a call. See `ClientTransport.start_call`."""
         number = next(self._numbers)
         deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
         call = _Call(number, data, timeout_s, deadline, then)
@@ -240,7 +245,7 @@ class SocketClient:
     # ---- in the I/O thread: updates from the session
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Add further servers."""
+        """Add servers that the master lists."""
         with self._lock:
             for remote in remotes:
                 if self._can_call_locked(remote):
@@ -260,7 +265,14 @@ class SocketClient:
         return bool(remote.publisher.endpoints)
 
     def publisher_removed(self, server: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - a message count
-        """Handle the removal of a server. Unless `is_closed`, the server may only be suspended."""
+        """Handle the removal of a server.
+
+        Args:
+            server: Id of the server.
+            final: Number of calls that the server has received. Ignored.
+            is_closed: True if the server unregistered, False if its node doesn't respond and may be
+                suspended.
+        """
         with self._lock:
             if is_closed or server != self._current or not self.is_connected or len(self._servers) > 1:
                 self._servers.pop(server, None)
@@ -467,11 +479,11 @@ class SocketClient:
     # ---- closing
 
     def close(self) -> None:
-        """Unregister the client; calls in flight fail with `ClosedError`. Idempotent."""
+        """Unregister and close the client; calls in flight fail with `ClosedError`. Idempotent."""
         self._closer(self)
 
     def release(self) -> None:
-        """Fail the calls in flight and close the connection. Idempotent."""
+        """Fail the calls in flight and close the connection. Idempotent. Called by the closer."""
         with self._lock:
             self._is_closed = True
             left, self._calls = list(self._calls.values()), {}

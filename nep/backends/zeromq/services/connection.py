@@ -1,8 +1,8 @@
-"""ServerConnection: connection to one server that reports when it opens and ends.
+"""Connection to one server that reports when it opens and ends.
 
-Replies received before the end can still be read. With `IMMEDIATE` or a `RECONNECT_IVL` of -1, libzmq would
-discard them, and a reconnected socket couldn't report which connection has ended. Therefore each connection
-has its own socket, which never reconnects, and a monitor.
+Replies received before the end can still be read. With `IMMEDIATE` or a `RECONNECT_IVL` of -1, libzmq
+would discard these replies, and a reconnected socket couldn't report which connection has ended.
+Therefore each connection has a separate socket, which never reconnects, and a monitor.
 """
 
 from __future__ import annotations
@@ -18,19 +18,23 @@ from nep.backends.zeromq.sockets import Part, Socket, keep_alive
 from nep.protocol.service_wire import PAYLOAD_MAX_BYTES
 
 FDS_PER_CONNECTION = 4
-"""Number of file descriptors per connection, including those of libzmq."""
+"""Number of file descriptors per connection, including the descriptors that libzmq opens."""
 
 _LARGE_BYTES = 65_536
-"""Size in bytes from which calls are sent without a copy."""
+"""Minimum size in bytes of calls that are sent without a copy."""
 _NO_RECONNECT_MS = 24 * 3600 * 1000
 _EVENT_HEADER = struct.Struct("=hi")
 _monitor_numbers = itertools.count(1)
 
 
 class ServerConnection:
-    """Connection to a server, which starts connecting immediately. Guarded by the client's lock.
+    """Connection to a server. The constructor starts connecting. Guarded by the client's lock.
 
-    `serve` is called in the I/O thread on events.
+    Args:
+        shared: ZeroMQ context of the process.
+        service: Name of the service.
+        endpoint: Endpoint of the server.
+        serve: Called in the I/O thread on events of the connection.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""ZeromqServices: servers, clients and surveyors of one node. Part of `ZeromqTransport`."""
+"""Servers, clients and surveyors of one node. Part of `ZeromqTransport`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,11 @@ if TYPE_CHECKING:
 class ZeromqServices:
     """Servers, clients and surveyors of one node.
 
-    `session` returns the node's session with a master; it raises `ClosedError` if the node is closed.
+    Args:
+        shared: ZeroMQ context of the process.
+        session: Returns the node's session with the master at an address; raises `ClosedError` if the node
+            is closed.
+        node_name: Name of the node.
     """
 
     def __init__(
@@ -54,7 +58,7 @@ class ZeromqServices:
     # ---- servers
 
     def create_server(self, spec: ServerSpec) -> RouterServer | TcpServer:
-        """Create a server. See `ServiceTransport.server`."""
+        """Create a server. See `ServiceTransport.create_server`."""
         if isinstance(spec.configuration, Direct):
             return self._create_direct_server(spec, spec.configuration)
         session = self._session(spec.configuration.master)
@@ -125,7 +129,7 @@ class ZeromqServices:
     # ---- clients
 
     def create_client(self, spec: ClientSpec) -> SocketClient:
-        """Create a client. See `ServiceTransport.client`."""
+        """Create a client. See `ServiceTransport.create_client`."""
         if isinstance(spec.configuration, Direct):
             return self._create_direct_client(spec, spec.configuration)
         session = self._session(spec.configuration.master)
@@ -145,7 +149,7 @@ class ZeromqServices:
         return client
 
     def create_surveyor(self, spec: ClientSpec) -> SurveyClient:
-        """Create a surveyor. See `ServiceTransport.survey`."""
+        """Create a surveyor. See `ServiceTransport.create_surveyor`."""
         if isinstance(spec.configuration, Direct):
             raise NepError(_("surveys of 'zeromq' need a master; omit the configuration, or use 'nanomsg'"))
         session = self._session(spec.configuration.master)

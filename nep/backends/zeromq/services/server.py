@@ -1,7 +1,7 @@
-"""RouterServer: a server's socket. The I/O thread reads calls; any thread can reply.
+"""Server over a ROUTER socket. The I/O thread reads calls; any thread can reply.
 
-Clients of the original NEP connect to the ROUTER socket as well: their REQ sockets don't notice the
-difference, and a ROUTER can reply to several clients at the same time.
+Clients of the original NEP connect to the ROUTER socket as well: for their REQ sockets, a ROUTER is
+equivalent to a REP, and a ROUTER can reply to several clients at the same time.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from nep.protocol.service_wire import PAYLOAD_MAX_BYTES, Framing, Reply
 _logger = logging.getLogger("nep")
 
 _READ_MAX = 100
-"""Maximum number of calls read at once, before other sockets are served."""
+"""Maximum number of calls read before other sockets are served."""
 _LARGE_BYTES = 65_536
-"""Size in bytes from which replies are sent without a copy, and tracked until libzmq has sent them."""
+"""Minimum size in bytes of replies that are sent without a copy, and tracked until libzmq has sent them."""
 _UNREAD_MAX_BYTES = 256 * 2**20
 _REPLY_HIGH_WATER_MARK = 1000
-"""High-water mark: number of replies queued for a client that doesn't read them."""
+"""High-water mark: maximum number of replies queued for a client that doesn't read."""
 
 
 class CallReader:
@@ -59,9 +59,12 @@ class CallReader:
         now: float,
         answer: Callable[[int, Reply], bool],
     ) -> IncomingCall | None:
-        """Parse a call; return None if it is malformed.
+        """Parse a call; return None if the call is malformed.
 
-        `answer` is called with the call's number and the reply.
+        Args:
+            parts: Parts of the message.
+            now: Time at which the call was received (`time.monotonic`).
+            answer: Sends a reply; called with the number of the call and the reply.
         """
         try:
             header = self._framing.read_call(parts)
@@ -72,7 +75,7 @@ class CallReader:
         return IncomingCall(header.data, header.codec, deadline, partial(answer, header.number))
 
     def reject(self, error: WireError) -> None:
-        """Count a malformed call."""
+        """Count a malformed call, and log it if due."""
         self._tally.add_unreadable()
         if self._refusals.add(error.reason):
             _logger.warning(
@@ -83,7 +86,7 @@ class CallReader:
             )
 
     def recent_message(self) -> str:
-        """Return the newest problem. See `RejectionLog.recent_message`."""
+        """Return the reason of the newest malformed call. See `RejectionLog.recent_message`."""
         return self._refusals.recent_message()
 
 
@@ -96,7 +99,7 @@ class RouterServer:
         framing: Wire format.
         serve_soon: Asks the I/O thread to serve the server.
         unregister: Unregisters the server; may be called twice.
-        closer: Closes the server within a time limit in seconds.
+        closer: Closes the server; called with the server and a time limit in seconds.
     """
 
     is_local = False
@@ -145,7 +148,7 @@ class RouterServer:
         return self._is_closed
 
     def move(self, hosts: Sequence[str]) -> tuple[str, ...]:
-        """Bind to these addresses of this computer and no others; return the endpoints."""
+        """Bind these addresses of this computer and unbind all others; return the endpoints."""
         with self._lock:
             return () if self._is_closed else self._bindings.move(hosts)
 
@@ -161,7 +164,7 @@ class RouterServer:
     # ---- in the I/O thread
 
     def serve(self, now: float) -> PollState:
-        """Queue calls, and reject them while the queue is full."""
+        """Read and queue calls; reject calls while the queue is full. See `Pollable.serve`."""
         calls: list[IncomingCall] = []
         with self._lock:
             if self._is_closed:
@@ -225,7 +228,7 @@ class RouterServer:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Unregister, reject queued calls and flush replies. Idempotent."""
+        """Unregister, reject queued calls and flush replies for up to `timeout_s` seconds. Idempotent."""
         self._closer(self, timeout_s)
 
     def begin_close(self) -> None:
@@ -238,7 +241,10 @@ class RouterServer:
         call.reply(rejection_reply(self.spec.service, is_closed=self.calls.is_closed))
 
     def release(self, deadline: float) -> None:
-        """Close the socket, which lingers until `deadline`. The I/O thread must have stopped serving it."""
+        """Close the socket, which continues to send replies until `deadline` (`time.monotonic`).
+
+        The I/O thread must have stopped serving the socket.
+        """
         with self._lock:
             if not self._is_closed:
                 self._is_closed = True

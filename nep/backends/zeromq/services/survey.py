@@ -1,4 +1,4 @@
-"""SurveyClient: a surveyor with one client per respondent."""
+"""Surveyor that uses one client per respondent."""
 
 from __future__ import annotations
 
@@ -28,9 +28,12 @@ class _SentCall(NamedTuple):
 
 
 class SurveyClient:
-    """Surveyor with one client per respondent.
+    """Surveyor that uses one client per respondent.
 
-    `new_client` creates the client for a respondent's endpoint; `closer` closes the surveyor.
+    Args:
+        spec: Settings of the surveyor.
+        new_client: Creates the client for a respondent's endpoint.
+        closer: Closes the surveyor.
     """
 
     def __init__(
@@ -54,7 +57,7 @@ class SurveyClient:
 
     @property
     def respondents(self) -> int:
-        """Number of known respondents."""
+        """Number of respondents that the master lists."""
         return len(self._clients)
 
     @property
@@ -66,7 +69,7 @@ class SurveyClient:
     def start_survey(
         self, data: bytes | memoryview, timeout_s: float | None, then: OutcomeCallback
     ) -> list[OpenCall]:
-        """Send a request to all respondents. See `SurveyTransport.begin_all`."""
+        """Send a request to all listed respondents. See `SurveyTransport.start_survey`."""
         self._close_idle_leaving()
         with self._lock:
             if self.is_closed:
@@ -111,7 +114,7 @@ class SurveyClient:
     # ---- in the I/O thread: updates from the session
 
     def connect(self, remotes: Iterable[RemotePublisher]) -> None:
-        """Add further respondents."""
+        """Add respondents that the master lists."""
         with self._lock:
             for remote in remotes:
                 self._add_respondent(remote.publisher.id, remote.publisher.endpoints)
@@ -138,13 +141,13 @@ class SurveyClient:
             self._leaving.append(client)
 
     def reconnect_remote(self) -> None:
-        """Reconnect to respondents on other computers, after the address of this one has changed."""
+        """Reconnect to respondents on other computers, because the address of this computer has changed."""
         with self._lock:
             for client in self._clients.values():
                 client.reconnect_remote()
 
     def publisher_removed(self, publisher: int, final: int, *, is_closed: bool) -> None:  # noqa: ARG002 - unused here
-        """Handle the removal of a respondent."""
+        """Handle the removal of a respondent. See `SessionSubscriber.publisher_removed`."""
         with self._lock:
             self._remove_respondent(publisher)
 

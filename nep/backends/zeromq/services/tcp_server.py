@@ -1,4 +1,4 @@
-"""TcpServer: a server over plain TCP, for programs without ZeroMQ."""
+"""Server over plain TCP, for programs without ZeroMQ."""
 
 from __future__ import annotations
 
@@ -33,20 +33,24 @@ from nep.system.log_rarely import is_logged
 _logger = logging.getLogger("nep")
 
 _BACKLOG = 128
-"""Maximum number of connections that wait to be accepted."""
+"""Maximum number of connections that the system queues until they are accepted."""
 _PEERS_MAX = 1000
 _READ_MAX = 100
 _UNREAD_MAX_BYTES = 256 * 2**20
-"""Maximum number of bytes queued per client; further replies are dropped."""
+"""Maximum number of bytes queued for a client that doesn't read; further replies are dropped."""
 _FDS_PER_LISTENER = 2
 _ACCEPT_PAUSE_S = 0.5
-"""Pause in seconds before accepting again after descriptors have run out."""
+"""Pause in seconds before accepting connections again after the process ran out of file descriptors."""
 
 
 class TcpServer:
-    """Server that listens at `address`. Raises `AddressInUseError`, `TooManyFilesError`.
+    """Server on a listening TCP socket. The constructor raises `AddressInUseError` or `TooManyFilesError`.
 
-    `io` serves the sockets; `closer` closes the server.
+    Args:
+        io: Thread that serves the sockets.
+        spec: Settings of the server.
+        address: Address as `HOST:PORT`.
+        closer: Closes the server; called with the server and a time limit in seconds.
     """
 
     def __init__(
@@ -108,7 +112,7 @@ class TcpServer:
         self._io.add(peer)
 
     def serve_peer(self, peer: _Peer, now: float) -> PollState:
-        """Queue the calls of a client and send its pending replies."""
+        """Read the calls of one client and send pending replies to this client."""
         calls: list[IncomingCall] = []
         with self._changed:
             if peer not in self._peers:
@@ -183,7 +187,7 @@ class TcpServer:
     # ---- closing
 
     def close(self, timeout_s: float) -> None:
-        """Reject queued calls, flush replies and close. Idempotent."""
+        """Reject queued calls, flush replies for up to `timeout_s` seconds and close. Idempotent."""
         self._closer(self, timeout_s)
 
     def begin_close(self) -> None:
@@ -192,7 +196,10 @@ class TcpServer:
             self._reject(call)
 
     def release(self, deadline: float) -> None:
-        """Stop listening. Clients can read their replies until `deadline`."""
+        """Stop listening, and wait until all clients have read their replies and disconnected.
+
+        Connections that are still open at `deadline` (`time.monotonic`) are closed.
+        """
         self._io.remove(self)
         with self._changed:
             if self.is_closed:

@@ -1,4 +1,4 @@
-"""Calls and replies over plain TCP: length-prefixed pairs of header and payload.
+"""Calls and replies over plain TCP, as length-prefixed pairs of header and payload.
 
 For programs without ZeroMQ. docs/services.md specifies the format.
 """
@@ -25,9 +25,9 @@ _KEEPALIVE_IDLE_S, _KEEPALIVE_INTERVAL_S, _KEEPALIVE_PROBES = 4, 2, 4
 
 
 class TcpStream:
-    """Stream of pairs of parts over a non-blocking socket.
+    """Stream of pairs (header and payload) over a non-blocking socket.
 
-    Not thread-safe: guarded by its owner's lock.
+    Not thread-safe: guarded by the owner's lock.
     """
 
     def __init__(self, connected: socket.socket) -> None:
@@ -48,7 +48,7 @@ class TcpStream:
     # ---- receiving
 
     def read(self) -> bool:
-        """Receive a limited amount of available data; return True if there was any."""
+        """Receive a limited amount of the available data; return True if there was any."""
         was = len(self._input)
         while not self.is_over and len(self._input) - was < _TURN_BYTES:
             try:
@@ -64,9 +64,10 @@ class TcpStream:
         return len(self._input) > was
 
     def next(self) -> list[bytes] | None:
-        """Return the oldest complete pair, or None.
+        """Remove and return the oldest complete pair, or None if there is none.
 
-        Raises `WireError` for an invalid size or an incomplete pair at the end; the stream is then over.
+        Raises `WireError` for an invalid size, or for an incomplete pair at the end of the stream. The
+        stream has then ended.
         """
         available = len(self._input) - self._start
         if available < _SIZE.size:
@@ -108,7 +109,7 @@ class TcpStream:
     # ---- sending
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
-        """Queue a pair and send as much as the socket accepts now; `flush` sends the rest."""
+        """Queue a pair and send as much as the socket accepts immediately; `flush` sends the rest."""
         if self.is_broken:
             return
         header, payload = parts
@@ -119,7 +120,7 @@ class TcpStream:
         self.flush()
 
     def flush(self) -> None:
-        """Send as much of the pending data as the socket accepts now."""
+        """Send as much of the queued data as the socket accepts immediately."""
         while self._output:
             try:
                 sent = self._socket.send(self._output[0])
@@ -155,14 +156,14 @@ class TcpStream:
     def forked(self) -> None:
         """Release the socket in a forked child process.
 
-        `nep.system.forks` closes its descriptor by address.
+        `nep.system.forks` closes the inherited file descriptor, which it finds by its address.
         """
         self.is_over = self.is_broken = True
         self._socket.detach()
 
 
 class TcpConnection:
-    """Client's TCP connection to `address`; starts connecting immediately. Counterpart of `ServerConnection`.
+    """TCP connection of a client. The constructor starts connecting. Counterpart of `ServerConnection`.
 
     Not thread-safe: guarded by the client's lock.
     """
@@ -195,11 +196,11 @@ class TcpConnection:
 
     @property
     def has_input(self) -> bool:
-        """False, because the descriptor is level-triggered and signals all input."""
+        """False, because the file descriptor is level-triggered and signals all input."""
         return False
 
     def update(self) -> None:
-        """Update `is_open`."""
+        """Update `is_open` from the state of the socket."""
         if self.is_open or self._is_dead:
             return
         if self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
@@ -212,13 +213,13 @@ class TcpConnection:
             self.is_open = not self._is_dead
 
     def serve(self, now: float) -> PollState:
-        """Send and receive. See `Pollable.serve`."""
+        """Send queued calls and receive replies. See `Pollable.serve`."""
         rest = self._serve(now)
         pause_reading = self._is_dead or self._stream.is_over
         return PollState(pause_reading, rest.due, wants_write=not self.is_open or self._stream.backlog > 0)
 
     def send(self, parts: Sequence[bytes | memoryview]) -> None:
-        """Send a call. The I/O thread sends what the socket doesn't accept immediately."""
+        """Send a call. Data that the socket doesn't accept immediately is sent by the I/O thread."""
         self._stream.send(parts)
         if self._stream.backlog:
             self._io.serve_soon(self)
@@ -245,7 +246,10 @@ class TcpConnection:
 
 
 def keep_alive(connected: socket.socket, address: str) -> None:
-    """Detect within a dozen seconds that the peer's computer has vanished. See `sockets.keep_alive`."""
+    """Set socket options that detect within a dozen seconds that the peer's computer has vanished.
+
+    See `nep.backends.zeromq.sockets.keep_alive`.
+    """
     connected.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if is_loopback(address):
         return

@@ -1,11 +1,12 @@
 """Shared memory for payloads between programs of one computer and user, over iceoryx2.
 
-The socket still carries a message per payload, so order, losses and waiting are the same as without shared
-memory; see docs/wire.md. A publisher has one `SharedWriter` with slots of one size; a subscriber has one
-`SharedReader` per publisher. Programs that can't share memory (another computer or user, iceoryx2 missing,
-memory full) use only the socket. Measurements: docs/adr/0023-shared-memory.md.
+The socket still transfers a message per payload, so order, losses and waiting are the same as without
+shared memory; see docs/wire.md. A publisher has one `SharedWriter` with slots of one size; a subscriber
+has one `SharedReader` per publisher. Programs that can't share memory (another computer or user,
+iceoryx2 missing, memory full) use only the socket. Measurements: docs/adr/0023-shared-memory.md.
 
-iceoryx2 releases the resources of a killed program when another program of the user starts to share memory.
+iceoryx2 releases the resources of a killed program when another program of the user starts to share
+memory.
 """
 
 from __future__ import annotations
@@ -30,32 +31,41 @@ from weakref import WeakValueDictionary
 from nep.system.forks import call_in_child
 
 MIN_SHARED_BYTES = 32 * 2**10
-"""Size in bytes from which shared memory is faster than the socket."""
+"""Payload size in bytes from which shared memory is faster than the socket."""
 _MAX_PAYLOAD_BYTES = 64 * 2**20
 _TOTAL_SLOT_BYTES = 320 * 2**20
-"""Total size of a publisher's slots in bytes; there are at least `_MIN_SLOTS`."""
+"""Target for the total size of a publisher's slots in bytes. At least `_MIN_SLOTS` are created."""
 _MIN_SLOTS, _MAX_SLOTS = 4, 256
 _MIN_SLOT_BYTES = 64 * 2**10
 _MAX_HELD_SLOTS = 12
-"""Maximum number of a publisher's payloads that a reader leaves in their slots; further ones are copied."""
+"""Maximum number of a publisher's payloads that a reader uses in place; further payloads are copied."""
 _HEADER_BYTES = 64
 """Size in bytes of the header before a payload: number, size, and padding for alignment."""
 _HEADER = struct.Struct("=QQ")
 _MAX_COPIED_BYTES = 2**18
-"""Size in bytes up to which payloads requested as bytes are copied on arrival, which frees their slots."""
+"""Maximum size in bytes of payloads that are copied on arrival if bytes are requested.
+
+Copying frees the slot early.
+"""
 _MAX_LOANS = 4
 _MAX_READERS = 64
 _RESERVED_BYTES = 64 * 2**20
-"""Bytes to keep free in the shared-memory file system; a write without free space kills the program."""
+"""Minimum free space in bytes of the shared-memory file system.
+
+Writing without free space would kill the program.
+"""
 _QUERY_INTERVAL_S = 0.05
 _QUERY_INTERVAL_BYTES = _MAX_PAYLOAD_BYTES
-"""Bytes that a publisher may write, within `_QUERY_INTERVAL_S`, before free space is queried again."""
+"""Number of bytes that a publisher may write before it queries the free space again.
+
+The free space is also queried after `_QUERY_INTERVAL_S`.
+"""
 _SHARED_MEMORY_FOLDER = "/dev/shm"  # noqa: S108 - only queried for free space; no file is created by name
 _MODULE_NAME = "iceoryx2"
 _logger = logging.getLogger("nep")
 _lock = threading.Lock()
 _fork_count = 0
-"""Number of forks since the process that loaded this module."""
+"""Number of forks between the process that loaded this module and this process."""
 
 
 class _IceoryxNode:
@@ -86,15 +96,15 @@ _process = _ProcessState()
 
 
 def can_share() -> bool:
-    """Return True if this program may share memory, as far as is known without loading iceoryx2."""
+    """Return True if this program can probably share memory. Doesn't load iceoryx2 to find out."""
     return not _process.is_unavailable and os.environ.get("NEP_SHARED_MEMORY", "") != "0"
 
 
 def start_sharing() -> object:
-    """Load iceoryx2 if needed, which is slow the first time.
+    """Load iceoryx2, which takes long the first time.
 
     Returns:
-        An object to keep while memory is shared, or None if iceoryx2 is unavailable.
+        An object that must be referenced while memory is shared; None if iceoryx2 is unavailable.
     """
     return _open_node()
 
@@ -197,7 +207,10 @@ class _SlotViews:
 
 
 class Loan:
-    """Slot into which a payload is written before it is published. Released with its last reference."""
+    """Slot into which a payload is written before being published.
+
+    The slot is released with the last reference to the object.
+    """
 
     def __init__(self, port: Any, sample: Any, size: int) -> None:  # noqa: ANN401 - iceoryx2 is not typed
         self.size = size
@@ -208,13 +221,13 @@ class Loan:
 
     @property
     def buffer(self) -> memoryview:
-        """Writable buffer with the size of the payload. Keeps the loan alive."""
+        """Writable buffer with the size of the payload. References the loan, so that the slot stays valid."""
         array = (ctypes.c_uint8 * self.size).from_address(self.address)
         array.loan = self  # type: ignore[attr-defined]
         return memoryview(array).cast("B")
 
     def send(self, number: int) -> None:
-        """Publish the payload to all readers. It must not be changed afterwards."""
+        """Publish the payload to all readers as payload `number`. It must not be changed afterwards."""
         head = (ctypes.c_uint8 * _HEADER.size).from_address(self.address - _HEADER_BYTES)
         _HEADER.pack_into(head, 0, number, self.size)
         sample, self._sample = self._sample, None
@@ -243,9 +256,9 @@ class SharedWriter:
         self._slots = _SlotViews()
 
     def prepare(self, size: int) -> bool:
-        """Provide slots for payloads of `size` bytes; return False if that is impossible.
+        """Create slots for payloads of `size` bytes if needed; return False if that is impossible.
 
-        May start a new `generation`.
+        New slots start a new `generation`.
         """
         if size <= self._slot_bytes:
             return self._port is not None
@@ -277,7 +290,7 @@ class SharedWriter:
         return True
 
     def loan(self, size: int) -> Loan | None:
-        """Return a free slot, or None if readers hold all of them."""
+        """Return a free slot for `size` bytes, or None if readers hold all slots."""
         sample = self._loan_sample(size)
         if sample is None:
             return None
@@ -296,7 +309,8 @@ class SharedWriter:
     def copy(self, data: bytes | memoryview, size: int) -> int | None:
         """Copy a payload into a slot and publish it to the readers.
 
-        Returns the payload's number, or None if no slot is free.
+        Returns:
+            The number of the payload, or None if no slot is free.
         """
         sample = self._loan_sample(size)
         if sample is None:
@@ -309,7 +323,7 @@ class SharedWriter:
         return number
 
     def find_loan(self, data: memoryview) -> Loan | None:
-        """Return the loan that owns the memory of `data`, or None."""
+        """Return the loan whose buffer is `data`, or None if there is none."""
         if not self._loans or data.readonly or not data.c_contiguous:
             return None
         address = ctypes.addressof(ctypes.c_uint8.from_buffer(data))
@@ -317,20 +331,20 @@ class SharedWriter:
         return found if found is not None and found.size == data.nbytes else None
 
     def send(self, loan: Loan) -> int:
-        """Publish a loan to the readers; return its number."""
+        """Publish the payload of a loan to the readers; return the number of the payload."""
         self.number += 1
         self._loans.pop(loan.address, None)
         loan.send(self.number)
         return self.number
 
     def reclaim_slots(self) -> None:
-        """Reclaim slots that are held by killed readers."""
+        """Reclaim the slots of readers whose processes were killed."""
         if self._opened is not None and self._port is not None:
             self._opened.node.try_cleanup_dead_nodes()
             self._port.update_connections()
 
     def close(self) -> None:
-        """Release the memory. Payloads that readers hold remain valid."""
+        """Release the memory. Payloads that readers still use remain valid."""
         self._port = self._service = self._opened = None
         self._slot_bytes = 0
         self._slots = _SlotViews()
@@ -350,10 +364,18 @@ class _HeldSample:
 
 
 class SharedReader:
-    """Shared memory of one publisher, as a subscriber reads it. Guarded by the subscriber's lock."""
+    """Shared memory of one publisher, opened for a subscriber. Guarded by the subscriber's lock."""
 
     def __init__(self, publisher: int, generation: int) -> None:
-        """Open the memory of a publisher. Raises `LookupError` if this program can't open it."""
+        """Open the shared memory of a publisher.
+
+        Args:
+            publisher: Id of the publisher.
+            generation: Number of the memory segment, see `SharedWriter.generation`.
+
+        Raises:
+            LookupError: The memory can't be opened by this program.
+        """
         self._opened = _open_node()
         if self._opened is None:
             raise LookupError
@@ -370,9 +392,11 @@ class SharedReader:
         _readers[id(self)] = self
 
     def read(self, number: int, *, may_copy: bool = False) -> bytes | memoryview | None:
-        """Return the payload with this number as a read-only buffer, or None if it was overwritten.
+        """Return a payload as a read-only buffer, or None if the payload was overwritten.
 
-        With `may_copy`, small payloads are copied out of their slots.
+        Args:
+            number: Number of the payload.
+            may_copy: True to copy small payloads, which frees their slots.
         """
         while True:
             found, self._ahead = self._ahead or self._receive_next(), None

@@ -1,4 +1,4 @@
-"""Negotiation of shared memory: a publisher's readers, and the publishers that a subscriber reads from.
+"""Negotiation of shared memory between publishers and subscribers.
 
 Both classes are guarded by their owner's lock. docs/wire.md describes the notices.
 """
@@ -15,13 +15,18 @@ from nep.protocol.wire import OfferAcceptance
 
 _NUMBER = struct.Struct("<Q")
 _MAX_OFFERS = 4
-"""Maximum number of offers to a subscriber. One that doesn't reply can't share memory."""
+"""Maximum number of offers to a subscriber. A subscriber that doesn't confirm any can't share memory."""
 _OFFER_RETRY_S = 0.5
 _RECLAIM_INTERVAL_S = 1.0
 
 
 class SharedPayloads:
-    """Shared-memory readers of one publisher. `offer` sends an offer of a generation to a subscriber."""
+    """Shared memory of one publisher, and the subscribers that read from it.
+
+    Args:
+        publisher: Id of the publisher.
+        offer: Offers the memory to a subscriber; called with the id of the subscriber and the generation.
+    """
 
     def __init__(self, publisher: int, offer: Callable[[int, int], None]) -> None:
         self.readers: set[int] = set()
@@ -32,19 +37,25 @@ class SharedPayloads:
         self._tidied_at = float("-inf")
 
     def confirm(self, shares: OfferAcceptance) -> None:
-        """Handle a subscriber's confirmation that it has opened the memory."""
+        """Handle a subscriber's confirmation that it has opened the offered memory."""
         if shares.generation == self._writer.generation:
             self.readers.add(shares.subscriber)
 
     def discard(self, subscriber: int) -> None:
-        """Remove a subscriber that has left or has sent another hello."""
+        """Remove a subscriber that has disconnected or has sent another hello."""
         self.readers.discard(subscriber)
         self._offered.pop(subscriber, None)
 
     def write(self, data: bytes | memoryview, subscribers: Mapping[int, int], now: float) -> bytes | None:
-        """Write a payload to shared memory; return the part of the message that refers to it.
+        """Write a payload to shared memory; return the part of the message that refers to the payload.
 
-        Returns None if the payload must go through the socket, because there is no reader or no free slot.
+        Returns None if the payload must be sent over the socket, because there is no reader or no free
+        slot.
+
+        Args:
+            data: Encoded payload.
+            subscribers: Connected subscribers; the keys are their ids.
+            now: Current time (`time.monotonic`).
         """
         size = data.nbytes if isinstance(data, memoryview) else len(data)
         if not subscribers or not self._prepare_readers(size, subscribers, now):
@@ -78,7 +89,7 @@ class SharedPayloads:
         return bool(self.readers)
 
     def borrow_memory(self, size: int) -> memoryview | None:
-        """Return writable memory for a payload of `size` bytes, or None if no reader shares it."""
+        """Return writable memory for a payload of `size` bytes; None if no subscriber shares memory."""
         if not self.readers or size < MIN_SHARED_BYTES or not self._prepare_slots(size) or not self.readers:
             return None
         loan = self._writer.loan(size)
@@ -91,7 +102,12 @@ class SharedPayloads:
 
 
 class SharedSources:
-    """Memory that one subscriber shares with publishers. `answer` sends the confirmation of an offer."""
+    """Shared memory of the publishers that one subscriber reads from.
+
+    Args:
+        subscriber: Id of the subscriber.
+        answer: Sends the confirmation of an offer.
+    """
 
     def __init__(self, subscriber: int, answer: Callable[[OfferAcceptance], None]) -> None:
         self._subscriber = subscriber
@@ -99,7 +115,12 @@ class SharedSources:
         self._readers: dict[int, SharedReader] = {}
 
     def open(self, publisher: int, generation: int) -> None:
-        """Open the memory that a publisher offers; confirm the offer if opening succeeded."""
+        """Open the memory that a publisher offers; send a confirmation on success.
+
+        Args:
+            publisher: Id of the publisher.
+            generation: Number of the memory segment.
+        """
         known = self._readers.get(publisher)
         if known is None or known.generation != generation:
             try:
@@ -111,9 +132,15 @@ class SharedSources:
     def read(
         self, publisher: int, part: bytes | memoryview, *, may_copy: bool = False
     ) -> bytes | memoryview | None:
-        """Return the payload to which a message's part refers, or None if it was overwritten.
+        """Return the payload that a message's part refers to, or None if the payload was overwritten.
 
-        With `may_copy`, small payloads are copied out of their slots. Raises `WireError`.
+        Args:
+            publisher: Id of the publisher.
+            part: Part of the message.
+            may_copy: True to copy small payloads, which frees their slots.
+
+        Raises:
+            WireError: The part is malformed.
         """
         reader = self._readers.get(publisher)
         if len(part) != _NUMBER.size:
@@ -123,7 +150,7 @@ class SharedSources:
         return None if reader is None else reader.read(_NUMBER.unpack(part)[0], may_copy=may_copy)
 
     def close_publisher(self, publisher: int) -> None:
-        """Close the memory of a publisher. Payloads in use remain valid."""
+        """Close the memory of a publisher. Payloads that are still used remain valid."""
         self._readers.pop(publisher, None)
 
     def close(self) -> None:

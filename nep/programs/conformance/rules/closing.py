@@ -19,7 +19,7 @@ def _is_connected(publisher: ScriptedPublisher) -> bool:
 
 
 def _close_without_bye(bench: Bench, publisher: ScriptedPublisher, last_seq: int, wait_s: float) -> None:
-    """Report a publisher as closed; check that the adapter is still connected after `wait_s`."""
+    """Report a publisher as closed, and check that the adapter stays connected for `wait_s` seconds."""
     bench.master.submit(RemovePublisher(publisher.node.id, publisher.id, last_seq))
     bench.wait(wait_s)
     if not _is_connected(publisher):

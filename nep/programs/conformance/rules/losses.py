@@ -14,7 +14,7 @@ _SECTION = "notices"
 
 
 def _expect_counts(bench: Bench, sub: int, received: int, lost: int) -> None:
-    """Wait until the adapter's subscriber has these counts. Other counts break the rule."""
+    """Check that the counts of the adapter's subscriber reach the expected values within 2 s."""
     bench.require(lambda: len(bench.events(sub)) >= received, "message")
     for _turn in range(40):
         if bench.counts(sub) == (received, lost):
@@ -24,7 +24,10 @@ def _expect_counts(bench: Bench, sub: int, received: int, lost: int) -> None:
 
 
 def _report_last_seq(bench: Bench, publisher: int, seq: int) -> None:
-    """Report a last sequence number in three renewals; at the second, missing messages count as lost."""
+    """Let the master report a publisher's last sequence number in three replies to renewals.
+
+    From the second reply on, missing messages count as lost.
+    """
     bench.master.change = lambda _request, reply: (
         {**reply, "what": {**reply["what"], "last_seqs": {publisher: seq}}}
         if reply["is"] == "renewed"

@@ -32,7 +32,14 @@ _SAMPLES: Mapping[str, tuple[dict[str, object], bytes]] = {
 def connected_subscriber(
     bench: Bench, topic: str, level: int | None, msg_type: str = "json"
 ) -> ScriptedSubscriber:
-    """Connect a subscriber of the tester to the adapter's publisher, and wait for the echo."""
+    """Create a subscriber of the tester that is connected to the adapter's publisher of a topic.
+
+    Args:
+        bench: Test bench.
+        topic: Name of the topic.
+        level: Hello level; None to send no hello. Otherwise the function waits for the echo.
+        msg_type: Message type.
+    """
     endpoint = bench.record("publisher", topic)["endpoints"][0]
     subscriber = bench.subscriber(topic, msg_type, level=level, endpoint=endpoint)
     if level is not None:
@@ -43,7 +50,7 @@ def connected_subscriber(
 def connected_publisher(
     bench: Bench, level: int | None = 3, msg_type: str = "json"
 ) -> tuple[str, int, ScriptedSubscriber]:
-    """Create a publisher of the adapter and a connected subscriber.
+    """Create a publisher of the adapter, and a subscriber of the tester that is connected to it.
 
     Returns:
         The topic, the number of the publisher, and the subscriber.
@@ -54,7 +61,7 @@ def connected_publisher(
 
 
 def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
-    """Return all received messages. A malformed message breaks the rule."""
+    """Return all messages received by a subscriber. Raises `BrokenRuleError` for a malformed message."""
     try:
         return subscriber.messages
     except WireError as error:
@@ -64,7 +71,7 @@ def messages_of(subscriber: ScriptedSubscriber) -> list[Parts]:
 
 
 def _plain_subscriber(bench: Bench, topic: str, pub: int) -> ScriptedSubscriber:
-    """Return a subscriber without a hello, once it receives messages of the adapter's publisher."""
+    """Return a subscriber that sends no hello, after it has received a message of the adapter's publisher."""
     subscriber = connected_subscriber(bench, topic, None)
     for _turn in range(200):
         bench.call("publish", pub=pub, value={"warm": True})

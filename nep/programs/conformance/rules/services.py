@@ -1,4 +1,4 @@
-"""Rules for services and for topics with wildcards. docs/services.md describes the wire of services."""
+"""Rules for services and for topics with wildcards. See docs/services.md for the wire format of services."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _socket(bench: Bench, kind: int) -> Iterator[zmq.Socket[bytes]]:
 
 
 def _replies(bench: Bench, socket: zmq.Socket[bytes], wanted: set[int]) -> dict[int | None, Reply]:
-    """Wait for the replies to these calls, and return all replies received."""
+    """Wait for the replies to the calls with these numbers, and return all replies received, by number."""
     found: dict[int | None, Reply] = {}
 
     def has_all() -> bool:
@@ -123,7 +123,7 @@ def _registered_server(bench: Bench, name: str, endpoint: str) -> Iterator[None]
 
 
 def _reply_to_call(bench: Bench, socket: zmq.Socket[bytes], number: int, reply: Reply) -> Any:  # noqa: ANN401 - JSON
-    """Reply to the adapter's pending call, and return the value that the adapter's client received."""
+    """Reply to the adapter's pending call, and return the result of the call in the adapter."""
     bench.require(lambda: bool(socket.poll(0)), "call")
     sender, *parts = socket.recv_multipart()
     call = NATIVE.read_call(parts)

@@ -1,4 +1,4 @@
-"""Foxglove's WebSocket protocol, for connections of Foxglove and Lichtblick."""
+"""Server side of Foxglove's WebSocket protocol, for Foxglove and Lichtblick."""
 
 from nep.programs.web.foxglove.page import ChannelFormat, FoxglovePage
 from nep.programs.web.foxglove.protocol import SUBPROTOCOLS, is_offered

@@ -25,11 +25,11 @@ from nep.programs.web.rosbridge.page_topics import read_messages, subscribed_top
 from nep.programs.web.send_queue import Feed, QueuedMessage
 
 _MAX_CHANNELS_PER_MESSAGE = 100
-"""Maximum number of channels advertised in one message, because each includes its schema."""
+"""Maximum number of channels in one message, because each channel includes its schema."""
 
 
 class ChannelSchema(Protocol):
-    """Channel and its schema, as defined by `nep.recordings.formats.channels`."""
+    """Channel with its schema, as defined by `nep.recordings.formats.channels`."""
 
     @property
     def topic(self) -> str:
@@ -49,17 +49,17 @@ class ChannelSchema(Protocol):
 
     @property
     def schema_data(self) -> bytes:
-        """The schema in this encoding."""
+        """Schema in the encoding `schema_encoding`."""
 
 
 class ChannelFormat(Protocol):
-    """Encoder of messages for channels, implemented by `nep.recordings.formats.channels.LiveChannels`."""
+    """Encoder of live messages, implemented by `nep.recordings.formats.channels.LiveChannels`."""
 
     def expected_channel(self, topic: str, msg_type: str) -> ChannelSchema:
         """Return the most likely channel for a topic on which no message was received yet."""
 
     def encode(self, message: Message, log_ns: int) -> tuple[ChannelSchema, bytes]:
-        """Return the channel of a message and the message's encoded data."""
+        """Return the channel of a message that was received at `log_ns`, and the message's encoded data."""
 
 
 @dataclass
@@ -83,8 +83,8 @@ class Channels:
 
     Args:
         context: Shared objects of the connection.
-        channels: Encodes messages.
-        tell: Sends a JSON message with the given fields.
+        channels: Encoder of messages.
+        tell: Sends a JSON message with the given fields to the client.
     """
 
     def __init__(
@@ -103,7 +103,12 @@ class Channels:
         return tuple(subscribed_topic(each.feed) for each in self._subscriptions.copy().values())
 
     def ros_type(self, topic: str, schema_name: str) -> str:
-        """Return the ROS type of a topic if it was advertised to the client with this schema, else ""."""
+        """Return the ROS type of a topic that was advertised to the client with a schema; else "".
+
+        Args:
+            topic: Name of the topic.
+            schema_name: Name of the schema that the client uses.
+        """
         known = self._channels.get(topic)
         is_known = known is not None and known.definition.schema_name == schema_name
         return ros_type_of(known.msg_type) if known is not None and is_known else ""
@@ -111,7 +116,11 @@ class Channels:
     # ---- topics
 
     async def update(self, found: Mapping[str, str]) -> None:
-        """Advertise new topics and unadvertise removed ones; `found` maps each topic to its type."""
+        """Advertise new topics and unadvertise removed ones.
+
+        Args:
+            found: Message types of all current topics, by topic.
+        """
         for topic, channel in list(self._channels.items()):
             if found.get(topic) != channel.msg_type:
                 del self._channels[topic]
@@ -151,7 +160,12 @@ class Channels:
     # ---- subscriptions
 
     async def subscribe(self, id_: object, channel_id: object) -> None:
-        """Start to send the messages of a channel to the client."""
+        """Start sending the messages of a channel to the client.
+
+        Args:
+            id_: Id of the subscription, chosen by the client.
+            channel_id: Id of the channel.
+        """
         channel = next((each for each in self._channels.values() if each.id == channel_id), None)
         if type(id_) is not int or not 0 <= id_ <= MAX_ID or id_ in self._subscriptions or channel is None:
             raise NepError(_("a subscription needs an unused 'id' and the 'channelId' of a topic"))
@@ -173,7 +187,7 @@ class Channels:
     async def unsubscribe(self, id_: int) -> None:
         """End a subscription.
 
-        Unknown ids are ignored, because a channel may have been unadvertised meanwhile.
+        Unknown ids are ignored, because the channel may have been unadvertised in the meantime.
         """
         known = self._subscriptions.pop(id_, None)
         if known is None:
@@ -183,7 +197,10 @@ class Channels:
         await self._context.run_in_thread(known.subscriber.close)
 
     async def frames_of(self, queued: QueuedMessage) -> list[Frame]:
-        """Encode a message for the client. Raises `NepError` if the message can't be decoded."""
+        """Encode a message for the client. Raises `NepError` if the message can't be decoded.
+
+        Returns no frames if the client must subscribe again because the channel has changed.
+        """
         message = queued.message
         known = next((each for each in self._subscriptions.values() if each.feed is queued.feed), None)
         if known is None:
@@ -197,14 +214,17 @@ class Channels:
         return [message_frame(known.id, log_ns, data)]
 
     def cancel(self) -> None:
-        """Stop reading, because the client has disconnected. Its node closes the subscribers."""
+        """Stop reading messages after the client has disconnected.
+
+        The client's node closes the subscribers.
+        """
         for each in self._subscriptions.values():
             each.reader.cancel()
             each.feed.clear()
 
 
 def _readable_type(msg_type: str) -> str:
-    """Return the type for a topic's channel; msgpack becomes JSON, because clients can't read msgpack."""
+    """Return the message type for a topic's channel, with msgpack replaced by JSON for the clients."""
     return "json" if codec_for(msg_type).name == "msgpack" else msg_type
 
 

@@ -1,4 +1,4 @@
-"""`GraphUpdates`: sends services and connections of the graph to a client as changes. No input or output."""
+"""`GraphUpdates`: incremental updates of a client's view of the graph. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _Names = Mapping[str, tuple[str, ...]]
 
 
 class _Connections(NamedTuple):
-    """Names of nodes by topic and by service."""
+    """Names of the nodes that publish, subscribe to or serve each topic and service."""
 
     published: _Names
     subscribed: _Names
@@ -27,7 +27,7 @@ _NO_CONNECTIONS = _Connections({}, {}, {})
 
 
 class GraphUpdates:
-    """Tracker of the part of the graph that was sent to a client."""
+    """State of the graph that was sent to a client, from which the next update is computed."""
 
     def __init__(self) -> None:
         self._service_ids: dict[tuple[str, str], int] = {}
@@ -37,7 +37,10 @@ class GraphUpdates:
         self._connections = _NO_CONNECTIONS
 
     def set_connections_wanted(self, *, is_wanted: bool) -> None:
-        """Start or stop sending the publishers, subscribers and servers; a start sends all of them."""
+        """Enable or disable updates about publishers, subscribers and servers.
+
+        After being enabled, the first update contains all of them.
+        """
         self._are_connections_wanted = is_wanted
         self._connections = _NO_CONNECTIONS
 

@@ -1,9 +1,9 @@
 """Connection of Foxglove or Lichtblick with Foxglove's WebSocket protocol.
 
 The server of the package foxglove-sdk (0.30.3) accepts every Origin and has no token, so any web page in the
-user's browser could read all topics. Here, Foxglove's clients pass the same checks as those of rosbridge, and
-share the code that publishes, calls services and guards robots. Encodings and schemas are those of recordings
-(`nep.recordings.formats.channels`).
+user's browser could read all topics. Here, Foxglove's clients must pass the same checks as rosbridge's, and
+share the code that publishes, calls services and guards robots. Encodings and schemas are the same as in
+recordings (`nep.recordings.formats.channels`).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _ROS_TYPES = {
     "foxglove.CompressedImage": "sensor_msgs/CompressedImage",
     "foxglove.RawImage": "sensor_msgs/Image",
 }
-"""ROS types for schemas of Foxglove that have the same fields."""
+"""ROS types by the Foxglove schema that has the same fields."""
 
 
 class FoxglovePage(PageConnection):
@@ -69,8 +69,8 @@ class FoxglovePage(PageConnection):
         name: Name of the page's node.
         new_node: Creates the node.
         counts: Counters of the server.
-        channels: Encodes messages.
-        guard: Decides on which topics the client may publish.
+        channels: Encoder of messages.
+        guard: Motion guard that decides on which topics the client may publish.
         on_robot_refused: Called with the name of a robot that the client may not move, and the reason.
     """
 
@@ -112,7 +112,7 @@ class FoxglovePage(PageConnection):
         return (*self._channels.subscribed_topics, *self._topics.topics)
 
     async def run(self) -> None:
-        """Serve the client until it disconnects; then close its node."""
+        """Serve the client until it disconnects, and close its node."""
         self._send_fields(
             {
                 "op": "serverInfo",
@@ -184,7 +184,7 @@ class FoxglovePage(PageConnection):
     # ---- requests of the client
 
     async def _handle(self, data: bytes) -> None:
-        """Process one message from the client. Never raises because of the message's content."""
+        """Execute one message from the client. Never raises because of the message's content."""
         self._counts.operations += 1
         try:
             request = wire.parse(data)

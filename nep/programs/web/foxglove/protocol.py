@@ -1,4 +1,4 @@
-"""Messages of Foxglove's WebSocket protocol: parsing and encoding. No input or output.
+"""Parsing and encoding of the messages of Foxglove's WebSocket protocol. Performs no I/O.
 
 Text messages from a client start with "{", binary messages with the byte 1 or 2.
 """
@@ -21,31 +21,43 @@ from nep.programs.web.outgoing import Frame
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 CAPABILITIES = ("clientPublish", "services", "connectionGraph")
 ENCODING = "json"
-"""Encoding of messages that clients publish, and of requests and responses of services."""
+"""Encoding of messages published by clients, and of requests and responses of services."""
 MAX_ID = 2**32 - 1
 _MESSAGE, _SERVICE = 1, 2  # opcodes of clients
 _MESSAGE_DATA = struct.Struct("<BIQ")
-"""Opcode 1, subscription id, log time in nanoseconds."""
+"""Header of a message: opcode 1, subscription id, log time in nanoseconds."""
 _RESPONSE = struct.Struct("<BIII")
-"""Opcode 3, service id, call id, length of the encoding's name."""
+"""Header of a service response: opcode 3, service id, call id, length of the encoding's name."""
 _CLIENT_MESSAGE = struct.Struct("<BI")
 _SERVICE_REQUEST = struct.Struct("<BIII")
 
 
 def is_offered(subprotocols: Iterable[str]) -> bool:
-    """Return True if the headers ``Sec-WebSocket-Protocol`` contain a version of Foxglove's protocol."""
+    """Return True if the values of the header ``Sec-WebSocket-Protocol`` include Foxglove's protocol."""
     return any(each.strip() in SUBPROTOCOLS for each in ",".join(subprotocols).split(","))
 
 
 class ClientMessage(NamedTuple):
-    """Message that a client publishes."""
+    """Message published by a client.
+
+    Attributes:
+        channel_id: Id of the channel that the client advertised.
+        data: Encoded message.
+    """
 
     channel_id: int
     data: bytes
 
 
 class ServiceRequest(NamedTuple):
-    """Request of a client to a service."""
+    """Service call of a client.
+
+    Attributes:
+        service_id: Id of the advertised service.
+        call_id: Id of the call, chosen by the client.
+        encoding: Encoding of the request.
+        data: Encoded request.
+    """
 
     service_id: int
     call_id: int
@@ -54,7 +66,11 @@ class ServiceRequest(NamedTuple):
 
 
 def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
-    """Parse a message from a client; a JSON message is returned as a map. Raises `NepError`."""
+    """Parse a message from a client. Raises `NepError`.
+
+    Returns:
+        A `ClientMessage` or `ServiceRequest` for a binary message, the fields of a JSON message.
+    """
     if data[:1] == b"\x01" and len(data) >= _CLIENT_MESSAGE.size:
         return ClientMessage(_CLIENT_MESSAGE.unpack_from(data)[1], data[_CLIENT_MESSAGE.size :])
     if data[:1] == b"\x02" and len(data) >= _SERVICE_REQUEST.size:
@@ -71,7 +87,7 @@ def parse(data: bytes) -> ClientMessage | ServiceRequest | Mapping[str, object]:
 
 
 def items(value: object) -> list[object]:
-    """Return the value if it is a list, else an empty list."""
+    """Return `value` if it is a list, else an empty list."""
     return value if isinstance(value, list) else []
 
 
@@ -81,11 +97,23 @@ def control_frame(fields: Mapping[str, object]) -> Frame:
 
 
 def message_frame(subscription_id: int, log_ns: int, data: bytes) -> Frame:
-    """Encode a message of a topic for a subscription."""
+    """Encode a message of a topic for a client.
+
+    Args:
+        subscription_id: Id of the client's subscription.
+        log_ns: Time of receipt in ns since 1970.
+        data: Encoded message.
+    """
     return Frame(_MESSAGE_DATA.pack(1, subscription_id, log_ns) + data, is_text=False)
 
 
 def response_frame(service_id: int, call_id: int, data: bytes) -> Frame:
-    """Encode the response of a service."""
+    """Encode the response to a service call.
+
+    Args:
+        service_id: Id of the advertised service.
+        call_id: Id of the call.
+        data: Response in the encoding `ENCODING`.
+    """
     head = _RESPONSE.pack(3, service_id, call_id, len(ENCODING)) + ENCODING.encode()
     return Frame(head + data, is_text=False)

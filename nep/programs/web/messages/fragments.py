@@ -1,4 +1,4 @@
-"""Fragments of operations: reassembly within limits, and splitting. No input or output."""
+"""Reassembly of fragmented operations within limits, and splitting of text. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from nep.programs.web.messages.operations import Fragment, OperationError, Opera
 
 
 class FragmentBuffer:
-    """Buffer for the incomplete operations of one page. When it is full, a new one replaces the oldest."""
+    """Buffer for a page's incomplete operations. When it is full, the oldest operation is discarded."""
 
     def __init__(self) -> None:
         self._parts: dict[OperationId, dict[int, str]] = {}
@@ -19,10 +19,11 @@ class FragmentBuffer:
         return len(self._parts)
 
     def add(self, part: Fragment | Png) -> str | None:
-        """Add a fragment; return the whole text when it is complete, else None.
+        """Add a fragment; return the text of the operation once it is complete, else None.
 
-        Raises `OperationError` for a fragment without id, or one that contradicts the other fragments or
-        makes the text too long; the other fragments are then discarded.
+        Raises:
+            OperationError: The fragment has no id, contradicts earlier fragments, or makes the text too
+                long. The earlier fragments are then discarded.
         """
         if part.total == 1:
             return part.data
@@ -58,5 +59,5 @@ class FragmentBuffer:
 
 
 def cut(text: str, size: int) -> list[str]:
-    """Split a text into pieces of at most `size` characters."""
+    """Split text into pieces of at most `size` characters."""
     return [text[at : at + size] for at in range(0, len(text), size)] or [""]

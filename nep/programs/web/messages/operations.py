@@ -1,4 +1,4 @@
-"""Operations of the rosbridge v2 protocol that a page sends: parsing to typed values. No input or output.
+"""Parsing of rosbridge v2 operations sent by a page to typed values. Performs no I/O.
 
 For any input, `parse` returns an operation or raises `OperationError` with a message for the page.
 """
@@ -32,7 +32,7 @@ OperationId = str | int | None
 Compression = Literal["none", "png", "cbor", "cbor-raw"]
 Level = Literal["info", "warning", "error", "none"]
 COMPRESSIONS: tuple[Compression, ...] = ("none", "png", "cbor", "cbor-raw")
-"""Compressions in order of priority, if two subscriptions of a page to one topic differ."""
+"""Compressions in ascending priority, for subscriptions of a page to one topic that differ."""
 LEVELS: tuple[Level, ...] = ("info", "warning", "error", "none")
 _RESERVED_PREFIX = "/nep/"
 _MAX_NUMBER = 2**53
@@ -40,7 +40,13 @@ _MAX_THROTTLE_MS = 3_600_000
 
 
 class OperationError(NepError):
-    """Error for an operation that failed. The message is for the page; `id` is the id of the operation."""
+    """Error for an operation that failed.
+
+    Args:
+        sentence: Message for the page.
+        id: Id of the operation, if any.
+        level: Level of the status that the page receives.
+    """
 
     def __init__(self, sentence: str, id: OperationId = None, level: Level = "error") -> None:
         self.id = id
@@ -50,7 +56,7 @@ class OperationError(NepError):
 
 @dataclass(frozen=True, slots=True)
 class Advertise:
-    """Request to announce that the page will publish on a topic."""
+    """Request to advertise a topic, on which the page will publish."""
 
     id: OperationId
     topic: str
@@ -60,7 +66,7 @@ class Advertise:
 
 @dataclass(frozen=True, slots=True)
 class Unadvertise:
-    """Request to end the announcement with this id, or all announcements of the topic if there is no id."""
+    """Request to end the advertisement with an id, or all advertisements of the topic if `id` is None."""
 
     id: OperationId
     topic: str
@@ -74,12 +80,22 @@ class Publish:
     topic: str
     msg: object
     size_bytes: int = field(default=0, compare=False)
-    """Size of the operation as received."""
+    """Size of the operation in bytes, as received."""
 
 
 @dataclass(frozen=True, slots=True)
 class Subscribe:
-    """Request to subscribe to a topic; `ros_type` is "" to use the topic's own type."""
+    """Request to subscribe to a topic.
+
+    Attributes:
+        id: Id of the subscription, if any.
+        topic: Name of the topic.
+        ros_type: Expected ROS type; "" for the topic's own type.
+        throttle_s: Minimum time in seconds between two messages.
+        queue_length: Maximum number of queued messages; 0 for the default.
+        fragment_size: Maximum number of characters in a message to the page; None for no limit.
+        compression: Compression of the messages.
+    """
 
     id: OperationId
     topic: str
@@ -92,7 +108,7 @@ class Subscribe:
 
 @dataclass(frozen=True, slots=True)
 class Unsubscribe:
-    """Request to end the subscription with this id, or all subscriptions to the topic if there is no id."""
+    """Request to end the subscription with an id, or all subscriptions to the topic if `id` is None."""
 
     id: OperationId
     topic: str
@@ -112,7 +128,7 @@ class CallService:
 
 @dataclass(frozen=True, slots=True)
 class AdvertiseService:
-    """Request to serve a service."""
+    """Request to advertise a service, which the page serves."""
 
     id: OperationId
     service: str
@@ -129,7 +145,7 @@ class UnadvertiseService:
 
 @dataclass(frozen=True, slots=True)
 class ServiceResponse:
-    """Reply of the page to a call that it received."""
+    """Reply of the page to a call from another node."""
 
     id: OperationId
     service: str
@@ -139,7 +155,14 @@ class ServiceResponse:
 
 @dataclass(frozen=True, slots=True)
 class Fragment:
-    """Fragment of the text of an operation."""
+    """Piece of the text of an operation.
+
+    Attributes:
+        id: Id shared by the fragments of one operation.
+        data: Piece of the text.
+        number: Index of the fragment, from 0.
+        total: Number of fragments.
+    """
 
     id: OperationId
     data: str
@@ -149,7 +172,14 @@ class Fragment:
 
 @dataclass(frozen=True, slots=True)
 class Png:
-    """Text of an operation (or a fragment) as the pixels of a PNG file, in base64."""
+    """Text of an operation or fragment, encoded in the pixels of a PNG file.
+
+    Attributes:
+        id: Id shared by the fragments of one operation.
+        data: PNG file, or piece of it, in base64.
+        number: Index of the fragment, from 0.
+        total: Number of fragments.
+    """
 
     id: OperationId
     data: str
@@ -159,7 +189,7 @@ class Png:
 
 @dataclass(frozen=True, slots=True)
 class SetLevel:
-    """Request to send statuses from this level on."""
+    """Request to receive only statuses of this level or above."""
 
     id: OperationId
     level: Level
@@ -167,7 +197,7 @@ class SetLevel:
 
 @dataclass(frozen=True, slots=True)
 class PageStatus:
-    """Status message of the page, for the log."""
+    """Status message from the page, which is written to the log."""
 
     id: OperationId
     level: Level
@@ -176,7 +206,18 @@ class PageStatus:
 
 @dataclass(frozen=True, slots=True)
 class Auth:
-    """Credentials in the form of rosauth; `mac` is a SHA-512 of the token and the other fields."""
+    """Credentials in the form of rosauth.
+
+    Attributes:
+        id: Id of the operation, if any.
+        mac: SHA-512 of the token and the other fields, in hexadecimal.
+        client: Address of the client.
+        dest: Address of the server.
+        rand: Random text.
+        time_s: Time of the request (s since 1970).
+        level: Requested level of access.
+        end_s: Time at which the credentials expire (s since 1970).
+    """
 
     id: OperationId
     mac: str
@@ -215,12 +256,17 @@ def parse(data: bytes) -> Operation:
 
 
 def operation_of(fields: Mapping[str, object], size_bytes: int = 0) -> Operation:
-    """Convert the fields of a message to an operation. Raises `OperationError`."""
+    """Convert the fields of a message to an operation. Raises `OperationError`.
+
+    Args:
+        fields: Fields of the message.
+        size_bytes: Size of the message in bytes.
+    """
     return _operation(_Fields(fields, size_bytes))
 
 
 def parse_json(data: bytes) -> object:
-    """Decode JSON from a page within the limits of an operation. Raises `OperationError`."""
+    """Parse JSON from a page within the limits of an operation. Raises `OperationError`."""
     if len(data) > MAX_MESSAGE_BYTES:
         raise OperationError(
             _("an operation has {count} bytes; at most {most} are allowed").format(
@@ -242,12 +288,12 @@ def parse_json(data: bytes) -> object:
 
 
 def log_text(text: str) -> str:
-    """Return text from a page, escaped and bounded for the log."""
+    """Return text from a page for the log, escaped and shortened."""
     return escaped(bounded_str(text, 1_000))
 
 
 class _Fields:
-    """Fields of an operation, each validated when it is read."""
+    """Accessor of an operation's fields that validates each field when it is read."""
 
     def __init__(self, fields: Mapping[str, object], size_bytes: int) -> None:
         self._fields = fields
@@ -258,11 +304,11 @@ class _Fields:
         self.op = self.text("op")
 
     def get(self, name: str, default: object = None) -> object:
-        """Return the raw value of a field."""
+        """Return the value of a field without validation."""
         return self._fields.get(name, default)
 
     def text(self, name: str, default: str | None = None, *, most: int = MAX_NAME_LENGTH) -> str:
-        """Return a text field. The field is required if there is no default."""
+        """Return a text field of at most `most` characters. The field is required if there is no default."""
         value = self._fields.get(name)
         if value is None and default is not None:
             return default
@@ -277,14 +323,14 @@ class _Fields:
         return value
 
     def topic(self, name: str) -> str:
-        """Return a field with the name of a topic or service."""
+        """Return a field that contains the name of a topic or service."""
         try:
             return check_topic(self.text(name))
         except BadTopicError as error:
             raise self.error(str(error)) from None
 
     def type_name(self, default: str | None = None) -> str:
-        """Return the field "type"; "" if missing and allowed by the default."""
+        """Return the field "type", or the default if the field is missing."""
         given = self.text("type", default)
         try:
             return check_topic(given) if given else given
@@ -292,7 +338,7 @@ class _Fields:
             raise self.error(_("'type' is invalid: {reason}").format(reason=error.reason)) from None
 
     def own_name(self, name: str) -> str:
-        """Return a field with the name of a topic or service that the page creates."""
+        """Return the name of a topic or service that the page creates, which must not be reserved."""
         given = self.topic(name)
         if given.startswith(_RESERVED_PREFIX):
             said = _("names that start with '{prefix}' are reserved; choose another name")
@@ -300,9 +346,15 @@ class _Fields:
         return given
 
     def number(self, name: str, default: int | None, least: int, most: int) -> int:
-        """Return an integer field; integral floats, which some programs send, are accepted.
+        """Return a number field as an integer. The field is required if there is no default.
 
-        The field is required if there is no default.
+        Floats are accepted, because some programs send whole numbers as floats.
+
+        Args:
+            name: Name of the field.
+            default: Value for a missing field.
+            least: Minimum.
+            most: Maximum.
         """
         value = self._fields.get(name)
         if value is None and default is not None:
@@ -331,22 +383,27 @@ class _Fields:
         return cast("Compression", self.choice("compression", "none", COMPRESSIONS))
 
     def fragment_size(self) -> int | None:
-        """Return the maximum number of characters in a message to the page, or None."""
+        """Return the maximum number of characters in a message to the page; None for no limit."""
         if self._fields.get("fragment_size") is None:
             return None
         return max(MIN_FRAGMENT_SIZE, self.number("fragment_size", None, 1, _MAX_NUMBER))
 
     def parts(self) -> tuple[int, int]:
-        """Return the number of a fragment, and the total number of fragments."""
+        """Return the index of a fragment, and the number of fragments."""
         total = self.number("total", 1, 1, MAX_FRAGMENTS)
         return self.number("num", 0, 0, total - 1), total
 
     def error(self, sentence: str) -> OperationError:
-        """Create the error for this operation."""
+        """Return an error with the id of this operation."""
         return OperationError(sentence, self.id)
 
     def invalid_field(self, name: str, wanted: str) -> OperationError:
-        """Create the error for a missing field, or a field that is not `wanted`."""
+        """Return the error for a missing or invalid field.
+
+        Args:
+            name: Name of the field.
+            wanted: Description of a valid value.
+        """
         op = quotable(self._fields.get("op"))
         if name not in self._fields:
             return self.error(

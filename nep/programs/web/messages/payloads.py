@@ -1,4 +1,4 @@
-"""Conversion of NEP messages to the shapes of ROS messages, and back. No input or output.
+"""Conversion of NEP messages to the shapes of ROS messages, and back. Performs no I/O.
 
     | NEP message type    | ROS type                     | shape                                           |
     |---------------------|------------------------------|-------------------------------------------------|
@@ -60,13 +60,16 @@ class PayloadError(NepError):
 
 
 def nep_type_of(ros_type: str) -> str:
-    """Return the NEP message type for a ROS type: "string" for std_msgs/String; other names are unchanged."""
+    """Return the NEP message type for a ROS type, such as "string" for "std_msgs/String".
+
+    Names without a counterpart are returned unchanged.
+    """
     bare = bare_type(ros_type)
     return _CODECS.get(bare, bare)
 
 
 def ros_type_of(msg_type: str) -> str:
-    """Return the ROS type that represents a NEP message type for pages."""
+    """Return the ROS type under which pages see a NEP message type."""
     if msg_type in _UNKNOWN_TYPES:
         return JSON_TYPE
     codec = codec_for(msg_type).name
@@ -74,9 +77,13 @@ def ros_type_of(msg_type: str) -> str:
 
 
 def is_compatible(ros_type: str, msg_type: str) -> bool:
-    """Return True if a page may use `ros_type` on a topic of `msg_type`.
+    """Return True if a page may use a ROS type on a topic.
 
-    A topic of plain JSON accepts any type, because its messages are passed on unchanged.
+    A topic of plain JSON accepts any type, because its messages are forwarded unchanged.
+
+    Args:
+        ros_type: Type that the page requests.
+        msg_type: NEP message type of the topic.
     """
     if msg_type in _UNKNOWN_TYPES or not ros_type or ros_type_of(msg_type) == JSON_TYPE:
         return True
@@ -85,7 +92,7 @@ def is_compatible(ros_type: str, msg_type: str) -> bool:
 
 
 def codec_or_type(msg_type: str) -> str:
-    """Return the name of the codec ("image" for "images"), or the type itself if it is a typed name."""
+    """Return the codec of a message type ("image" for "images"), or the type itself if it is a typed name."""
     codec = codec_for(msg_type).name
     return msg_type if codec == "json" and "/" in msg_type else codec
 
@@ -94,9 +101,15 @@ def codec_or_type(msg_type: str) -> str:
 
 
 def to_ros(message: Message, *, as_pixels: bool = False) -> object:
-    """Return the payload of a message in its ROS shape; bytes in it stay `bytes`.
+    """Return the payload of a message in its ROS shape, in which bytes stay `bytes`.
 
-    Raises `DecodeError` or `EncodeError` if the message can't be decoded or has no such shape.
+    Args:
+        message: Message to convert.
+        as_pixels: Convert an image to the pixels of ``sensor_msgs/Image``.
+
+    Raises:
+        DecodeError: The message can't be decoded.
+        EncodeError: The payload has no ROS shape.
     """
     if message.codec == "string":
         return {"data": message.payload}
@@ -113,7 +126,10 @@ def to_ros(message: Message, *, as_pixels: bool = False) -> object:
 
 
 def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
-    """Return a message in the ROS 1 serialization of its type. Raises the exceptions of `to_ros`."""
+    """Return a message in ROS 1 serialization.
+
+    The arguments and exceptions are those of `to_ros`.
+    """
     if message.codec == "image":
         return _image_bytes(message, _RAW_IMAGE if as_pixels else _COMPRESSED_IMAGE)
     if message.codec in {"string", "bytes"}:
@@ -127,7 +143,7 @@ def ros_bytes(message: Message, *, as_pixels: bool = False) -> bytes:
 
 
 def _image_bytes(message: Message, ros_type: str) -> bytes:
-    """Return an image in ROS serialization, stamped with the time of publication."""
+    """Return an image in ROS serialization; the header has the time of publication."""
     encoded = Encoded(message.data, dict(message.extension) or parse_header(message.data).extension)
     layout = image_codec.raw_layout((encoded.extension or {}).get("encoding"))
     if ros_type == _COMPRESSED_IMAGE and layout is not None:
@@ -142,7 +158,7 @@ def _image_bytes(message: Message, ros_type: str) -> bytes:
 
 
 def _with_ros1_times(value: object) -> object:
-    """Replace `{sec, nanosec}`, as in NEP and ROS 2, with `{secs, nsecs}`."""
+    """Replace times of the form `{sec, nanosec}` (NEP, ROS 2) with `{secs, nsecs}` (ROS 1)."""
     if isinstance(value, dict):
         if value.keys() == {"sec", "nanosec"}:
             return {"secs": value["sec"], "nsecs": value["nanosec"]}
@@ -156,9 +172,15 @@ def _with_ros1_times(value: object) -> object:
 
 
 def from_ros(msg: object, ros_type: str, msg_type: str) -> object:
-    """Convert a page's message of `ros_type` to the payload for a topic of `msg_type`.
+    """Convert a message from a page to a payload.
 
-    Raises `PayloadError` naming the field that doesn't match.
+    Args:
+        msg: Message in its ROS shape.
+        ros_type: ROS type of the message.
+        msg_type: NEP message type of the topic.
+
+    Raises:
+        PayloadError: A field doesn't match; the message names the field.
     """
     codec = codec_or_type(msg_type)
     if codec == "string":

@@ -1,4 +1,7 @@
-"""Text in the pixels of a PNG file: rosbridge's compression `png`. Requires the extra `image`."""
+"""Encoding of text in the pixels of a PNG file, rosbridge's compression `png`.
+
+Requires the extra `image`.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,9 @@ _MAX_WIDTH = 4_096
 
 
 def text_as_png(text: bytes) -> str:
-    """Encode text in the pixels of a PNG file, padded with newlines; return the file in base64.
+    """Encode text in the pixels of a PNG file and return the file in base64.
 
-    Raises `NepError` if the image codec is not installed.
+    The text is padded with newlines. Raises `NepError` if the image codec is not installed.
     """
     try:
         import numpy as np  # noqa: PLC0415 - optional and heavy
@@ -33,7 +36,10 @@ def text_as_png(text: bytes) -> str:
 
 
 def text_in_png(data: str) -> bytes:
-    """Decode the text in a PNG file. Raises `OperationError`; large files are rejected before decoding."""
+    """Decode the text in the pixels of a PNG file.
+
+    Raises `OperationError` for invalid data. Large files are rejected before decoding.
+    """
     try:
         file = parse_header(base64.b64decode(data, validate=True))
         is_right = file.kind == "png" and (file.channels, file.bits) == (3, 8)

@@ -1,7 +1,7 @@
-"""ROS definitions of the message types that NEP knows without ROS, for rosapi and CBOR.
+"""ROS definitions of NEP's own message types, for rosapi and CBOR, without an installation of ROS.
 
-The fields and their order are those of ROS 1 (common_msgs 1.13), because readers of cbor-raw decode bytes
-with these definitions. Comments and constants are omitted.
+The fields and their order are as in ROS 1 (common_msgs 1.13), because readers of cbor-raw decode bytes with
+these definitions. Comments and constants are omitted.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ from functools import cache
 from nep.backends.ros.definition import Definition, FieldKind, parse
 
 JSON_TYPE = "nep/Json"
-"""Type of topics with arbitrary JSON messages. In ROS serialization, the JSON text is a string."""
+"""ROS type of topics with arbitrary JSON messages.
+
+In ROS serialization, a message is one string with the JSON text.
+"""
 MSGPACK_TYPE = "nep/Msgpack"
 
 _HEADER = "std_msgs/Header header\n"
@@ -77,19 +80,19 @@ _SEPARATOR = "=" * 80
 
 
 def bare_type(ros_type: str) -> str:
-    """Remove the "msg" of ROS 2 from a type name: "std_msgs/msg/String" becomes "std_msgs/String"."""
+    """Return a type name without the "msg" of ROS 2: "std_msgs/String" for "std_msgs/msg/String"."""
     return ros_type.replace("/msg/", "/", 1)
 
 
 @cache
 def definition_of(ros_type: str) -> Definition | None:
-    """Return the definition of a type including all nested types, or None if the type is unknown here."""
+    """Return the definition of a type including all nested types, or None if the type is unknown."""
     text = full_text(ros_type)
     return None if text is None else parse(ros_type, text)
 
 
 def full_text(ros_type: str) -> str | None:
-    """Return the definition as printed by `gendeps --cat`, or None if the type is unknown here."""
+    """Return a definition in the format of `gendeps --cat`, or None if the type is unknown."""
     if ros_type not in _DEFINITION_TEXTS:
         return None
     inside = sorted(set(_nested_types(ros_type)))
@@ -107,7 +110,7 @@ def _nested_types(ros_type: str) -> Iterator[str]:
 
 
 def type_definitions(ros_type: str) -> list[dict[str, object]] | None:
-    """Return a type and its nested types in the form of rosapi, or None if the type is unknown here."""
+    """Return a type and its nested types in the format of rosapi, or None if the type is unknown."""
     definition = definition_of(ros_type)
     if definition is None:
         return None

@@ -1,1 +1,1 @@
-"""Connections of pages and programs with the rosbridge v2 protocol."""
+"""Server side of the rosbridge v2 protocol, for web pages and programs."""

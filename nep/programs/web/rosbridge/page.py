@@ -1,4 +1,4 @@
-"""`Page`: a rosbridge connection with its own node, which is closed with the connection."""
+"""`Page`: rosbridge connection with its own node, which is closed with the connection."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Page(PageConnection):
         connection: WebSocket connection.
         name: Name of the page's node.
         new_node: Creates the node.
-        guard: Decides on which topics the page may publish.
+        guard: Motion guard that decides on which topics the page may publish.
         counts: Counters of the server.
         on_robot_refused: Called with the name of a robot that the page may not move, and the reason.
     """
@@ -89,7 +89,7 @@ class Page(PageConnection):
         return self._topics.topics
 
     async def run(self) -> None:
-        """Serve the page until it disconnects; then close its node."""
+        """Serve the page until it disconnects, and close its node."""
         writer = asyncio.create_task(self._write())
         try:
             await self._context.run_in_thread(self._log_connection)
@@ -150,7 +150,7 @@ class Page(PageConnection):
             raise op.OperationError(str(error), operation.id) from error
 
     def _unwrap(self, part: op.Fragment | op.Png) -> op.Operation | None:
-        """Return the wrapped operation once all fragments have arrived, else None."""
+        """Return the operation in fragments or in a PNG once all parts have arrived, else None."""
         try:
             whole = self._fragments.add(part)
             if whole is None:
@@ -179,7 +179,10 @@ class Page(PageConnection):
 
 
 async def authenticate(connection: ServerConnection, check: AuthCheck) -> bool:
-    """Return True if the first message is a valid ``auth`` operation and arrives in time."""
+    """Return True if the client's first message is a valid ``auth`` operation.
+
+    Returns False if the message does not arrive within the time limit.
+    """
     try:
         data = await asyncio.wait_for(connection.recv(decode=False), AUTH_TIMEOUT_S)
         return isinstance(auth := op.parse(bytes(data)), op.Auth) and check.verify(auth)

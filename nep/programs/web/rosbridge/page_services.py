@@ -1,4 +1,4 @@
-"""Services that one page calls and serves."""
+"""Services that a page calls and serves."""
 
 from __future__ import annotations
 
@@ -27,18 +27,26 @@ from nep.programs.web.rosbridge.rosapi import RosApi, is_rosapi
 from nep.text import bounded_str, quotable
 
 Respond = Callable[[CallService, object, bool], None]
-"""Sends a reply, or the reason of a failure, to the page; raises `NepError` if it can't be encoded."""
+"""Function that sends the result of a call to the page: (operation, values or reason, success).
+
+Raises `NepError` if the result can't be encoded.
+"""
 
 
 class ServiceFailedError(NepError):
-    """Error for a call that the page answered with a failure or does not answer any more."""
+    """Error for a call that the page rejected or can no longer answer."""
 
 
 class PageServices:
-    """Services of one page. Methods raise `NepError` for invalid requests."""
+    """Services that one page calls and serves. Methods raise `NepError` for invalid requests."""
 
     def __init__(self, context: PageContext, respond: Respond | None = None) -> None:
-        """Initialize; `respond` sends the reply to a call in a protocol other than rosbridge."""
+        """Initialize the services.
+
+        Args:
+            context: Shared objects of the connection.
+            respond: Sends the result of a call in another protocol; None for rosbridge.
+        """
         self._context = context
         self._send_response = respond or self._respond
         self._loop = asyncio.get_running_loop()
@@ -51,7 +59,7 @@ class PageServices:
     # ---- calling
 
     def call(self, operation: CallService) -> None:
-        """Start a call to a service; the reply is sent later."""
+        """Start a call to a service without waiting; the reply is sent to the page later."""
         if len(self._calls) >= MAX_CALLS:
             raise OperationError(
                 _("this page already has {count} calls in flight, the maximum").format(count=MAX_CALLS),
@@ -116,9 +124,9 @@ class PageServices:
         self._context.send_status("info", said, operation.id)
 
     def _forward_call(self, service: str, request: object) -> Future[object]:
-        """Forward a request to the page and return the future of its reply.
+        """Forward a request to the page and return a future of its reply.
 
-        Called in a thread of the server.
+        Called in a thread of the service's server.
         """
         answer: Future[object] = Future()
         self._loop.call_soon_threadsafe(self._send_call, service, request, answer)
@@ -139,7 +147,7 @@ class PageServices:
         self._context.queue.put(frames)
 
     def respond(self, operation: ServiceResponse) -> None:
-        """Pass a reply of the page to the caller."""
+        """Forward a reply of the page to the caller."""
         service, answer = self._pending.get(operation.id, ("", None))
         if answer is None or service != operation.service:
             raise OperationError(
@@ -167,7 +175,10 @@ class PageServices:
         await self._context.run_in_thread(known.close)
 
     def cancel(self) -> None:
-        """Cancel all calls, because the page has disconnected. Its node closes servers and clients."""
+        """Cancel all calls after the page has disconnected.
+
+        The page's node closes servers and clients.
+        """
         for task in self._calls:
             task.cancel()
         self._fail_pending()

@@ -1,4 +1,4 @@
-"""Topics that one page publishes and subscribes to."""
+"""Topics that a page publishes and subscribes to."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from nep.text import quotable
 
 _GRAPH_TIMEOUT_S = 2.0
 _SETTLE_S = 0.5
-"""Maximum time in seconds to wait for the descriptions of robots before a page may publish."""
+"""Maximum time in seconds that opening a publisher waits for the descriptions of robots."""
 _RAW_IMAGE = "sensor_msgs/Image"
 _NS_PER_S = 1_000_000_000
 
@@ -50,7 +50,7 @@ class _Subscription:
 
 
 class PageTopics:
-    """Topics of one page. Methods raise `NepError` for invalid requests."""
+    """Topics that one page publishes and subscribes to. Methods raise `NepError` for invalid requests."""
 
     def __init__(self, context: PageContext) -> None:
         self._context = context
@@ -59,7 +59,7 @@ class PageTopics:
 
     @property
     def topics(self) -> tuple[PageTopic, ...]:
-        """Topics to which the page subscribes, followed by those that it publishes. Thread-safe."""
+        """Topics to which the page subscribes, followed by topics that it publishes. Thread-safe."""
         feeds = [each.feed for each in self._subscriptions.copy().values()]
         return (*map(subscribed_topic, feeds), *map(_published_topic, self._publications.copy().items()))
 
@@ -144,7 +144,10 @@ class PageTopics:
         return await self._open_publication(opened)
 
     async def unadvertise(self, operation: Unadvertise) -> None:
-        """Remove an advertisement of a topic; the publisher is closed with the last one."""
+        """Remove one advertisement of a topic, or all of them if there is no id.
+
+        The publisher is closed with the last advertisement.
+        """
         known = self._publications.get(operation.topic)
         if known is None:
             raise OperationError(
@@ -163,7 +166,7 @@ class PageTopics:
     # ---- subscribing
 
     async def subscribe(self, operation: Subscribe) -> None:
-        """Start to send the messages of a topic to the page."""
+        """Start sending the messages of a topic to the page."""
         as_pixels = bare_type(operation.ros_type) == _RAW_IMAGE
         known = self._subscriptions.get(operation.topic)
         if known is None:
@@ -224,21 +227,30 @@ class PageTopics:
         await self._context.run_in_thread(known.subscriber.close)
 
     def cancel(self) -> None:
-        """Stop reading, because the page has disconnected. Its node closes publishers and subscribers."""
+        """Stop reading messages after the page has disconnected.
+
+        The page's node closes publishers and subscribers.
+        """
         for each in self._subscriptions.values():
             each.reader.cancel()
             each.feed.clear()
 
 
 async def read_messages(subscriber: Subscriber, feed: Feed, queue: SendQueue) -> None:
-    """Append the messages of a subscriber to a page's queue until the task is cancelled."""
+    """Append the messages of a subscriber to a page's queue until the task is cancelled.
+
+    Args:
+        subscriber: Subscriber to read from.
+        feed: Feed of the topic in the queue.
+        queue: Send queue of the page.
+    """
     async for message in subscriber:
         queue.add(feed, message)
         del message  # may be in shared memory, which is released with the last reference
 
 
 def subscribed_topic(feed: Feed) -> PageTopic:
-    """Return the rate limit, rates and counts of a feed. Thread-safe."""
+    """Return a snapshot of a feed's rate limit, rates and counts. Thread-safe."""
     rate, bytes_per_s = feed.sent.rates()
     return PageTopic(
         feed.topic,
@@ -267,7 +279,7 @@ def _type_conflict(topic: str, ros_type: str, known: str, id_: OperationId) -> O
 
 
 def _with_header(msg: object, ros_type: str) -> object:
-    """Add the current time to the header of a message, if its type has a header and no stamp is given."""
+    """Add the current time to a message whose type has a header, unless the message has a stamp."""
     definition = definition_of(bare_type(ros_type))
     if definition is None or not definition.has_header or not isinstance(msg, Mapping):
         return msg

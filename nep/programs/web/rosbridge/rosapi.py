@@ -30,30 +30,33 @@ _NS_PER_S = 1_000_000_000
 
 
 def is_rosapi(service: str) -> bool:
-    """Return True if a service belongs to rosapi; roslib omits the first slash."""
+    """Return True if a service belongs to rosapi, with or without the leading slash (roslib omits it)."""
     return f"/{service.removeprefix('/')}".startswith(PREFIX)
 
 
 def is_visible(name: str) -> bool:
-    """Return True unless a topic or service is internal to NEP (below /nep/)."""
+    """Return False for topics and services that are internal to NEP (below /nep/)."""
     return not name.startswith(_HIDDEN_PREFIX)
 
 
 class RosApi:
-    """Handler of one call. Reads the graph at most once, when it is needed."""
+    """Handler of one call to rosapi. Queries the graph at most once, when it is needed.
+
+    Services return the fields of their reply, and raise `NepError` for invalid arguments.
+    """
 
     def __init__(self, node: Node, motion_refusal: Callable[[str, str], str]) -> None:
         """Initialize the handler.
 
         Args:
             node: Node of the page.
-            motion_refusal: Returns the reason why the page may not publish on a topic with a type.
+            motion_refusal: Returns the reason why the page may not publish (topic, message type), or "".
         """
         self._node = node
         self._motion_refusal = motion_refusal
 
     def reply(self, service: str, args: object) -> Mapping[str, object]:
-        """Return the reply of a rosapi service. Raises `NepError`."""
+        """Execute a service of rosapi and return the fields of its reply. Raises `NepError`."""
         name = f"/{service.removeprefix('/')}".removeprefix(PREFIX)
         known = _SERVICES.get(name)
         if known is None:
@@ -85,7 +88,7 @@ class RosApi:
     def topic_rates(self, _args: Mapping[str, object]) -> Mapping[str, object]:
         """Return all topics with types, messages per second and bytes per second.
 
-        This is NEP's extension of rosapi. A rate is None if it is not known yet.
+        This service is an extension of rosapi. A rate is None if it is not known yet.
         """
         known = [self._view.topics[each] for each in self._types]
         return {
@@ -104,7 +107,7 @@ class RosApi:
         return {"type": self._types.get(_text(args, "topic"), "")}
 
     def topics_and_raw_types(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return all topics with their types and the definitions of these types."""
+        """Return all topics with their types and the definitions of the types."""
         texts = [full_text(each) or full_text(JSON_TYPE) for each in self._types.values()]
         return {**self.topics(args), "typedefs_full_text": texts}
 
@@ -131,7 +134,7 @@ class RosApi:
     # ---- services
 
     def services(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return all services that have a server, and those of rosapi."""
+        """Return the names of all services that have a server, and of rosapi's own services."""
         return {"services": [*self._served_services, *(f"{PREFIX}{each}" for each in _SERVICES)]}
 
     @property
@@ -140,7 +143,7 @@ class RosApi:
         return [each.name for each in found if each.servers and is_visible(each.name)]
 
     def service_type(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the type of a service; "" if the service doesn't exist."""
+        """Return the type of a service; "" if the service has no server."""
         return {"type": self._service_type(_text(args, "service"))}
 
     def _service_type(self, service: str) -> str:
@@ -161,7 +164,7 @@ class RosApi:
         return {"providers": self._nodes_serving(_text(args, "service"))}
 
     def service_node(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the name of the first node that serves a service; "" if there is none."""
+        """Return the name of the first node that serves a service; "" if the service has no server."""
         return {"node": next(iter(self._nodes_serving(_text(args, "service"))), "")}
 
     def _nodes_serving(self, service: str) -> list[str]:
@@ -201,7 +204,7 @@ class RosApi:
     # ---- parameters
 
     def get_param_names(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the names of all parameters, for nodes that reply in time."""
+        """Return the names of all parameters. Nodes that don't reply within the time limit are omitted."""
         able = [
             each for each in self._view.nodes.values() if parameters_topic(each.id) in self._view.services
         ]
@@ -218,7 +221,7 @@ class RosApi:
         return {"names": names}
 
     def get_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return the value of a parameter as JSON text, or the default that the page passes."""
+        """Return the value of a parameter as JSON text, or the default given in the request."""
         default = args.get("default")
         try:
             node, name = _parameter(args)
@@ -230,7 +233,7 @@ class RosApi:
             raise
 
     def has_param(self, args: Mapping[str, object]) -> Mapping[str, object]:
-        """Return {"exists": True} if a parameter exists."""
+        """Return {"exists": True} if a parameter exists, else {"exists": False}."""
         try:
             self.get_param({"name": args.get("name")})
         except NepError:
@@ -255,7 +258,7 @@ class RosApi:
         return {}
 
     def delete_param(self, _args: Mapping[str, object]) -> Mapping[str, object]:
-        """Raise `NepError`: parameters are declared by their node and can't be deleted."""
+        """Raise `NepError`, because parameters are declared by their node and can't be deleted."""
         raise NepError(_("parameters are declared by their node and can't be deleted"))
 
     # ---- others

@@ -1,8 +1,8 @@
 """Responses to HTTP requests that are not WebSocket handshakes. Reads no files except the pages.
 
-Pages have no external files, and a Content-Security-Policy with the hashes of their scripts and styles. They
-are served only for a Host from which a page could also connect, because a host name of another site can
-resolve to this computer (DNS rebinding).
+Pages load no external files, and have a Content-Security-Policy with the hashes of their scripts and styles.
+Pages are served only for a Host header from which a page could also connect, because a host name of another
+site can resolve to this computer (DNS rebinding).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class PageRequest(NamedTuple):
         method: HTTP method.
         path: Path with query.
         hosts: Values of the Host headers.
-        own: Origin of the server's pages at the address of the connection.
+        own_origin: Origin of the server's pages at the address of the connection.
         authorization: Value of the Authorization header, if any.
     """
 
@@ -56,7 +56,14 @@ class PageRequest(NamedTuple):
 
 
 class PageResponse(NamedTuple):
-    """HTTP response; `is_token_refused` is True if the token was missing or wrong."""
+    """HTTP response.
+
+    Attributes:
+        status: Status code.
+        headers: Header fields.
+        body: Content.
+        is_token_refused: True if the token was missing or wrong.
+    """
 
     status: HTTPStatus
     headers: Mapping[str, str]
@@ -65,7 +72,12 @@ class PageResponse(NamedTuple):
 
 
 def respond(request: PageRequest, access: Access) -> PageResponse:
-    """Return the response to a request. Never raises because of the request's content."""
+    """Return the response to a request. Never raises because of the request's content.
+
+    Args:
+        request: HTTP request.
+        access: Rules that decide which pages may connect.
+    """
     path = request.path.partition("?")[0]
     if request.method not in _METHODS:
         return _text_response(
@@ -93,7 +105,7 @@ def respond(request: PageRequest, access: Access) -> PageResponse:
 
 
 def starter_page(url: str) -> str:
-    """Return the HTML of a template page, which connects to `url` and shows a topic.
+    """Return the HTML of a template page that connects to a server and shows a topic.
 
     Args:
         url: WebSocket URL of the server, with the token if one is required.
@@ -102,7 +114,7 @@ def starter_page(url: str) -> str:
 
 
 def _origin(request: PageRequest, access: Access) -> str | None:
-    """Return the origin that the page will have in the browser; None if the page could not connect."""
+    """Return the origin of the served page in the browser; None if that page may not connect."""
     if len(request.hosts) != 1:
         return None
     for scheme in ("http", "https"):
@@ -143,7 +155,10 @@ def _read_template(name: str) -> str:
 
 
 def _fill_template(name: str, words: Mapping[str, str]) -> str:
-    """Fill in the texts of a page. "data" is the JSON for the page's script; other texts are escaped."""
+    """Return a page with its placeholders replaced by texts.
+
+    The placeholder "data" is replaced by JSON for the page's script; other texts are escaped.
+    """
 
     def value(hole: re.Match[str]) -> str:
         if hole[1] == "data":
@@ -154,7 +169,7 @@ def _fill_template(name: str, words: Mapping[str, str]) -> str:
 
 
 def _script_json(value: object) -> str:
-    """Encode a value as JSON that is safe inside a script element."""
+    """Encode a value as JSON that can be embedded in a script element."""
     return json.dumps(value).replace("<", "\\u003c")
 
 

@@ -1,4 +1,4 @@
-"""Input controls of a form, one module per kind of parameter; `chooser` selects the control.
+"""Input controls for the parameters of an action, one module per kind of parameter.
 
-`base` has the interface that the form uses.
+`chooser` selects the control for a parameter; `base` contains the interface between form and control.
 """

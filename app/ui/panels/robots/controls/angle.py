@@ -1,4 +1,4 @@
-"""Dial to enter an angle of a robot."""
+"""Dial for entering an angle."""
 
 from __future__ import annotations
 
@@ -18,10 +18,20 @@ WHEEL_NOTCH = 120
 
 
 class AngleDial(QWidget):
-    """Dial for an angle: drag, wheel (with focus), arrow keys, Page, Home and End.
+    """Dial for entering an angle in degrees.
 
-    A double click sets the default. The dial shows the robot from above: up is forward, positive angles turn
-    left. If `upright`, it shows the robot from its left side: forward is left, positive angles point down.
+    The dial is operated by dragging, the wheel (with focus), the arrow keys, Page Up, Page Down, Home and
+    End. A double click sets the default.
+
+    Args:
+        minimum: Smallest angle in degrees.
+        maximum: Largest angle in degrees.
+        step: Step of the arrow keys in degrees.
+        value: Initial angle in degrees.
+        default: Angle after a double click; by default the initial angle.
+        name: Accessible name.
+        upright: False to show the robot from above: up is forward, and positive angles turn left. True to
+            show the robot from its left side: left is forward, and positive angles point down.
     """
 
     changed = Signal(float)
@@ -56,7 +66,7 @@ class AngleDial(QWidget):
         return self._value
 
     def set_value(self, value: float) -> None:
-        """Show an angle without emitting `changed`."""
+        """Set the angle in degrees without emitting `changed`."""
         self._value = value
         self.setAccessibleDescription(f"{number(value)}°")
         self.update()
@@ -66,7 +76,7 @@ class AngleDial(QWidget):
         return QSize(side, side)
 
     def direction(self, angle_deg: float) -> QPointF:
-        """Return the unit vector of an angle in screen coordinates."""
+        """Return the direction of an angle as a unit vector in screen coordinates."""
         turned = math.radians(angle_deg)
         if self._upright:
             return QPointF(-math.cos(turned), math.sin(turned))

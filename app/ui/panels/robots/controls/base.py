@@ -1,4 +1,4 @@
-"""Interface between a form and the input control of a parameter, with helpers for controls."""
+"""Interface between a form and the input control of a parameter, and helpers for controls."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Callback = Callable[[], None]
 
 
 class Control:
-    """Input control of one parameter, composed of functions.
+    """Input control of one parameter, composed of a widget and functions.
 
     Args:
         widget: Widget of the control.
-        value: Returns the value.
-        show: Shows a value.
-        changed: Connects a callback to every change.
+        value: Returns the current value.
+        show: Shows a value in the widget.
+        changed: Connects a callback to every change of the value.
         finished: Connects a callback to the end of editing.
-        sentence: Returns the error message that the control shows itself, "" if the value is valid.
-        close: Releases resources.
+        sentence: Returns the error message that the control shows itself, or "".
+        close: Releases resources, such as an image stream.
     """
 
     def __init__(
@@ -46,7 +46,11 @@ class Control:
         self._finished, self._sentence, self._close = finished, sentence, close
 
     def value(self) -> object:
-        """Return the value, the typed text if it is invalid, or None to omit the parameter."""
+        """Return the value for the action.
+
+        Returns:
+            The value, the typed text if it is invalid, or None to omit the parameter.
+        """
         return self._value()
 
     def show_value(self, value: object) -> None:
@@ -54,13 +58,17 @@ class Control:
         self._show(value)
 
     def finished(self, tell: Callback) -> None:
-        """Call `tell` whenever the user finishes editing."""
+        """Connect a callback to the end of editing.
+
+        Args:
+            tell: Called whenever the user finishes editing.
+        """
         if self._finished is not None:
             self._finished(tell)
 
     @property
     def error_text(self) -> str:
-        """Error message shown by the control itself, "" if the value is valid."""
+        """Error message that the control shows itself; "" if there is none."""
         return "" if self._sentence is None else self._sentence()
 
     def close(self) -> None:
@@ -70,14 +78,14 @@ class Control:
 
 
 def connect(signal: object, tell: Callback) -> None:
-    """Connect a callback to a signal and ignore the signal's arguments."""
+    """Connect a callback without arguments to a signal with any arguments."""
     signal.connect(lambda *_values: tell())  # type: ignore[attr-defined]  # any Qt signal
 
 
 def line_field(theme: Theme, parameter: Parameter) -> QLineEdit:
-    """Return a line edit with a context menu and an accessible name.
+    """Create the line edit for a parameter, with a context menu and an accessible name.
 
-    The line edit accepts any text; invalid input is kept and explained after validation.
+    The line edit accepts any text, because validation explains errors afterwards.
     """
     field = QLineEdit()
     EditMenu(theme, field)

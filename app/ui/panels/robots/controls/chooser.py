@@ -27,10 +27,13 @@ MAX_SEGMENT_CHARS = 44
 def control_for(
     theme: Theme, parameter: Parameter, options: Sequence[str] = (), pictures: ImageSource | None = None
 ) -> Control:
-    """Return the input control for a parameter.
+    """Create the input control for a parameter.
 
     Args:
+        theme: Theme of the window.
+        parameter: Parameter of an action.
         options: Values that the robot currently offers for the parameter.
+        pictures: Source of images for image parameters.
     """
     if parameter.choices or options:
         return _choice(theme, parameter, options)

@@ -109,7 +109,7 @@ class ColourSwatches(QWidget):
 
 
 class HueStrip(QWidget):
-    """Strip of hues whose lightness decreases downwards. Press, drag or use arrow keys to select."""
+    """Strip of all hues, which get darker towards the bottom. A colour is selected by mouse or arrow keys."""
 
     changed = Signal(str)
 
@@ -128,7 +128,7 @@ class HueStrip(QWidget):
         return STRIP_SIZE
 
     def show_colour(self, colour: QColor) -> None:
-        """Move the marker to the colour of the strip that is nearest to `colour`."""
+        """Move the marker to the colour of the strip that is most similar to `colour`."""
         if colour.hslHueF() >= 0:
             self._hue = colour.hslHueF()
         self._light = min(MAX_LIGHTNESS, max(MIN_LIGHTNESS, colour.lightnessF()))
@@ -192,7 +192,10 @@ class HueStrip(QWidget):
 
 
 class ColourChoice(QWidget):
-    """Swatches, and "Other" for the hue strip and a field for a hex code. Invalid text stays in the field."""
+    """Control with named swatches and, under "Other", a hue strip and a field for a hex code.
+
+    Invalid text stays in the field.
+    """
 
     changed = Signal()
     finished = Signal()
@@ -289,7 +292,7 @@ class ColourChoice(QWidget):
 
 
 def colour_control(theme: Theme, parameter: Parameter) -> Control:
-    """Return the input control for a colour parameter."""
+    """Create the input control for a colour parameter."""
     choice = ColourChoice(theme, parameter)
     return Control(
         choice,

@@ -1,4 +1,4 @@
-"""Input controls for numbers: slider and field for a limited range, else a field; a dial for angles."""
+"""Input controls for numbers: a slider with a field, only a field, or a dial for angles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAGE_STEPS = 10
 
 
 def number_control(theme: Theme, parameter: Parameter) -> Control:
-    """Return the input control for a number, integer or angle."""
+    """Create the input control for a number, integer or angle."""
     low, high = parameter.minimum, parameter.maximum
     if low is None or high is None or high <= low:
         return _open_number(theme, parameter)
@@ -70,7 +70,7 @@ def _value_of(slider: SliderWithUnit, parameter: Parameter) -> object:
 
 
 def step_of(parameter: Parameter) -> float:
-    """Return the step from the parameter's description, or one that suits its range."""
+    """Return the step of a parameter: from its description, or derived from its range."""
     if parameter.step is not None and parameter.step > 0:
         return parameter.step
     span = (parameter.maximum or 0.0) - (parameter.minimum or 0.0)
@@ -80,7 +80,15 @@ def step_of(parameter: Parameter) -> float:
 
 
 def typed_value(typed: str, *, whole: bool) -> object:
-    """Parse a typed number. Return None for empty text, and the text itself if it is invalid."""
+    """Parse a typed number.
+
+    Args:
+        typed: Text of the field.
+        whole: True to return whole numbers as int.
+
+    Returns:
+        The number; None for empty text, and the text itself if it is not a number.
+    """
     if not typed.strip():
         return None
     try:
@@ -122,7 +130,10 @@ def _dial_row(dial: AngleDial, slider: SliderWithUnit, name: str) -> QWidget:
 
 
 class OpenNumber(NumberEdit):
-    """Field for a number without limits: arrow keys step by one, Page keys by ten. May be empty."""
+    """Number field for a parameter without a range; it may be empty.
+
+    Arrow keys change the number by one step, Page Up and Page Down by ten steps.
+    """
 
     def __init__(self, theme: Theme, parameter: Parameter) -> None:
         self._parameter = parameter

@@ -1,6 +1,6 @@
 """Input control for an image: a file, the newest image of a topic, or an address, with a thumbnail.
 
-Typed addresses are sent unchanged; images are sent as encoded by `picture_file.encoded`.
+Typed addresses are sent unchanged; images are sent in the format of `picture_file.encoded`.
 """
 
 from __future__ import annotations
@@ -41,17 +41,22 @@ class ImageSource(Protocol):
         """Return the names of available image topics."""
 
     def stream(self, topic: str) -> ImageStream:
-        """Subscribe to a topic's images until the stream is closed."""
+        """Subscribe to the images of a topic; the caller closes the stream."""
 
     def prompt_file(self, folder: str, take: Callable[[Path], None]) -> None:
-        """Show the dialog to choose an image file; an empty `folder` stands for the user's pictures."""
+        """Show the dialog for choosing an image file.
+
+        Args:
+            folder: Initial folder; "" for the user's pictures.
+            take: Receives the path of the file.
+        """
 
 
 class EmptyImageSource:
-    """Null implementation of `Pictures`, without topics and files."""
+    """Null implementation of `ImageSource`, without topics and files."""
 
     def topics(self) -> Sequence[str]:
-        """Return no topics."""
+        """Return an empty sequence."""
         return ()
 
     def stream(self, topic: str) -> ImageStream:
@@ -108,7 +113,10 @@ class Thumbnail(QWidget):
 
 
 class PictureChoice(QWidget):
-    """Thumbnail, file name or address, and buttons for file and camera. Accepts dropped files."""
+    """Control with a thumbnail, a field for the file name or address, and buttons for file and camera.
+
+    Files can also be dropped onto the control.
+    """
 
     changed = Signal()
 
@@ -154,7 +162,7 @@ class PictureChoice(QWidget):
     # -- value --------------------------------------------------------------------------------------------
 
     def value(self) -> str | None:
-        """Return the encoded image or the typed address; None without an image."""
+        """Return the encoded image or the typed address; None if there is neither."""
         if self._stream is not None:
             self._poll_stream()
             if self._stream.is_awaiting_picture:
@@ -164,7 +172,7 @@ class PictureChoice(QWidget):
         return None if self._stream is not None else self.field.text().strip() or None
 
     def set_value(self, value: object) -> None:
-        """Show an address or a file."""
+        """Show a value: an encoded image (``data:`` URL), an address, or None for no image."""
         self.close_stream()
         self._clear_image()
         text = "" if value is None else str(value)
@@ -188,7 +196,7 @@ class PictureChoice(QWidget):
             self.use_file(path)
 
     def use_file(self, path: Path) -> None:
-        """Load an image file; on failure show the reason."""
+        """Load an image file, or show the reason if that fails."""
         self.close_stream()
         self._file = path
         self._image, said = read_picture(path)
@@ -234,7 +242,7 @@ class PictureChoice(QWidget):
         open_below(menu, self.camera)
 
     def use_topic(self, topic: str) -> None:
-        """Show the images of a topic. The newest one is sent with the action."""
+        """Show the images of a topic. The action receives the image that is the newest when it starts."""
         self.close_stream()
         self._clear_image()
         self._stream = self._pictures.stream(topic)
@@ -284,7 +292,7 @@ def _image_from_url(address: str) -> QImage | None:
 
 
 def picture_control(theme: Theme, parameter: Parameter, pictures: ImageSource) -> Control:
-    """Return the input control for an image parameter."""
+    """Create the input control for an image parameter."""
     choice = PictureChoice(theme, parameter, pictures)
     show: Callable[[object], None] = choice.set_value
     show(parameter.default)

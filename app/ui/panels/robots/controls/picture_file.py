@@ -1,9 +1,10 @@
 """Loading and encoding of image files for robots.
 
-`nep.messages.image_files` decides by the content which files Qt may decode (JPEG and PNG).
+`nep.messages.image_files` checks the content of a file before Qt decodes it; JPEG and PNG are
+supported.
 
-Images are sent as in NEP's JSON messages: ``data:image/jpeg;base64,…``, or plain base64 if the description
-requires it (``contentEncoding`` without ``format``).
+Images are sent as in NEP's JSON messages: ``data:image/jpeg;base64,…``, or plain base64 if the
+description of the action requires it (``contentEncoding`` without ``format``).
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ MAX_FILE_BYTES = 40_000_000
 
 
 def read_picture(path: Path) -> tuple[QImage | None, str]:
-    """Load an image file with its EXIF orientation.
+    """Load an image file and apply its EXIF orientation.
 
-    Return the image, or None and a sentence with the reason.
+    Returns:
+        The image and ""; or None and the reason why the file can't be loaded.
     """
     try:
         if not path.is_file() and path.exists():
@@ -45,7 +47,7 @@ def read_picture(path: Path) -> tuple[QImage | None, str]:
 
 
 def image_of(data: bytes) -> QImage:
-    """Decode an image within the allocation limit and apply its orientation.
+    """Decode an image, limited in size, and apply its EXIF orientation.
 
     Raises:
         DecodeError: The data is not a supported image.
@@ -65,7 +67,7 @@ def image_of(data: bytes) -> QImage:
 
 
 def apply_orientation(image: QImage, file: ImageFile) -> QImage:
-    """Rotate an image by its EXIF orientation, which Qt reads from JPEG files only."""
+    """Rotate an image by its EXIF orientation. Qt itself would do so for JPEG files only."""
     if file.orientation >= 5:
         image = image.transformed(QTransform(0, 1, 1, 0, 0, 0))
     if file.orientation in (2, 3, 6, 7):
@@ -74,9 +76,11 @@ def apply_orientation(image: QImage, file: ImageFile) -> QImage:
 
 
 def encode_image(image: QImage, *, bare: bool = False) -> str:
-    """Return an image as base64 JPEG, scaled to at most 1280 px on its longer side.
+    """Encode an image as JPEG in base64, scaled to at most 1280 px on its longer side.
 
-    If `bare` is True, the ``data:`` prefix is left out.
+    Args:
+        image: Image to encode.
+        bare: True to omit the ``data:`` prefix.
     """
     if max(image.width(), image.height()) > MAX_SIDE_PX:
         keep, smooth = Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation

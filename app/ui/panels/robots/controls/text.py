@@ -1,4 +1,4 @@
-"""Input controls for texts and lists."""
+"""Input controls for texts, lists and objects."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from app.ui.widgets.inputs.fields import LongText
 from nep.i18n import _
 
 MULTILINE_LENGTH = 200
-"""Maximum length above which the field for a text has several lines."""
+"""Maximum length of a parameter from which its field has several lines."""
 
 
 def text_control(theme: Theme, parameter: Parameter) -> Control:
-    """Return a field with one or several lines; the items of a list are separated by commas.
+    """Create the input control for a text, list or object.
 
-    Objects, and lists of lists or objects, are typed as JSON.
+    The items of a list are separated by commas. Objects, and lists of lists or objects, are typed as JSON.
     """
     if parameter.kind in ("list", "object"):
         return _list(theme, parameter)

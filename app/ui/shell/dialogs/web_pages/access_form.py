@@ -1,4 +1,4 @@
-"""Form for access to the web server: address, token, network on which it is reachable, and QR code."""
+"""Form for access to the web server: address, token, network interface and QR code."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _VISIBLE_CHARS = 4
 
 
 class AddressChoice(QWidget):
-    """Choice of the address on which the server is reachable.
+    """Input for the address at which the server can be reached.
 
-    Emits `chosen` with one of this computer's addresses, or "" for this computer only.
+    `selected` is emitted with an address of this computer, or with "" for this computer only.
     """
 
     selected = Signal(str)
@@ -39,7 +39,12 @@ class AddressChoice(QWidget):
         self._hosts: tuple[str, ...] = ()
 
     def set_addresses(self, addresses: Sequence[OwnAddress], value: str) -> None:
-        """Set the available addresses, with ``value`` selected."""
+        """Set the available addresses and select one of them.
+
+        Args:
+            addresses: Addresses of this computer.
+            value: Address to select, or "" for this computer only.
+        """
         if value and value not in {own.host for own in addresses}:  # the computer no longer has this address
             addresses = (*addresses, OwnAddress(value, ""))
         options: list[tuple[str, str, str | None]] = [("", _("This computer"), None)]
@@ -68,18 +73,18 @@ class AddressChoice(QWidget):
         return "" if self._choice is None else self._choice.value
 
     def set_value(self, value: str) -> None:
-        """Select an address without emitting `chosen`."""
+        """Select an address without emitting `selected`."""
         if self._choice is not None:
             self._choice.set_value(value)
 
     @property
     def input_widget(self) -> QWidget | None:
-        """Widget of the choice that gets the focus."""
+        """Input widget, which can get the focus, or None before the first `set_addresses`."""
         return self._choice
 
 
 class AccessForm(QWidget):
-    """First part of the form. Signals request changes; `show_state` shows the current state."""
+    """First part of the form. Signals request changes of the settings; `show_state` shows the result."""
 
     copy_address = Signal()
     copy_token = Signal()
@@ -144,7 +149,11 @@ class AccessForm(QWidget):
         self.qr_words.setFixedWidth(round(self._theme.scaled(SIDE)))
 
     def show_state(self, *, is_foxglove: bool) -> None:
-        """Show the server's address, its token, and the computers that can reach it."""
+        """Update the address of the server, its token, and the description of who can reach it.
+
+        Args:
+            is_foxglove: True to show the server for Foxglove, False to show the one for rosbridge.
+        """
         web = self._web
         self.address.show_text(web.url)
         self._show_token()

@@ -15,7 +15,10 @@ _PADDING, _BUTTON = 10, 26
 
 
 class _ReadOnlyLine(QLineEdit):
-    """Read-only line edit. If nothing is selected, Ctrl+C copies the full text, even if parts are masked."""
+    """Read-only line edit that emits `copy_requested` on Ctrl+C if nothing is selected.
+
+    The owner then copies the full text, even if the displayed text is masked.
+    """
 
     copy_requested = Signal()
     focus_changed = Signal()
@@ -37,7 +40,7 @@ class _ReadOnlyLine(QLineEdit):
 
 
 class CopyField(QWidget):
-    """Field with a text to copy; emits `copy_wanted` for its button and Ctrl+C."""
+    """Read-only field with a copy button; the button and Ctrl+C emit `copy_requested`."""
 
     copy_requested = Signal()
 
@@ -66,11 +69,16 @@ class CopyField(QWidget):
         self._set_font()
 
     def text(self) -> str:
-        """Return the visible text."""
+        """Return the displayed text."""
         return self.line.text()
 
     def show_text(self, text: str, *, can_copy: bool = True) -> None:
-        """Set the text and scroll to its start."""
+        """Set the displayed text and scroll to its start.
+
+        Args:
+            text: Text, which may be masked.
+            can_copy: True to enable the copy button.
+        """
         if text != self.line.text():
             self.line.setText(text)
             self.line.setCursorPosition(0)

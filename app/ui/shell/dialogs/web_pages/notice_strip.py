@@ -1,4 +1,4 @@
-"""Strip with the latest rejected request or slow page, with buttons to fix and to dismiss it."""
+"""Strip about the latest rejected request or slow page, with buttons to fix and to dismiss it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ _BUTTONS = {
 
 
 class NoticeStrip(AlertBox):
-    """Strip with one notice; emits `helped` for its button and `dismissed` for its close button."""
+    """Strip that shows one notice.
+
+    `fix_requested` is emitted when the user presses the button that fixes the problem, and `dismissed`
+    on close.
+    """
 
     fix_requested = Signal()
     dismissed = Signal()
@@ -42,7 +46,7 @@ class NoticeStrip(AlertBox):
         self.hide()
 
     def show_notices(self, notices: tuple[WebNotice, ...]) -> None:
-        """Show the first notice and the number of further ones."""
+        """Show the first notice and the number of the others, or hide the strip if there are none."""
         paint.show_when(self, bool(notices))
         if not notices:
             self.notice = None

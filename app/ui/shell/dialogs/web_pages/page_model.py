@@ -1,4 +1,4 @@
-"""Qt model of connected pages and their topics, which is updated in place."""
+"""Qt model of the connected pages and their topics, updated in place."""
 
 from __future__ import annotations
 
@@ -24,7 +24,13 @@ _TopicKey = tuple[str, bool]
 
 @dataclass(slots=True)
 class PageRow:
-    """Row of a page; ``place`` is its row number."""
+    """Row of a page in the model.
+
+    Attributes:
+        listed: Page.
+        number: Row number.
+        topics: Topics of the page, in the order of the child rows.
+    """
 
     listed: ListedPage
     topics: list[PageTopic] = field(default_factory=list)
@@ -37,9 +43,10 @@ class PageRow:
 
 
 class PageTreeModel(QAbstractItemModel):
-    """Tree model of pages with their topics as children. Indexes stay valid while other rows come and go.
+    """Tree model of pages, with their topics as children.
 
-    There is a single column: with several, Qt would query the size of each cell of thousands of topics.
+    Indexes of pages stay valid while other rows are added or removed. There is a single column, because
+    with several Qt would query the size of each cell of thousands of topics.
     """
 
     def __init__(self, parent: QObject | None = None) -> None:
@@ -84,7 +91,11 @@ class PageTreeModel(QAbstractItemModel):
         return _("Page and topics") if is_title and section == 0 else None
 
     def page_row(self, index: Index) -> PageRow | None:
-        """Return the row of a page, or of the page to which a topic belongs."""
+        """Return the row of the page at an index, or of the page to which the topic at the index belongs.
+
+        Returns:
+            None if the index is invalid.
+        """
         if not index.isValid():
             return None
         page_id = index.internalId() - 1
@@ -93,12 +104,12 @@ class PageTreeModel(QAbstractItemModel):
         return self._rows[index.row()] if index.row() < len(self._rows) else None
 
     def topic(self, index: Index) -> PageTopic | None:
-        """Return the topic of an index, or None if it is a page."""
+        """Return the topic at an index, or None if the index is that of a page or invalid."""
         row = self._by_id.get(index.internalId() - 1) if index.isValid() else None
         return row.topics[index.row()] if row is not None and index.row() < len(row.topics) else None
 
     def show_pages(self, listed: Sequence[ListedPage]) -> None:
-        """Update the model to a list of pages, sorted by id."""
+        """Update the rows to a list of pages that is sorted by id."""
         wanted = {each.page.id: each for each in listed}
         for place in reversed(range(len(self._rows))):
             if self._rows[place].id not in wanted:
@@ -171,6 +182,6 @@ def _key(topic: PageTopic) -> _TopicKey:
 
 
 def sorted_topics(listed: ListedPage) -> ListedPage:
-    """Return the page with its topics sorted by name, subscriptions first."""
+    """Return a copy of a page with sorted topics: first subscribed, then published ones, each by name."""
     topics = tuple(sorted(listed.page.topics, key=lambda each: (each.is_published, each.topic)))
     return dataclasses.replace(listed, page=dataclasses.replace(listed.page, topics=topics))

@@ -1,4 +1,4 @@
-"""Tree view of connected pages, with a row per page and a disconnect button, and a row per topic."""
+"""Tree view of connected pages: a row with a disconnect button for each page, and a row for each topic."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ _GONE_ROLE = "textDisabled"
 
 
 class _PageHeader(QHeaderView):
-    """Header with titles for the columns that `PageTree` positions."""
+    """Header with the titles of the columns that `PageTree` paints itself."""
 
     def __init__(self, theme: Theme, tree: PageTree) -> None:
         super().__init__(Qt.Orientation.Horizontal, tree)
@@ -92,7 +92,7 @@ class _PageHeader(QHeaderView):
 
 
 def column_titles() -> dict[PageColumn, str]:
-    """Return the titles of the columns at the right."""
+    """Return the translated titles of the columns on the right, by column."""
     return {"rate": _("Rate /s"), "bandwidth": _("Bandwidth"), "dropped": _("Dropped")}
 
 
@@ -111,7 +111,10 @@ class _RowHeights(QStyledItemDelegate):
 
 
 class PageTree(QTreeView):
-    """Tree of pages; emits `disconnect_wanted` with the id of a page, and `copied` with the copied text."""
+    """Tree view of connected pages and their topics.
+
+    `disconnect_requested` is emitted with the id of a page, and `copied` with the text to copy.
+    """
 
     disconnect_requested = Signal(int)
     copied = Signal(str)
@@ -144,18 +147,18 @@ class PageTree(QTreeView):
         theme.changed.connect(self._measure)
 
     def current_page(self) -> ListedPage | None:
-        """Return the page of the current row, or of the current topic."""
+        """Return the page of the current row, which can be one of its topics; None if no row is current."""
         row = self._pages.page_row(self.currentIndex())
         return None if row is None else row.listed
 
     def disconnect_current(self) -> None:
-        """Emit `disconnect_wanted` for the page of the current row."""
+        """Emit `disconnect_requested` for the current page if it is connected."""
         listed = self.current_page()
         if listed is not None and listed.gone_s is None:
             self.disconnect_requested.emit(listed.page.id)
 
     def copy_current(self) -> None:
-        """Copy the name of the current topic or the address of the current page."""
+        """Emit `copied` with the name of the current topic or the origin of the current page."""
         topic, listed = self._pages.topic(self.currentIndex()), self.current_page()
         if topic is not None:
             self.copied.emit(topic.topic)
@@ -306,7 +309,7 @@ class PageTree(QTreeView):
         return left + side + _GAP
 
     def cell(self, column: PageColumn, rect: QRectF) -> QRectF:
-        """Return the content rectangle of a column in a row."""
+        """Return the rectangle of a column within the rectangle of a row."""
         right = float(self.viewport().width())
         for name in reversed(_WIDTHS):
             if name == column:

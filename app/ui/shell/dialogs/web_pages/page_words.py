@@ -1,4 +1,4 @@
-"""Texts of the table of connected pages."""
+"""Formatting of the table of connected pages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def since_text(listed: ListedPage) -> str:
-    """Format the state of a page, such as "since 8:32" or "gone 4 s"."""
+    """Format since when a page is connected or disconnected, such as "since 8:32" or "gone 4 s"."""
     if listed.gone_s is not None:
         return _("gone for {seconds} s").format(seconds=int(listed.gone_s))
     then = dt.datetime.fromtimestamp(listed.page.since_s).astimezone()
@@ -24,30 +24,30 @@ def since_text(listed: ListedPage) -> str:
 
 
 def direction_text(topic: PageTopic) -> str:
-    """Return "publishes" or "reads", translated, for a topic of a page."""
+    """Return the translated verb "publishes" or "reads" for a topic of a page."""
     return _("publishes") if topic.is_published else _("reads")
 
 
 def limit_text(topic: PageTopic) -> str:
-    """Format the rate limit of a topic, such as "at most 15/s"; "" without a limit."""
+    """Format the rate limit of a topic, such as "at most 15/s"; "" if there is none."""
     limit = topic.max_rate_hz
     return _("at most {rate}/s").format(rate=number(limit, ".3g")) if limit else ""
 
 
 def dropped_text(topic: PageTopic) -> str:
-    """Format the share of dropped messages, such as "0" or "0.3 %"."""
+    """Format the share of dropped messages of a topic, such as "0" or "0.3 %"."""
     if topic.dropped_count <= 0:
         return "0"
     return share_text(dropped_share(topic.sent_count, topic.dropped_count))
 
 
 def page_description(listed: ListedPage) -> str:
-    """Return the text that screen readers read for a page."""
+    """Return the description of a page for screen readers."""
     return ", ".join((page_name(listed.page), location_text(listed.page), since_text(listed)))
 
 
 def topic_description(topic: PageTopic) -> str:
-    """Return the text that screen readers read for a topic of a page."""
+    """Return the description of a page's topic for screen readers."""
     rate = rate_text(topic.rate_hz)
     words = (
         f"{direction_text(topic)} {topic.topic}",

@@ -1,4 +1,4 @@
-"""QR code that opens the test page on a tablet, black on white in both themes."""
+"""QR code of the test page for tablets, black on white in all themes."""
 
 from __future__ import annotations
 
@@ -21,17 +21,20 @@ else:  # imported with the first code
 
 SIDE = 140
 QUIET_ZONE = 4
-"""Width of the quiet zone in modules on each side, as required by ISO/IEC 18004."""
+"""Width of the quiet zone on each side in modules, as required by ISO/IEC 18004."""
 _PADDING = 12
 
 
 def modules_of(text: str) -> tuple[bytes, ...]:
-    """Return the rows of modules of a text's QR code, 1 for dark, without the quiet zone."""
+    """Encode a text as a QR code and return the rows of its modules.
+
+    Each byte is a module, 1 for dark and 0 for light. The quiet zone isn't included.
+    """
     return tuple(bytes(row) for row in segno.make_qr(text, error="m").matrix)
 
 
 class QrCode(QWidget):
-    """QR code of a text, or a message in an empty frame."""
+    """Widget that shows the QR code of a text, or a message in an empty frame."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -43,11 +46,16 @@ class QrCode(QWidget):
 
     @property
     def text(self) -> str:
-        """Encoded text, or ""."""
+        """Encoded text, or "" while a message is shown."""
         return self._text
 
     def show_code(self, text: str, address: str) -> None:
-        """Show the code of a text. Screen readers read only ``address``."""
+        """Show the QR code of a text.
+
+        Args:
+            text: Text to encode, which may contain the token.
+            address: Part of the text for screen readers.
+        """
         if text == self._text:
             return
         try:
@@ -62,7 +70,7 @@ class QrCode(QWidget):
         self.update()
 
     def show_message(self, words: str) -> None:
-        """Show a message with the reason why there is no code."""
+        """Show a message that explains why there is no code."""
         if words != self._words:
             self._text, self._modules, self._words = "", (), words
             self.setAccessibleName(words)

@@ -46,9 +46,9 @@ _MIN_TABLE_HEIGHT = 120
 
 
 class WebPagesSheet(Overlay):
-    """Sheet without a scrim, which stays open while the user works in the window.
+    """Sheet of the web server. It has no scrim and stays open while the user works in the window.
 
-    Changes are applied at once.
+    Changes are applied immediately.
     """
 
     top = _BELOW_BARS
@@ -236,7 +236,7 @@ class WebPagesSheet(Overlay):
         return  # the sheet stays open while the user works in the window
 
     def open(self) -> None:
-        """Open the sheet; it is updated until it is closed."""
+        """Open the sheet and update it until it is closed."""
         self.access.open_to.set_addresses(self._web.addresses(), self._web.host)
         if self._tab not in self._web.protocols and self._web.protocols:
             self.tabs.set_value(next(iter(self._web.protocols)))
@@ -250,7 +250,7 @@ class WebPagesSheet(Overlay):
         return "foxglove" if self.tabs.value == "foxglove" else "rosbridge"
 
     def refresh(self) -> None:
-        """Show the state of the server and its pages."""
+        """Update the sheet to the state of the server and the connected pages."""
         web, is_foxglove = self._web, self._tab == "foxglove"
         web.refresh()
         self._show_switch()

@@ -1,4 +1,4 @@
-"""Form for the allowed origins, and for the robots that pages may move."""
+"""Form for the allowed origins of pages, and for the robots that pages may move."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EXAMPLE = "http://192.168.1.20:8080"
 
 
 class OriginField(TokenField):
-    """Field for allowed origins as tokens. Invalid text is kept and shown as an error."""
+    """Token field for allowed origins. Invalid text stays in the field and is shown as an error."""
 
     def __init__(self, theme: Theme, web: WebPages) -> None:
         super().__init__(theme, _("Origins"), EXAMPLE, _("Add an origin"))
@@ -32,7 +32,7 @@ class OriginField(TokenField):
         self.is_wrong = False
 
     def show_origins(self, origins: Sequence[str]) -> None:
-        """Set the tokens. Text that is being typed is kept."""
+        """Set the tokens to the given origins. Text that is being typed is preserved."""
         if [each.entry for each in self.tokens] == [*origins]:
             return
         for token in self.tokens:
@@ -83,7 +83,7 @@ class _Box(QWidget):
 
 
 class RobotChoice(QWidget):
-    """Check boxes of the robots that pages may move; emits `changed` when the user changes them."""
+    """Check boxes for the robots that pages may move; `changed` is emitted when the user toggles one."""
 
     changed = Signal()
 
@@ -118,12 +118,12 @@ class RobotChoice(QWidget):
         self.show_state()
 
     def open_list(self) -> None:
-        """Show the check boxes and focus the first one."""
+        """Show the check boxes and set the focus to the first one."""
         self.choose.setChecked(True)
         self._open(True)
 
     def show_state(self) -> None:
-        """Show the allowed robots, and check boxes for connected and allowed ones."""
+        """Update the names of the allowed robots, and the check boxes of all connected or allowed robots."""
         names = self._web.robots
         said = format_list(list(names)) if names else _("none")
         words = _("May command robots: {robots}").format(robots=said)
@@ -202,7 +202,7 @@ class PermissionForm(QWidget):
             title.setMinimumHeight(round(self._theme.scaled(_FIELD_HEIGHT)))
 
     def show_state(self) -> None:
-        """Show the current permissions."""
+        """Update the fields and explanations to the current permissions."""
         self.origins.show_origins(self._web.origins)
         set_role(self.origins_state, "error" if self.origins.is_wrong else "textTertiary")
         self.origins_state.setText(
