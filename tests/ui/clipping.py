@@ -83,6 +83,9 @@ def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
         wanted = widget.sizeHint()
         if widget.width() < wanted.width() - SLACK and not _tip(widget):
             yield f"{said} is {widget.width()} wide and needs {wanted.width()}"
+        least = widget.minimumSizeHint().width()
+        if widget.width() < least - SLACK:
+            yield f"{said} is {widget.width()} wide and can be shortened only to {least}"
         if widget.height() < wanted.height() - SLACK:
             yield f"{said} is {widget.height()} high and needs {wanted.height()}"
     elif isinstance(widget, QLineEdit | QComboBox):

@@ -177,20 +177,32 @@ class DeveloperTools(QObject):
     def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.Resize:
             self._fit()
+        elif event.type() == QEvent.Type.LayoutRequest:
+            self._hide_crowded()
         return False
 
     def _fit(self) -> None:
         # Hides tools in this order if there is little room: Keep, source, layouts, Freeze, Record. All of
         # them are also in menus.
         width, scaled, recording = self._bar.width(), self._shell.theme.scaled, self.source.is_recording
+        paint.show_when(self.keep, width >= scaled(KEEP_ROOM_PX) and not recording)
         paint.show_when(self.source, recording or width >= scaled(SOURCE_ROOM_PX))
         paint.show_when(self.source.back, recording)
         for tool in self._wide_only:
             paint.show_when(tool, width >= scaled(RECORDING_ROOM_PX if recording else ROOM_PX))
-        paint.show_when(self.keep, width >= scaled(KEEP_ROOM_PX) and not recording)
         self.record.set_icon_only(width < scaled(RECORD_TEXT_ROOM_PX))
         paint.show_when(self.freeze, width >= scaled(FREEZE_ROOM_PX))
         paint.show_when(self.record, width >= scaled(RECORD_ROOM_PX))
+        self._hide_crowded()
+
+    def _hide_crowded(self) -> None:
+        # Hides further tools if the run state, or the texts of the language, need more room. They stay hidden
+        # until the bar is resized, so that the other tools don't move with every change of the run state.
+        source = () if self.source.is_recording else (self.source,)
+        for tool in (self.keep, *source, *self._wide_only, self.freeze, self.record):
+            if self._bar.needed_width() <= self._bar.width():
+                break
+            tool.hide()
 
     def on_half_tick(self) -> None:
         """Refresh the tools at regular intervals while the bar is visible; called on every half tick."""

@@ -464,7 +464,7 @@ class ToolBar(Bar):
     def _build(self) -> None:
         row = QHBoxLayout(self)
         row.setContentsMargins(10, 0, 6, 1)
-        row.setSpacing(8)
+        row.setSpacing(GAP)
         self.tools.setSpacing(6)
         row.addLayout(self.tools)
         row.addStretch(1)
@@ -480,19 +480,33 @@ class ToolBar(Bar):
     def banner_area(self) -> QRect:
         """Return the area for an alert, between the tools and the run state.
 
-        In a narrow bar, the area includes the run state.
+        In a narrow bar, the area includes the run state and, if needed, the tools at the right.
         """
-        shown = [each for each in self._tools() if not each.isHidden()]
-        left = max((each.geometry().right() + 1 for each in shown), default=0) + GAP
+        left = max((each.geometry().right() + 1 for each in self._shown_tools()), default=0) + GAP
         buttons = (self.result, self.restart, self.pause, self.step, self.confirm, self.run, self.stop)
         beside: list[QWidget] = [each for each in buttons if not each.isHidden()]
         states = [each for each in (self.mark, self.words) if not each.isHidden()]
+        least = round(self._theme.scaled(BANNER_PX))
         area = free_area(self, left, [*beside, *states])
-        return area if area.width() >= self._theme.scaled(BANNER_PX) else free_area(self, left, beside)
+        if area.width() < least:
+            area = free_area(self, left, beside)
+        if area.width() < least:
+            edges = [each.x() for each in self._shown_tools()]
+            area.setLeft(max((x for x in edges if area.right() - x >= least), default=GAP))
+        return area
 
-    def _tools(self) -> list[QWidget]:
+    def needed_width(self) -> int:
+        """Return the width in px at which no text in the bar is shortened."""
+        run_state = (self.mark, self.words, self.result, self.restart, self.pause, self.step, self.confirm)
+        shown = [each for each in (*run_state, self.run, self.stop) if not each.isHidden()]
+        parts: list[QWidget] = [*shown, *self._shown_tools()]
+        widths = [each.sizeHint().expandedTo(each.minimumSize()).width() for each in parts]
+        return sum(widths) + GAP * (len(widths) + 2)
+
+    def _shown_tools(self) -> list[QWidget]:
         items = (self.tools.itemAt(place) for place in range(self.tools.count()))
-        return [tool for item in items if item is not None and (tool := item.widget()) is not None]
+        tools = [item.widget() for item in items if item is not None]
+        return [tool for tool in tools if tool is not None and not tool.isHidden()]
 
     def set_actions(self, actions: Actions) -> None:
         """Connect the buttons to the actions of their commands."""
