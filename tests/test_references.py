@@ -173,6 +173,74 @@ def test_every_anchor_of_a_link_is_a_heading() -> None:
     } == set()
 
 
+@cache
+def _trees() -> dict[str, ast.Module]:
+    """Every module of nep, app and tools by its path."""
+    return {
+        place: ast.parse(text)
+        for place, text in _texts().items()
+        if place.startswith(("nep/", "app/", "tools/")) and place.endswith(".py")
+    }
+
+
+@cache
+def _classes() -> dict[str, ast.ClassDef]:
+    return {
+        node.name: node
+        for tree in _trees().values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+    }
+
+
+def _arguments(function: ast.FunctionDef | ast.AsyncFunctionDef) -> set[str]:
+    """Return the names of the arguments of a function."""
+    declared = function.args
+    found = [*declared.posonlyargs, *declared.args, *declared.kwonlyargs, declared.vararg, declared.kwarg]
+    return {each.arg for each in found if each is not None}
+
+
+@cache
+def _members(of: ast.ClassDef) -> set[str]:
+    """Return the attributes and methods of a class and its bases, and the arguments of its constructor."""
+    names: set[str] = set()
+    for node in ast.walk(of):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            names |= {node.name} | (
+                _arguments(node) if node.name in {"__init__", "__new__", "__call__"} else set()
+            )
+        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            names.add(node.id if isinstance(node, ast.Name) else node.attr)
+    for base in of.bases:
+        name = re.sub(r"\[.*", "", ast.unparse(base)).rpartition(".")[2]
+        if name in _classes() and name != of.name:
+            names |= _members(_classes()[name])
+        elif name.endswith("Error"):
+            names |= {"args", "name", "what"}
+    return names
+
+
+def _described(docstring: str) -> Iterator[str]:
+    """Return the names that sections such as `Args:` describe."""
+    for section in re.findall(
+        r"^ *(?:Args|Attributes|Signals):\n((?:(?:    .*)?\n?)+)", docstring, re.MULTILINE
+    ):
+        yield from re.findall(r"^    \*{0,2}(\w+)(?=:| \()", section, re.MULTILINE)
+
+
+def test_docstring_sections_describe_existing_names() -> None:
+    count, missing = 0, set()
+    for place, tree in _trees().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                names = list(_described(ast.get_docstring(node) or ""))
+                known = _members(node) if isinstance(node, ast.ClassDef) else _arguments(node)
+                count += len(names)
+                missing |= {(place, node.name, name) for name in names if name not in known}
+    assert count > 5000
+    assert missing == set()
+
+
 def test_missing_references_are_detected() -> None:
     assert _is_there("nep.masters.graph.Graph")
     assert _is_there("nep.node")

@@ -33,7 +33,7 @@ class ConsoleRecord:
         origin: Name of the program that logged the record.
         number: Serial number of the record, starting at 1.
         logger: Name of the logger; "" if unknown.
-        place: Source file and line number; "" if unknown.
+        location: Source file and line number; "" if unknown.
     """
 
     stamp_s: float

@@ -200,7 +200,7 @@ class _Fault:
     """Failed step.
 
     Attributes:
-        said: Error message for the user.
+        message: Error message for the user.
         last_s: Time of the last failure.
         has_recovered: True if the step has succeeded since the last failure.
     """

@@ -66,7 +66,7 @@ class TypedService:
     Attributes:
         name: Name of the service type.
         request: Codec of request bodies.
-        answer: Codec of response bodies.
+        response: Codec of response bodies.
         is_nep: True for the type described in the module docstring, whose fields are a codec number and
             data.
     """

@@ -244,7 +244,7 @@ class _Row(NamedTuple):
 
     Attributes:
         name: Name of the route.
-        figures: Formatted counts in the order of `_HEADINGS`.
+        cells: Formatted counts in the order of `_HEADINGS`.
         problem: Problem of the route, or "".
     """
 

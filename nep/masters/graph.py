@@ -76,7 +76,7 @@ class Outgoing(NamedTuple):
 
     Attributes:
         to: Id of the node for a push; connection of the request for a reply.
-        answer: Content of the message.
+        body: Content of the message.
         call: Number of the request, or None for a push.
     """
 

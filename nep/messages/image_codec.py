@@ -104,7 +104,7 @@ class RawLayout:
     """Layout of raw pixels.
 
     Attributes:
-        numbers: numpy type of a channel's value.
+        dtype: numpy type of a channel's value.
         channels: Number of channels per pixel.
         is_red_first: True for the order RGB, False for BGR.
     """

@@ -171,7 +171,7 @@ class Hello(NamedTuple):
         subscriber: Id of the subscriber.
         topic: Name of the topic.
         one_part: True if the subscriber reads messages of one part.
-        tells: True if the subscriber acknowledges echoes.
+        acknowledges: True if the subscriber acknowledges echoes.
         batches: True if the subscriber reads batches.
     """
 

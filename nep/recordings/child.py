@@ -68,8 +68,8 @@ class _ActiveRecording:
         writer: Writer of the recording.
         recorder: Recorder that passes messages to the writer.
         path: File of the recording.
-        until: Time at which the recording stops (clock of the service); None for no limit.
-        most_bytes: File size at which the recording stops; None for no limit.
+        stop_at: Time at which the recording stops (clock of the service); None for no limit.
+        max_bytes: File size at which the recording stops; None for no limit.
     """
 
     writer: RecordingWriter
@@ -92,7 +92,7 @@ class RecorderService:
     Args:
         node: Node that subscribes to the topics; stays open.
         tell: Called with events, one at a time, in any thread.
-        figures_s: Interval between "figures" events in seconds.
+        stats_interval_s: Interval between "figures" events in seconds.
         clock: Monotonic clock in seconds.
     """
 

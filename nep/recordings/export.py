@@ -65,7 +65,7 @@ class ExportedFile:
         topic: Name of the topic; "" for a file with all topics.
         path: Path of the file or folder.
         count: Number of exported messages.
-        unreadable: Number of messages that were skipped because they can't be decoded.
+        undecodable_count: Number of messages that were skipped because they can't be decoded.
     """
 
     topic: str

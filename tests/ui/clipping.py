@@ -83,9 +83,7 @@ def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
         wanted = widget.sizeHint()
         if widget.width() < wanted.width() - SLACK and not _tip(widget):
             yield f"{said} is {widget.width()} wide and needs {wanted.width()}"
-        least = widget.minimumSizeHint().width()
-        if widget.width() < least - SLACK:
-            yield f"{said} is {widget.width()} wide and can be shortened only to {least}"
+        yield from _below_minimum(widget, said)
         if widget.height() < wanted.height() - SLACK:
             yield f"{said} is {widget.height()} high and needs {wanted.height()}"
     elif isinstance(widget, QLineEdit | QComboBox):
@@ -96,6 +94,12 @@ def _faults(widget: QWidget, root: QWidget) -> Iterator[str]:
         cut = _cut(widget, root)
         if cut:
             yield f"{said} is cut by {cut}"
+
+
+def _below_minimum(widget: QWidget, said: str) -> Iterator[str]:
+    least = widget.minimumSizeHint().width()
+    if widget.width() < least - SLACK:
+        yield f"{said} is {widget.width()} wide and can be shortened only to {least}"
 
 
 def _heads(head: TableHeader) -> Iterator[str]:

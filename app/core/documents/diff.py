@@ -16,7 +16,7 @@ class Difference:
     """Difference between an earlier state of a behaviour and its current one.
 
     Attributes:
-        blocks: Number of blocks in the earlier state.
+        block_count: Number of blocks in the earlier state.
         added: Number of added blocks.
         removed: Number of removed blocks.
         changed: Number of blocks whose fields, values or texts differ.

@@ -37,7 +37,7 @@ class BehaviourFile:
         name: Name of the behaviour.
         workspace: Blocks in Blockly's JSON format.
         robots: Descriptions of the robots in use, by name.
-        others: Fields that this version doesn't know.
+        unknown_fields: Fields that this version doesn't know.
     """
 
     name: str

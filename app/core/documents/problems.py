@@ -39,7 +39,7 @@ class ProblemLine:
     Attributes:
         problem: Problem that is shown.
         fixes: Fixes, best first.
-        blocks: Number of affected blocks.
+        block_count: Number of affected blocks.
     """
 
     problem: Problem

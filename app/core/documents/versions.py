@@ -114,7 +114,7 @@ class Version:
         name: Name of the original file, without extension.
         written_s: Time when the content was written, in seconds since 1970.
         replaced_s: Time when the content was overwritten, in seconds since 1970.
-        mark: Hash of the original path.
+        path_hash: Hash of the original path.
     """
 
     copy: Path

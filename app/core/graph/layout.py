@@ -78,11 +78,11 @@ class GraphLayout:
     """Positions of boxes and groups, and routes of lines.
 
     Attributes:
-        places: Centre of each box, by key.
+        positions: Centre of each box, by key.
         groups: Rectangle of each group, by key.
         routes: Points of each route, from the edge of the source box to the edge of the target box.
-        kept: Last positions of nodes that left, by key, oldest first.
-        left_out: Number of omitted routes.
+        saved_positions: Last positions of nodes that left, by key, oldest first.
+        omitted_routes: Number of omitted routes.
         is_plain: True if graphlay failed and the boxes are arranged in rows.
     """
 

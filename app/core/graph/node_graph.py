@@ -91,7 +91,7 @@ class DrawnNode:
     Attributes:
         key: Identifier of the box, which stays the same when a program is restarted.
         entry: Current state of the node; None for a collapsed group.
-        members: Number of nodes in a collapsed group.
+        member_count: Number of nodes in a collapsed group.
         bridged_network: Name of the network to which a bridge connects, or "".
         has_pictures: True if the node publishes images.
     """
@@ -141,8 +141,8 @@ class GraphGroup:
     """Group of nodes on one computer, of one robot, or in one network.
 
     Attributes:
-        members: Number of nodes.
-        quiet: Number of nodes that are hidden because they are quiet.
+        member_count: Number of nodes.
+        quiet_count: Number of nodes that are hidden because they are quiet.
         is_collapsed: True if the group is collapsed.
     """
 

@@ -41,7 +41,7 @@ class Shape:
         fill: Fill colour; None for no fill.
         thickness: Width of the outline in pixels of the image.
         size: Radius of a circle as fractions of width and height; height of a text as a fraction.
-        words: Text to draw.
+        text: Text to draw.
     """
 
     kind: str

@@ -34,7 +34,7 @@ class ObjectRow:
     """Row of a table.
 
     Attributes:
-        place: Index of the row.
+        index: Index of the row.
         name: Index as text, or the path of the object in the message.
     """
 

@@ -25,7 +25,7 @@ class NodeEntry:
         gone_s: Seconds since the node left; None while the node is registered. Its topics are still
             listed.
         network: Kind of network; "" for the native one.
-        stale: True if the network can't be queried at the moment.
+        is_stale: True if the network can't be queried at the moment.
         has_parameters: True if the node declares parameters.
         can_set_parameters: True if other nodes can set the parameters, which requires services.
     """

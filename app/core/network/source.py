@@ -47,7 +47,7 @@ class GraphReceived:
 
     Attributes:
         view: New graph.
-        asked_s: Duration of the query in seconds.
+        query_s: Duration of the query in seconds.
     """
 
     view: GraphView
@@ -67,7 +67,7 @@ class MasterLost:
 
     Attributes:
         address: Address of the master.
-        sentence: Explanation for the user.
+        message: Explanation for the user.
     """
 
     address: str
@@ -76,7 +76,7 @@ class MasterLost:
 
 @dataclass(frozen=True, slots=True)
 class WatchFailed:
-    """Event: subscribing to a topic failed. ``sentence`` contains the reason."""
+    """Event: subscribing to a topic failed. `message` contains the reason."""
 
     topic: str
     message: str
@@ -88,7 +88,7 @@ class JobFailed:
 
     Attributes:
         what: Sentence for the report, see `Source.submit`.
-        sentence: Reason for the failure.
+        message: Reason for the failure.
     """
 
     what: str

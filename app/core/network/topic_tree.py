@@ -58,10 +58,10 @@ class TopicFolder:
     Attributes:
         name: Last part of the path.
         path: Whole path, such as "/robot/arm/".
-        deep: Depth in the tree, 0 for a top-level folder.
+        depth: Depth in the tree, 0 for a top-level folder.
         is_open: True if the folder is expanded.
         topics: All topics in the folder and its subfolders.
-        inside: Topics and subfolders directly in the folder.
+        children: Topics and subfolders directly in the folder.
     """
 
     name: str

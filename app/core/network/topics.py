@@ -64,7 +64,7 @@ class Topic:
         dropped: Number of messages discarded before a panel read them, since the watch began.
         missed: Number of messages sent but not received here, since the watch began.
         network: Kind of network; "" for the native one.
-        stale: True if the network can't be queried at the moment.
+        is_stale: True if the network can't be queried at the moment.
         measured_rates: Measured rate (messages and bytes per second) of a watched topic whose publishers
             report no rate.
     """

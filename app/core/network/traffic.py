@@ -12,7 +12,7 @@ from nep.protocol.graph_view import GraphView
 WINDOW_S = 30.0
 
 SUM_INTERVAL_S = 0.5
-"""Interval in seconds at which the statistics of more than `AT_ONCE` topics are summed."""
+"""Interval in seconds at which the statistics of more than `BATCH_SIZE` topics are summed."""
 
 
 class RecentLosses:

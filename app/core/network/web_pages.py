@@ -98,7 +98,7 @@ class WebServerStarted:
     Attributes:
         number: Number of the start, which identifies results of outdated starts.
         server: Running server; None if the start failed.
-        sentence: Reason for the failure, or "".
+        message: Reason for the failure, or "".
     """
 
     number: int

@@ -71,8 +71,8 @@ class FolderScan:
     Attributes:
         files: Recordings, newest first.
         problem: Reason why the folder can't be read, or "".
-        left_out: Number of older files that are not listed.
-        is_whole: True if all files have been read; otherwise call `RecordingFolder.start_scan` again.
+        omitted_count: Number of older files that are not listed.
+        is_complete: True if all files have been read; otherwise call `RecordingFolder.start_scan` again.
     """
 
     files: Sequence[RecordingFacts] = ()

@@ -44,7 +44,7 @@ class Crash:
 
     Attributes:
         part: Part that crashed.
-        how: Cause, in English.
+        cause: Cause, in English.
         text: Details such as a traceback.
         version: Version of Studio that crashed, which may be older than the running version.
     """

@@ -65,8 +65,8 @@ class _Announcement:
 
     Attributes:
         owners: Nodes that have owned the topic, newest first.
-        told: Newest description of each publisher.
-        place: Number of topics that the same node announced before this one.
+        messages: Newest description of each publisher.
+        rank: Number of topics that the same node announced before this one.
     """
 
     watch: Watch | None = None

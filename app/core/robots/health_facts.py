@@ -38,7 +38,7 @@ class HealthFact:
     Attributes:
         title: One of the constants of this module, to be translated with `nep.i18n`.
         status: "ok", "warn", "error", or "off" if the value is missing or unknown.
-        words: Value as text.
+        text: Value as text.
     """
 
     title: str

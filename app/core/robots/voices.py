@@ -92,7 +92,7 @@ class RobotSound:
         speech: Text that the robot is speaking, or "".
         spoken_fraction: Progress of the speech, 0 to 1.
         sound: Serial number of the sound.
-        played: Progress of the sound, 0 to 1.
+        played_fraction: Progress of the sound, 0 to 1.
         notes: Tones of the sound.
     """
 

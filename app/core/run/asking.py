@@ -14,7 +14,7 @@ class AskedQuestion:
     Attributes:
         run: Number of the run.
         number: Number of the question within the run.
-        words: Text of the question.
+        text: Text of the question.
         choices: Possible answers; empty if any answer is allowed.
     """
 

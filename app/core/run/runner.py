@@ -63,7 +63,7 @@ class RunnerEvent:
         run: Number of the run.
         blocks: Ids of the running blocks (running), of the blocks before which the program is paused,
             the next one first (paused), or of the failed blocks (error).
-        says: Description of the running block, or of the next block (paused).
+        description: Description of the running block, or of the next block (paused).
         text: Printed line; warning (paused); error message (error); reason for a failure (ended);
             question (ask).
         is_ok: True if the program ended without a failed block.

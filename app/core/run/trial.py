@@ -21,7 +21,7 @@ class TriedValue:
     Attributes:
         document: Behaviour of the block.
         block: Id of the block.
-        words: Formatted value.
+        text: Formatted value.
         number: Serial number of the trial.
     """
 

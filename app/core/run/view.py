@@ -27,7 +27,7 @@ class RunState:
     Attributes:
         state: "ready", "running", "paused", "stopping", "proven" or "unanswered"; "ready" with a
             `report` after a Stop without robots.
-        doubts: Reasons why robots that did not reply may be moving (`MovedRobots`).
+        motion_warnings: Reasons why robots that did not reply may be moving (`MovedRobots`).
         warning: Warning shown while the program is paused, or "".
         is_started: True if the scripts run and receive events; the process starts some tenths of a second
             earlier.
@@ -88,7 +88,7 @@ class RunView:
         result_status: Status of `result`, which determines icon and colour.
         last_stop: Reminder of the last Stop while a program is running, or None.
         last_stop_status: Status of `last_stop`, which determines icon and colour.
-        confirm: Label of the button with which the user confirms that a robot without a reply has
+        confirm_label: Label of the button with which the user confirms that a robot without a reply has
             stopped, or None.
     """
 

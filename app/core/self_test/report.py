@@ -29,12 +29,12 @@ class StepReport:
     """Report of one step. Times are in milliseconds since the start of the process.
 
     Attributes:
-        words: Expectation.
-        bound_s: Time limit in seconds.
+        description: Expectation.
+        timeout_s: Time limit in seconds.
         began_ms: Start of the step.
         ended_ms: Duration; None while the step is in progress.
         ok: True if the step succeeded.
-        said: Details of the result.
+        details: Details of the result.
     """
 
     name: str
@@ -123,7 +123,7 @@ class Report:
 
         Args:
             name: Name of the step.
-            words: Expectation.
+            words: Expected result, as a sentence for the report.
             bound_s: Time limit in seconds.
         """
         with self._lock:

@@ -49,8 +49,8 @@ class SelfTest:
         """Start a step.
 
         Args:
-            name: Name of the step, a key of `bounds.STEP_S`.
-            words: Expectation.
+            name: Name of the step, a key of `bounds.STEP_TIMEOUTS_S`.
+            words: Expected result, as a sentence for the report.
         """
         bound_s = bounds.STEP_TIMEOUTS_S[name]
         self.report.start_step(name, words, bound_s)

@@ -42,7 +42,7 @@ class Curve:
         text: Expression as typed by the user.
         source: Source of the samples.
         samples: Numbers over time.
-        of: Series of the field; None for a calculated curve.
+        series: Series of the field; None for a calculated curve.
     """
 
     text: str

@@ -69,7 +69,7 @@ class WindowSource:
 
     Attributes:
         kind: Calculation, such as "difference" or "mean".
-        of: Other source.
+        source: Other source.
         window_s: Length of the window for the mean, in seconds.
     """
 

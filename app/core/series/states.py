@@ -18,7 +18,7 @@ class StateRun:
     """Run of equal values from ``begin_s`` to ``end_s``.
 
     Attributes:
-        word: Value; None if it is unknown.
+        value: Value; None if it is unknown.
     """
 
     begin_s: float

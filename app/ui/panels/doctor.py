@@ -38,7 +38,7 @@ class NextStep:
     """Button of a finding.
 
     Attributes:
-        words: Text of the button.
+        text: Text of the button.
         run: Called when the button is clicked.
     """
 

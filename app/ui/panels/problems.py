@@ -48,8 +48,8 @@ class ProblemRow(QWidget):
 
     Signals:
         pressed: Id of the block with the problem.
-        fix: Action of the fix to apply.
-        stepped: Number of rows by which to move the focus.
+        fix_requested: Action of the fix to apply.
+        step_requested: Number of rows by which to move the focus.
     """
 
     pressed = Signal(str)

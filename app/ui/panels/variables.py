@@ -44,10 +44,10 @@ class VariableRow:
     Attributes:
         variable: Variable of the row.
         value: Current value; None before the first run.
-        opened: True if the list is expanded.
+        is_expanded: True if the list is expanded.
         item: Number of the item, counted from 1; 0 for the variable itself.
-        fresh: True for a moment after the value changed.
-        over: True if the run has ended.
+        is_new: True for a moment after the value changed.
+        has_ended: True if the run has ended.
     """
 
     variable: Variable

@@ -58,7 +58,7 @@ class OpenSession:
 
     Attributes:
         session: Session of zenoh.
-        meeting: Rendezvous of a local network; None for other networks.
+        rendezvous: Rendezvous of a local network; None for other networks.
         entry: Entry of this session in `meeting`, or None.
         endpoints: Endpoints to close in a forked child process (`forks.give_up`).
         routers: Endpoints of routers. At least one must be connected to reach other nodes. Empty for peers.

@@ -48,7 +48,7 @@ class ReceivedMessage(NamedTuple):
 
     Attributes:
         content: Reply or notification.
-        then: Callback of the request that the message replies to, or None.
+        callback: Callback of the request that the message replies to, or None.
     """
 
     content: Reply | Push

@@ -44,7 +44,7 @@ class AlarmEvent:
         kind: "on", "off", or "still" if the alarm is still on when its snooze ends.
         rule: Rule of the alarm.
         at_s: Time of the transition (s since 1970).
-        seen: Value that caused the transition.
+        value: Value that caused the transition.
         duration_s: Duration of the alarm in seconds; 0 if the alarm was turned on.
         count: Number of times the condition became true while the alarm was on.
         is_snoozed: True if no action runs because the rule is snoozed.
@@ -66,10 +66,10 @@ class AlarmState:
     Attributes:
         phase: "off" (disabled), "faulty" (invalid rule), "waits" (the topic or node was never seen), "well"
             (condition false), "pending" (condition true, but not yet long enough) or "on".
-        seen: Newest value.
+        value: Newest value.
         on_for_s: Time in seconds since the alarm turned on; 0 if it is off.
         count: Number of times the condition became true since the alarm turned on.
-        trouble: "missing" if the newest message lacks the field, "no_number" if the field isn't a number,
+        problem: "missing" if the newest message lacks the field, "no_number" if the field isn't a number,
             "unreadable" if the message can't be decoded, else "".
     """
 

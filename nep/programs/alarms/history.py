@@ -21,7 +21,7 @@ class ActionResult(NamedTuple):
 
     Attributes:
         kind: Kind of the action.
-        words: Result as text.
+        text: Result as text.
     """
 
     kind: str
@@ -34,13 +34,13 @@ class AlarmRecord:
 
     Attributes:
         rule_id: Id of the rule.
-        words: Cause as text, such as "range of /distance is 0.36, below 0.4".
+        cause: Cause as text, such as "range of /distance is 0.36, below 0.4".
         at_s: Start (s since 1970).
-        lasted_s: Duration in seconds; None while the alarm is on, or if the end was not observed.
+        duration_s: Duration in seconds; None while the alarm is on, or if the end was not observed.
         is_on: True while the alarm is on.
         count: Number of times the condition became true in this period.
         was_snoozed: True if no action ran because the rule was snoozed.
-        deeds: Completed actions.
+        action_results: Completed actions.
     """
 
     rule_id: str

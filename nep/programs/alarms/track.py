@@ -25,7 +25,7 @@ class Transition(NamedTuple):
 
     Attributes:
         is_on: True if the alarm turned on, False if it turned off.
-        seen: Value that caused the transition.
+        value: Value that caused the transition.
         duration_s: Time in seconds that the alarm was on; 0 if it turned on.
         occurrences: Number of times the condition became true while the alarm was on.
     """

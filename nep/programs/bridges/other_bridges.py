@@ -32,7 +32,7 @@ class OtherBridge(NamedTuple):
     Attributes:
         id: Id of the bridge.
         name: Name of the bridge.
-        ways: Routes of the bridge, with the names that our bridge gives to the sides.
+        routes: Routes of the bridge, with the names that our bridge gives to the sides.
     """
 
     id: str
@@ -46,8 +46,8 @@ class _Status(NamedTuple):
     Attributes:
         at: Time of arrival (monotonic, s).
         name: Name of the bridge.
-        on: The other bridge's name ("a" or "b") of the side on which the status was published.
-        ways: Routes of the bridge, with the names that it gives to the sides.
+        side: The other bridge's name ("a" or "b") of the side on which the status was published.
+        routes: Routes of the bridge, with the names that it gives to the sides.
     """
 
     at: float

@@ -21,7 +21,7 @@ class Rule:
         id: Unique id.
         requirement: English sentence; translate it with `_` for display.
         section: Anchor of a heading in docs/wire.md, or ``PAGE.md#anchor``.
-        judge: Check; raises `BrokenRuleError` if the adapter on the bench breaks the rule.
+        check: Check; raises `BrokenRuleError` if the adapter on the bench breaks the rule.
         features: Features that an adapter must announce for the rule to apply.
         is_last: True if the check makes the adapter exit, so that it must be restarted.
     """

@@ -42,7 +42,7 @@ class RecordedRequest:
         sender: Route of the sender.
         do: Name of the request.
         call: Number of the call; 0 if invalid.
-        what: Content of the request.
+        fields: Content of the request.
         problem: Reason why the request is malformed; "" if it is valid.
     """
 

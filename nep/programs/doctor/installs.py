@@ -30,8 +30,8 @@ class Install:
 
     Attributes:
         version: Version of NEP Studio.
-        since_s: Time of the installation (s since 1970).
-        place: Folder of the environment.
+        installed_s: Time of the installation (s since 1970).
+        location: Folder of the environment.
     """
 
     version: str

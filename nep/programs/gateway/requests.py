@@ -45,7 +45,7 @@ class Request:
             binds).
         msg_type: Message type of the original NEP.
         pid: Process id, if known.
-        asked_port: Port to which the request was sent.
+        request_port: Port to which the request was sent.
         language: Programming language, if known.
     """
 

@@ -20,7 +20,7 @@ class WriterLimits:
     Attributes:
         queue_bytes: Maximum size of queued messages.
         queue_messages: Maximum number of queued messages.
-        least_free_bytes: Free disk space at which a recording stops, so that other programs can still
+        min_free_bytes: Free disk space at which a recording stops, so that other programs can still
             write.
         flush_interval_s: Maximum time in seconds until a received message is written to the file.
         stats_interval_s: Interval in seconds at which the message counts by topic are written.

@@ -19,7 +19,7 @@ class RecordLocation(NamedTuple):
         offset: Offset of the record.
         opcode: Opcode of the record.
         length: Length of the content.
-        begin: First bytes of the content, which were read together with the header.
+        prefix: First bytes of the content, which were read together with the header.
     """
 
     offset: int

@@ -98,7 +98,7 @@ class ReplayResults:
         seek_messages: Newest message of each topic after a seek; None if there was no seek.
         history: Earlier messages of topics with history, by topic.
         drained: Messages played after that.
-        figures: Statistics by topic.
+        stats: Statistics by topic.
     """
 
     seek_messages: Sequence[Message] | None = None

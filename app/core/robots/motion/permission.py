@@ -41,7 +41,7 @@ class Question:
 
     Attributes:
         moves: Titles of the actions that move a robot, by robot.
-        go_on: Called if the user allows the motion.
+        on_allow: Called if the user allows the motion.
         strangers: Robots without a readable description, or topics of unknown robots, that would move
             too.
         reason: Sentence about the origin of the command, or "" for a command of the user.

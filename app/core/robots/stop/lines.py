@@ -85,7 +85,7 @@ class StopTarget:
     Attributes:
         identity: Program of the robot; None for the first program that announced the robot.
         earlier_programs: Earlier programs with the robot's name that may still be running and move the robot.
-        topics: Topics of earlier descriptions.
+        earlier_topics: Topics of earlier descriptions.
         is_expected: False if the reply is not awaited. The Stop is then sent in case the robot still
             receives commands.
     """

@@ -51,7 +51,7 @@ class UnprovenMotion:
 
     Attributes:
         number: Serial number of the motion among all robots.
-        by: Kind of sender.
+        sender: Kind of sender.
         since_s: Time of the command (monotonic seconds).
         program: Program of the robot at that time.
         id: Id of the invocation; "" if its end can't be observed.

@@ -66,7 +66,7 @@ class ArmQuestion:
     Attributes:
         topic: Name of the topic.
         robots: Names of the robots; empty if unknown.
-        go_on: Called if the user allows the motion.
+        on_allow: Called if the user allows the motion.
     """
 
     topic: str

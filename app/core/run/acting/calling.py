@@ -37,9 +37,9 @@ class CallRecord:
 
     Attributes:
         at_s: Time of the start in seconds since 1970.
-        took_s: Duration in seconds.
-        sentence: Reason for a failure, or "".
-        answer: Value of the reply.
+        duration_s: Duration in seconds.
+        error: Reason for a failure, or "".
+        reply: Value of the reply.
         text: Reply as JSON; shortened if `is_cut` is True.
         is_retained: False if `answer` and `text` were discarded in favour of newer calls.
     """

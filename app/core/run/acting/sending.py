@@ -64,8 +64,8 @@ class SendResult:
 
     Attributes:
         kind: "sent", "began", "ended" or "failed".
-        sentence: Reason for a failure, or "".
-        heard: Number of subscribers.
+        message: Reason for a failure, or "".
+        subscriber_count: Number of subscribers.
         count: Number of repeated messages that were sent.
         skipped: Number of repeated messages that were dropped because they were late.
         text: Message that was sent once; "" if it is too large to be stored.

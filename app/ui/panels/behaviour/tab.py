@@ -229,8 +229,8 @@ class NameField(QLineEdit):
         why_not: Returns the reason why a name is invalid, or "".
 
     Signals:
-        taken: New name.
-        left: The field should be closed.
+        committed: New name.
+        exited: The field should be closed.
     """
 
     committed = Signal(str)

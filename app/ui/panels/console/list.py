@@ -267,7 +267,7 @@ class LineList(QListView):
     """List view of the records.
 
     Signals:
-        find_wanted: The key ``/`` was pressed.
+        find_requested: The key ``/`` was pressed.
         resized: The size of the view changed.
     """
 

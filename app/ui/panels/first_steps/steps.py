@@ -74,7 +74,7 @@ class TutorialBlocks:
         started: True if there is a "when started" block.
         say_ids: Ids of the "say" blocks below "when started".
         has_turn: True if there is a "turn" block below "when started".
-        loose: Type suffixes of blocks that occur only in scripts without "when started".
+        detached_suffixes: Type suffixes of blocks that occur only in scripts without "when started".
     """
 
     started: bool = False

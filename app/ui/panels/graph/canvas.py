@@ -54,14 +54,14 @@ class GraphCanvas(QWidget):
     The viewport stays the same when the scene changes, unless the whole graph is fitted.
 
     Signals:
-        chosen: New selection, or None.
+        selected: New selection, or None.
         opened: Key of a topic to inspect.
         entered: The card of the selected node should get the focus.
         toggled: Key of a group to expand or collapse.
-        quiet_wanted: Key of a group whose quiet nodes should be shown.
-        letter: Key for the panel to handle, such as "g".
-        moved: The viewport changed.
-        menu_wanted: Item and screen position for a context menu.
+        quiet_nodes_requested: Key of a group whose quiet nodes should be shown.
+        key_pressed: Key for the panel to handle, such as "g".
+        viewport_changed: The viewport changed.
+        menu_requested: Item and screen position for a context menu.
 
     Args:
         describe: Returns the selection as text for screen readers.

@@ -84,7 +84,7 @@ class CardContent:
     Attributes:
         title: Name of the topic, service or node.
         kind: Short description below the title, such as the message type.
-        figures: Numbers in large type.
+        stats: Numbers in large type.
         facts: Lines of text below the numbers.
         tables: Tables below the lines of text.
         foot: Text at the bottom of the card, or "".
@@ -109,11 +109,11 @@ class GraphCard(QWidget):
 
     Signals:
         closed: The close button was clicked.
-        inspected: Key of a topic to inspect.
-        plotted: Key of a topic to plot.
-        record_wanted: Key of a topic to record.
-        warned: Command that creates an alarm.
-        chose: Kind and key of an item to select.
+        inspect_requested: Key of a topic to inspect.
+        plot_requested: Key of a topic to plot.
+        record_requested: Key of a topic to record.
+        alarm_requested: Command that creates an alarm.
+        select_requested: Kind and key of an item to select.
     """
 
     closed = Signal()
@@ -348,7 +348,7 @@ class CardSources:
         view: Graph reported by the master, or None.
         name_of: Returns the name of a node by key.
         box_of: Returns the key of the box that shows a node, or "" if the node is not drawn.
-        calls: Calls per second, by name of the service.
+        call_rates_hz: Calls per second, by name of the service.
         is_visible: Returns False for topics to hide.
         now_ns: Returns the current time in ns since 1970.
     """

@@ -55,7 +55,7 @@ class NodeItem:
         node: Node or collapsed group.
         rect: Rectangle in scene coordinates.
         name: First line, elided to the available width.
-        said: Second line in full length.
+        detail: Second line in full length.
         is_dim: True while the filter fades the box.
     """
 
@@ -74,11 +74,11 @@ class LineItem:
 
     Attributes:
         line: Topics or services that the line stands for.
-        ways: Points of the route between each pair of source and target.
+        routes: Points of the route between each pair of source and target.
         bounds: Bounding rectangle in scene coordinates.
         label: Rectangle of the label, or None if there is no room for it.
         is_placed: True after a place for the label has been searched.
-        figures: Label, width and losses.
+        stats: Label, width and losses.
         is_dim: True while the filter fades the line.
     """
 

@@ -38,9 +38,9 @@ class LineStats:
     """Label, width and losses of a line.
 
     Attributes:
-        words: Label.
+        label: Label.
         width: Width of the line in px.
-        lost: Box key and loss ratio (0 to 1) of each subscriber with losses.
+        losses: Box key and loss ratio (0 to 1) of each subscriber with losses.
     """
 
     label: str

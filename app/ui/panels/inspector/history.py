@@ -27,7 +27,7 @@ class HistoryStrip(QWidget):
         at: Number of the selected message; None while the newest one is selected.
 
     Signals:
-        moved: The user selected another message.
+        selection_changed: The user selected another message.
     """
 
     selection_changed = Signal()

@@ -46,7 +46,7 @@ class ObjectsView(QWidget):
     """Table of the objects in a list, below a line with the path of the list and the number of rows.
 
     Signals:
-        revealed: Path of an object to select in the tree.
+        reveal_requested: Path of an object to select in the tree.
 
     Args:
         toast: Shows a toast.

@@ -62,7 +62,7 @@ class TreeView(QTreeView):
         clock: Returns the monotonic time in s, as in `TreeNode.changed_s`.
 
     Signals:
-        dragged: Node that the user started to drag.
+        drag_started: Node that the user started to drag.
     """
 
     drag_started = Signal(object)

@@ -44,7 +44,7 @@ class NodeRow:
 
     Attributes:
         node: Node of the row.
-        opened: True if the node is expanded.
+        is_expanded: True if the node is expanded.
         direction: `PUBLISHES` or `SUBSCRIBES` for a topic; "" for a node.
         topic: Name of the topic; "" for a node.
         rate: Returns the formatted rate of a topic by key.

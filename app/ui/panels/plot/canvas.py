@@ -179,7 +179,7 @@ class PlotCanvas(pg.GraphicsView):  # type: ignore[misc]
         zoomed: Zoom factor, and time at the mouse pointer in s.
         moved: Shift of the visible range in s.
         values_changed: The range of a value axis changed.
-        all_wanted: All data should be shown.
+        show_all_requested: All data should be shown.
         cursor_moved: Name and new time of a cursor.
         field_dropped: Topic and path of a field that was dropped onto the canvas.
     """

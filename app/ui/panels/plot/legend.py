@@ -169,7 +169,7 @@ class LegendTable(TableView[PlotCurve]):
     Signals:
         changed: Visibility, axis or style of a curve changed.
         removed: Name of a curve to remove.
-        chosen_copy: Name of a curve to copy to the clipboard.
+        copy_requested: Name of a curve to copy to the clipboard.
     """
 
     changed = Signal()

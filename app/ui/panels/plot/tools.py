@@ -124,8 +124,8 @@ class AddCurve(SearchField):
         plotted: Returns the expressions of existing curves, which can be used in formulas.
 
     Signals:
-        wanted: Expression of the curve to add, and True for the right axis.
-        left: The user pressed Esc.
+        add_requested: Expression of the curve to add, and True for the right axis.
+        exited: The user pressed Esc.
     """
 
     icon_name = "plus"

@@ -42,10 +42,10 @@ class ShelfList(TableView[SavedMessage]):
         state: Returns the cell with the state of a message.
 
     Signals:
-        chosen: Id of the message that was selected by mouse or keyboard.
-        send_wanted: Id of a message to send.
-        copy_wanted: Id of a message to duplicate.
-        delete_wanted: Id of a message to delete.
+        selected: Id of the message that was selected by mouse or keyboard.
+        send_requested: Id of a message to send.
+        copy_requested: Id of a message to duplicate.
+        delete_requested: Id of a message to delete.
     """
 
     selected = Signal(str)

@@ -47,7 +47,7 @@ class RecordingDetails(QWidget):
     """Details of the selected recording.
 
     Signals:
-        wants_export: Export format, when the user starts an export.
+        export_requested: Export format, when the user starts an export.
         cancelled: The user cancelled the running export.
     """
 

@@ -22,9 +22,9 @@ class RecordingTable(TableView[RecordingFacts]):
     """Table of recordings, in which a click selects a row without opening the recording.
 
     Signals:
-        chosen: Key of the row that was selected by mouse or keyboard, or "".
-        rename_wanted: Key of a recording to rename.
-        delete_wanted: Key of a recording to delete.
+        selected: Key of the row that was selected by mouse or keyboard, or "".
+        rename_requested: Key of a recording to rename.
+        delete_requested: Key of a recording to delete.
     """
 
     selected = Signal(str)

@@ -24,7 +24,7 @@ class TopicList(QWidget):
     """Checklist of topics.
 
     Signals:
-        chosen: Names of all checked topics, after the user changed one of them.
+        selection_changed: Names of all checked topics, after the user changed one of them.
     """
 
     selection_changed = Signal(list)

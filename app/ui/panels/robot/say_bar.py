@@ -30,8 +30,8 @@ class SayField(SearchField):
     """Text field for speech.
 
     Signals:
-        said: Text to say, when Return was pressed.
-        asked: Suggestions should be shown, because Down was pressed.
+        submitted: Text to say, when Return was pressed.
+        suggestions_requested: Suggestions should be shown, because Down was pressed.
     """
 
     submitted = Signal(str)
@@ -74,8 +74,8 @@ class SayBar(QWidget):
         awaited: Returns the values of an event's field that running or open programs react to.
 
     Signals:
-        said: Text to say to the robot.
-        happened: Event to simulate.
+        speech_submitted: Text to say to the robot.
+        event_simulated: Event to simulate.
     """
 
     speech_submitted = Signal(str)

@@ -45,7 +45,7 @@ class ActionCard(Card):
         title_of: Returns the title of another action by its name.
 
     Signals:
-        tried: Input with which to start the action.
+        try_requested: Input with which to start the action.
         cancelled: The action should be cancelled.
     """
 

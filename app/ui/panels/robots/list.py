@@ -40,7 +40,7 @@ class RobotItem(PaintedButton):
     """Row of a robot.
 
     Signals:
-        menu_wanted: Screen position for a context menu.
+        menu_requested: Screen position for a context menu.
     """
 
     menu_requested = Signal(QPoint)
@@ -123,8 +123,8 @@ class RobotList(QWidget):
         run: Runs a command of the window by its id.
 
     Signals:
-        chosen: Name of the selected robot.
-        forgotten: Name of a robot to remove from the list.
+        selected: Name of the selected robot.
+        discard_requested: Name of a robot to remove from the list.
     """
 
     selected = Signal(str)

@@ -66,7 +66,7 @@ class ServiceList(TableView[OfferedService]):
     """List of services; a click selects a service, Ctrl+Enter calls it.
 
     Signals:
-        chosen: Name of the service that was selected by mouse or keyboard.
+        selected: Name of the service that was selected by mouse or keyboard.
     """
 
     selected = Signal(str)

@@ -59,10 +59,10 @@ class TimelineCanvas(QAbstractScrollArea):
     """Canvas with the timeline of one replay.
 
     Signals:
-        chosen: Topic that was clicked.
+        selected: Topic that was clicked.
         opened: Topic that was double-clicked.
-        rename_wanted: Bookmark that was double-clicked.
-        menu_wanted: Bookmark and screen position for a context menu.
+        rename_requested: Bookmark that was double-clicked.
+        menu_requested: Bookmark and screen position for a context menu.
     """
 
     selected = Signal(str)

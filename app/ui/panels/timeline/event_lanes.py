@@ -42,7 +42,7 @@ class LaneMark:
     Attributes:
         box: Rectangle of the mark.
         at_ns: Time to seek to on click, in ns since 1970.
-        words: Tooltip.
+        text: Tooltip.
         bookmark: Bookmark that the mark stands for, or None.
     """
 

@@ -31,7 +31,7 @@ class ReplayStrip(ArmedStrip):
     """Arming strip for a replay, visible while topics are armed or a confirmation is pending.
 
     Signals:
-        change_wanted: The page for choosing topics should be shown.
+        change_requested: The page for choosing topics should be shown.
     """
 
     for_replay = True
@@ -94,7 +94,7 @@ class SendChooser(QWidget):
     """Table for choosing the topics to send and their names on the live network; shown in place of the lanes.
 
     Signals:
-        left: The page should be closed.
+        exited: The page should be closed.
     """
 
     exited = Signal()

@@ -54,7 +54,7 @@ class TopicsTable(TableView[TreeRow]):
     """Table in which Left and Right collapse and expand folders.
 
     Signals:
-        fold_wanted: Key of a row, and True to expand it or False to collapse it.
+        expand_requested: Key of a row, and True to expand it or False to collapse it.
     """
 
     expand_requested = Signal(str, bool)
