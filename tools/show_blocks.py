@@ -1,4 +1,4 @@
-"""Create images of the block editor with the tests' sample: running, stopped, and with errors.
+"""Take screenshots of the block editor with the sample program of the tests: running, stopped, with errors.
 
 Needs a screen: ``xvfb-run -a .venv/bin/python tools/show_blocks.py FOLDER [--open CATEGORY]``
 """

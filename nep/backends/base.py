@@ -172,7 +172,7 @@ class PublisherTransport(Protocol):
         """Send an encoded message to all subscribers. Never blocks: full queues drop the message."""
 
     def close(self, timeout_s: float) -> None:
-        """Unregister and flush. Messages not delivered within `timeout_s` seconds are logged as a warning."""
+        """Unregister and flush the publisher; messages not delivered in `timeout_s` are logged as warning."""
 
 
 @runtime_checkable
@@ -253,7 +253,7 @@ class SubscriberTransport(Protocol):
         """Report the reason why messages can't be decoded, as an alert in the graph; "" clears the alert."""
 
     def close(self) -> None:
-        """Unregister and discard unread messages."""
+        """Unregister the subscriber and discard its unread messages."""
 
     def forked(self) -> None:
         """Mark the subscriber as closed and discard its messages in a forked child process.

@@ -296,7 +296,7 @@ class ServerTransport(Protocol):
         """Unregister; reject queued and new calls. Doesn't wait."""
 
     def close(self, timeout_s: float) -> None:
-        """Unregister and close; replies are flushed for up to `timeout_s` seconds. Idempotent."""
+        """Unregister and close the server; replies are flushed for up to `timeout_s` seconds. Idempotent."""
 
     def forked(self) -> None:
         """Mark the server as closed in a forked child process. Acquires no lock and touches no socket."""

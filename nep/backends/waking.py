@@ -23,7 +23,10 @@ class WakingSubscriber(ABC):
         """True if input is available or the subscriber is closed. Call with `changed` held."""
 
     def enter_wait(self, waker: Wakeable) -> bool:
-        """Register `waker`; return False if input is available or the subscriber is closed."""
+        """Register `waker` and return True; return False without registering it if input is available.
+
+        A closed subscriber counts as having input.
+        """
         with self._changed:
             if self.has_input:
                 return False

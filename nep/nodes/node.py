@@ -570,7 +570,7 @@ class Node(ServiceNode):
         return self._open_transport().graph(self.hybrid(), timeout_s)
 
     def close(self, timeout_s: float = FLUSH_TIMEOUT_S) -> None:
-        """Unregister and close everything created on this node. Idempotent.
+        """Unregister the node and close everything created on it. Idempotent.
 
         Published messages are delivered first; messages that can't be delivered in time are logged as a
         warning. Called automatically at interpreter exit. A concurrent `new_pub`, `new_sub` or similar

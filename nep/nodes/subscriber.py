@@ -318,7 +318,7 @@ class Subscriber:
         self._transport.report(self._problem)
 
     def close(self) -> None:
-        """Unregister and discard unread messages. Idempotent."""
+        """Unregister the subscriber and discard its unread messages. Idempotent."""
         if not self._is_forked:
             self._transport.close()
             if self._on_close is not None:

@@ -213,7 +213,7 @@ class Networks:
                     continue
 
     def select(self, name: str, address: str) -> None:
-        """Show the network of this kind, and save this for the next start.
+        """Connect to a network, show it, and save the choice for the next start.
 
         Raises:
             NepError: The address is invalid.

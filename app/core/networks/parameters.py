@@ -157,7 +157,11 @@ class NodeParameters:
         return next((each for each in self.all if each.name == name), None)
 
     def refresh(self, now: float) -> None:
-        """Apply the received values; ``now`` is monotonic seconds."""
+        """Apply the received values and the result of a pending change.
+
+        Args:
+            now: Monotonic time in seconds.
+        """
         node = self.node
         if node is None:
             return

@@ -167,7 +167,14 @@ class RecordingFolder:
 
 
 def read_facts(plain: RecordingFacts, opener: RecordingOpener) -> RecordingFacts:
-    """Return ``plain`` completed with the content of the file, or with the reason why it wasn't read."""
+    """Return the facts of a recording with the fields that are read from the file.
+
+    If reading fails, they contain the reason.
+
+    Args:
+        plain: Facts from the file system.
+        opener: Opener of recordings.
+    """
     try:
         with opener.open(plain.path, cache_bytes=CACHE_BYTES, budget=SCAN_BUDGET) as recording:
             words = recording.recorder_metadata

@@ -387,7 +387,10 @@ class Runs:
         return self._run
 
     def on_stop(self, event: StopDone | RobotReplied | RobotStopped | LateReply) -> None:
-        """Apply the replies of robots to the newest Stop."""
+        """Handle an event of a Stop: a reply, a late reply or the result.
+
+        Replies to earlier Stops are ignored.
+        """
         if isinstance(event, RobotStopped):
             self._news.update_fleet(event.report, event.mark)
             self._news.notify_user(event.report, "stop")

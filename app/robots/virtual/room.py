@@ -196,9 +196,9 @@ class Room:
         return named or next(iter(kinds.get(name, ())), None)
 
     def is_free(self, x: float, y: float, radius: float, before: tuple[float, float] | None = None) -> bool:
-        """Return True if a disc on the floor doesn't overlap obstacles.
+        """Return True if a disc is inside the room and overlaps no obstacle.
 
-        Balls are no obstacles: they roll away.
+        Balls don't count because they are pushed away.
 
         Args:
             x: Centre of the disc.

@@ -118,7 +118,7 @@ class SharedRoom:
         body.set_position(*room.nearest_free(*self._start, self._like.radius))
 
     def restore_start(self) -> Room:
-        """Restore the room at the start and return it. Call this with the lock held."""
+        """Reset the room to its initial state and return it. Call this with the lock held."""
         self._map.restore_start()
         self._is_new = True
         self.update_body()

@@ -1,4 +1,4 @@
-"""Native file dialogs on Linux, by the desktop portal on the session bus.
+"""Native file dialogs on Linux, through the XDG desktop portal on the session bus.
 
 Qt uses the portal if its platform theme "xdgdesktopportal" is selected before the application is
 created. Without a session bus, no module is loaded and the startup isn't delayed.

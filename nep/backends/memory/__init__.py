@@ -232,7 +232,7 @@ class MemorySubscriber(WakingSubscriber):
         self.is_closed = True
 
     def close(self) -> None:
-        """Unregister and discard unread messages."""
+        """Unregister the subscriber and discard its unread messages."""
         with self.hub.lock:
             if self.is_closed:
                 return

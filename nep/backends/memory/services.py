@@ -121,7 +121,7 @@ class MemoryServer:
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
-        """Unregister and reject queued calls."""
+        """Unregister the server and reject its queued calls."""
         with self.hub.lock:
             left = tuple(each for each in self.hub.servers.get(self.spec.service, ()) if each is not self)
             is_listed = self in self.hub.servers.get(self.spec.service, ())

@@ -125,7 +125,7 @@ class RosServer:
         return PublisherCount(self.spec.id, tally.calls, tally.bytes, tally.calls, errors=tally.errors)
 
     def begin_close(self) -> None:
-        """Unregister and reject queued calls."""
+        """Unregister the server and reject its queued calls."""
         with self._changed:
             if self._unregistering is not None:
                 return

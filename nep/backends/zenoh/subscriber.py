@@ -248,7 +248,7 @@ class ZenohSubscriber(WakingSubscriber):
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and discard unread messages."""
+        """Unregister the subscriber and discard its unread messages."""
         with self._inboxes.changed:
             if self.is_closed:
                 return

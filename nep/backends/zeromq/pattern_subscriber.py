@@ -234,7 +234,7 @@ class PatternSubscriber(WakingSubscriber):
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and discard unread messages."""
+        """Unregister the subscriber and discard its unread messages."""
         with self._members_lock, self._changed:
             if self.is_closed:
                 return

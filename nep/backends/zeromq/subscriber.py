@@ -369,7 +369,7 @@ class SocketSubscriber(Generic[R]):
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and discard unread messages."""
+        """Unregister the subscriber and discard its unread messages."""
         with self._requested_lock():
             if self.is_closed:
                 return

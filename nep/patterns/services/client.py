@@ -249,7 +249,7 @@ class Client:
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and close. Running calls raise `ClosedError`. Idempotent."""
+        """Unregister and close the client. Running calls raise `ClosedError`. Idempotent."""
         if self._is_forked:
             return
         self._transport.close()

@@ -247,7 +247,7 @@ class Server:
     # ---- closing
 
     def close(self, timeout_s: float = _CLOSE_TIMEOUT_S) -> None:
-        """Unregister and close; waiting calls are rejected. Idempotent.
+        """Unregister and close the server; waiting calls are rejected. Idempotent.
 
         Args:
             timeout_s: Time limit in seconds for callbacks running in the server's own threads.

@@ -184,7 +184,7 @@ class Surveyor:
     # ---- closing
 
     def close(self) -> None:
-        """Unregister and close. Idempotent."""
+        """Unregister and close the surveyor. Idempotent."""
         if self._is_forked:
             return
         self._transport.close()

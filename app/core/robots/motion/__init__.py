@@ -1,4 +1,4 @@
-"""Motion of real robots: the question to the user, the gate for messages, and commands of bridges.
+"""Permission to move real robots: confirmation, the gate for messages, and commands of bridges.
 
 `app.core.robots.stop` stops robots and proves that they stand still.
 """

@@ -196,7 +196,10 @@ def _stranger_label(name: str) -> str:
 
 
 def risky_actions(robot: Robot, actions: Iterable[str]) -> tuple[str, ...]:
-    """Return the titles of the actions that move the robot, without duplicates, limited to the first few."""
+    """Return the quoted titles of the actions that move the robot, without duplicates.
+
+    At most `MAX_NAMED` titles are returned, followed by “more” if there are others.
+    """
     found = [action.title for name in actions if (action := robot.action(name)) is not None and action.risk]
     titles = [f"“{title}”" for title in dict.fromkeys(found)]
     return (

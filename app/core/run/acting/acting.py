@@ -75,7 +75,7 @@ class ArmQuestion:
 
     @property
     def message(self) -> str:
-        """Text about the motion, which names the robots if they are known."""
+        """Warning that messages on the topic move robots; it names the robots if they are known."""
         template = _("{topic} moves {robots}. Make sure nobody is in the way. Press F12 to stop.")
         if not self.robots:
             template = _("{topic} commands robots. Make sure nobody is in the way. Press F12 to stop.")

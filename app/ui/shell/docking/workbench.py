@@ -570,7 +570,7 @@ def insert_dock(bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], d
 def insert_beside(
     bench: QMainWindow, layout: Layout, docks: Mapping[str, Dock], dock: Dock, other: Dock | None
 ) -> None:
-    """Insert a dock that gets half the place of another one, which is split along its longer side.
+    """Insert a dock by splitting another dock in half along its longer side.
 
     Args:
         bench: Window with the docks.
