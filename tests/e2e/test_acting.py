@@ -74,7 +74,7 @@ def test_message_composed_by_hand_is_armed_and_published_until_stop(studio: Stud
     studio.screen.key("2", held=["Alt"])
     studio.says(f"Master {address}", 40)
     with lamp(address) as seen:
-        fingers.do("publish a mess", "Publish per message")
+        fingers.do("publish a mess", "Publish a message")
         write(studio, fingers, "Message name", "Warm light")
         write(studio, fingers, "Topic", "/lamp", kind="TopicEdit")
         fingers.press("Escape")  # what is offered
