@@ -156,12 +156,12 @@ def test_health_alerts_are_translated() -> None:
             name=name,
             robot=robot,
             virtual=robot.virtual,
-            connected=on,
-            goes_on="",
+            is_connected=on,
+            unended_actions="",
             rejected=ReportedCount(12, now[0]),
             errors=ReportedCount(1, now[0]),
-            may_move="",
-            not_stopped="",
+            motion_warning="",
+            stop_problem="",
             silent=None,
         )
         for name, robot, on in (

@@ -19,7 +19,7 @@ from nep.cli.message_filter import MessageFilter
 from nep.cli.network import BackendOption, open_command_node
 from nep.cli.options import JsonOption, MasterOption, TimeoutOption
 from nep.cli.screen import UNKNOWN, cells, console, json_highlighter, print_status, show_json, size, write
-from nep.cli.table_file import CsvWriter, FieldExtractor
+from nep.cli.table_file import CsvMessageWriter, FieldExtractor
 from nep.cli.topic_patterns import TopicPatterns, is_pattern
 from nep.cli.topic_wait import TopicMonitor
 from nep.cli.values import cleaned, format_payload, json_of
@@ -116,7 +116,7 @@ def echo(
         if as_json:
             show = partial(show_record, fields=picked)
         elif as_csv:
-            show = CsvWriter(picked, names_topic=names_topic)
+            show = CsvMessageWriter(picked, names_topic=names_topic)
         with closing(_messages(node, topics, graph, timeout_s)) as messages:
             passing = (each for each in messages if condition is None or _matches(condition, each))
             try:

@@ -77,7 +77,7 @@ class FieldExtractor:
             print_status(template.format(count=self.unreadable))
 
 
-class CsvWriter:
+class CsvMessageWriter:
     """Writer of comma-separated values: the time of publication (s since 1970), followed by the fields."""
 
     def __init__(

@@ -450,7 +450,7 @@ class Node(ServiceNode):
             answer: Callback of the service.
         """
         publisher = self.new_pub(place, MSG_TYPE, latched=True)
-        if hasattr(self._open_transport(), "server"):
+        if hasattr(self._open_transport(), "create_server"):
             try:
                 self.new_server(place, answer, threads=1)
             except BaseException:

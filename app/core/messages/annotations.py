@@ -31,7 +31,7 @@ YELLOW: Colour = (1.0, 0.77, 0.24, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class AnnotationShape:
     """Shape to draw. Positions are fractions of the image's width and height.
 
     Attributes:
@@ -61,7 +61,7 @@ def is_annotation(payload: object) -> bool:
     return any(_is_list(each) for each in lists) or _face_of(payload) is not None or "positions" in payload
 
 
-def shapes_in(payload: object, width: int, height: int) -> tuple[Shape, ...]:
+def shapes_in(payload: object, width: int, height: int) -> tuple[AnnotationShape, ...]:
     """Return the shapes in a decoded message; invalid shapes are skipped.
 
     Args:
@@ -92,7 +92,7 @@ class _Frame:
         return x / self.width, y / self.height
 
 
-def _all_shapes(payload: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
+def _all_shapes(payload: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     makers = (("circles", _circle), ("points", _points), ("texts", _text))
     for name, maker in makers:
         for item in _items(payload.get(name)):
@@ -103,16 +103,16 @@ def _all_shapes(payload: Mapping[str, object], frame: _Frame) -> Iterator[Shape]
         yield from face
 
 
-def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
+def _circle(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     centre, diameter = frame.point(item.get("position")), _number(item.get("diameter"))
     if centre is None or diameter is None or diameter <= 0:
         return
     size = diameter / 2 / frame.width, diameter / 2 / frame.height
     outline, fill = _colour(item.get("outline_color")), _colour(item.get("fill_color"))
-    yield Shape("circle", (centre,), outline, fill, _thickness(item), size)
+    yield AnnotationShape("circle", (centre,), outline, fill, _thickness(item), size)
 
 
-def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
+def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     kind = _number(item.get("type")) or 0
     found = (frame.point(value) for value in islice(_items(item.get("points")), frame.left))
     points, thickness = tuple(point for point in found if point is not None), _thickness(item)
@@ -120,29 +120,31 @@ def _points(item: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
     each = [_colour(colour) for colour in islice(_items(item.get("outline_colors")), len(points))]
     if kind == POINTS and len(each) == len(points):
         for at, own in zip(points, each, strict=True):
-            yield Shape("points", (at,), own, None, thickness)
+            yield AnnotationShape("points", (at,), own, None, thickness)
     elif kind == POINTS:
-        yield Shape("points", points, outline, fill, thickness)
+        yield AnnotationShape("points", points, outline, fill, thickness)
     elif kind == LINE_LOOP and len(points) > 1:
-        yield Shape("area", points, outline, fill, thickness)
+        yield AnnotationShape("area", points, outline, fill, thickness)
     elif kind == LINE_STRIP and len(points) > 1:
-        yield Shape("line", points, outline, None, thickness)
+        yield AnnotationShape("line", points, outline, None, thickness)
     elif kind == LINE_LIST:
         for place in range(0, len(points) - 1, 2):
             own = each[place // 2] if place // 2 < len(each) else outline
-            yield Shape("line", points[place : place + 2], own, None, thickness)
+            yield AnnotationShape("line", points[place : place + 2], own, None, thickness)
 
 
-def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[Shape]:
+def _text(item: Mapping[str, object], frame: _Frame) -> Iterator[AnnotationShape]:
     at, words, height = frame.point(item.get("position")), item.get("text"), _number(item.get("font_size"))
     if at is None or not isinstance(words, str) or not words.strip():
         return
     size = (0.0, (height if height is not None and height > 0 else 12.0) / frame.height)
     ink, ground = _colour(item.get("text_color")) or YELLOW, _colour(item.get("background_color"))
-    yield Shape("text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), MAX_TEXT_LENGTH))
+    yield AnnotationShape(
+        "text", (at,), ink, ground, 1.0, size, shortened(" ".join(words.split()), MAX_TEXT_LENGTH)
+    )
 
 
-def _face_of(payload: Mapping[str, object]) -> tuple[Shape, ...] | None:
+def _face_of(payload: Mapping[str, object]) -> tuple[AnnotationShape, ...] | None:
     # The field `center` of `face_positions` is in fact the upper left corner.
     face = payload.get("face")
     if not isinstance(face, Mapping):
@@ -157,7 +159,7 @@ def _face_of(payload: Mapping[str, object]) -> tuple[Shape, ...] | None:
     x, y = corner
     right, low = x + wide / frame.width, y + high / frame.height
     corners = ((x, y), (right, y), (right, low), (x, low))
-    return (Shape("area", corners, YELLOW, None, 2.0, text=_("face")),)
+    return (AnnotationShape("area", corners, YELLOW, None, 2.0, text=_("face")),)
 
 
 def _thickness(item: Mapping[str, object]) -> float:

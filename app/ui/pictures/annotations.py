@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from PySide6.QtCore import QPointF, QRectF, QSizeF, Qt
 from PySide6.QtGui import QBrush, QColor, QFontMetricsF, QImage, QPainter, QPen, QPolygonF, QTransform
 
-from app.core.messages.annotations import Colour, Shape
+from app.core.messages.annotations import AnnotationShape, Colour
 from app.core.messages.picture_look import ColourScale
 from app.ui.theme.theme import Theme
 from app.ui.widgets import paint
@@ -22,7 +22,7 @@ MIN_BAR_HEIGHT = 40
 
 
 def paint_annotations(
-    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Iterable[Shape]
+    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Iterable[AnnotationShape]
 ) -> None:
     """Paint annotations over an image.
 
@@ -44,7 +44,12 @@ def paint_annotations(
 
 
 def _paint_annotation(
-    painter: QPainter, theme: Theme, shares: QTransform, scale: float, drawn: Shape, points: list[QPointF]
+    painter: QPainter,
+    theme: Theme,
+    shares: QTransform,
+    scale: float,
+    drawn: AnnotationShape,
+    points: list[QPointF],
 ) -> None:
     if drawn.kind == "points":
         radius = max(1.5, drawn.thickness * scale)
@@ -68,7 +73,7 @@ def _paint_annotation(
         _paint_text(painter, theme, points[0], high, drawn)
 
 
-def _paint_text(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: Shape) -> None:
+def _paint_text(painter: QPainter, theme: Theme, at: QPointF, high: float, drawn: AnnotationShape) -> None:
     # The lower left corner of the text is at `at`; the text is upright for any rotation of the image.
     font, words = theme.font("small"), drawn.text
     font.setPixelSize(round(min(max(high, MIN_LETTERS), MAX_LETTERS)))

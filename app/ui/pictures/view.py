@@ -21,7 +21,7 @@ from app.ui.widgets import paint
 from nep.i18n import _
 
 if TYPE_CHECKING:
-    from app.core.messages.annotations import Shape
+    from app.core.messages.annotations import AnnotationShape
     from app.core.messages.image_streams import ImageStream
     from app.core.messages.picture import Picture, Pixel
 
@@ -114,7 +114,7 @@ class PictureView(QWidget):
         self._image: QImage | None = None
         self._grey: QImage | None = None  # grey version of the last image, shown while the stream is silent
         self._boxes: tuple[DetectionBox, ...] = ()
-        self._drawn: tuple[Shape, ...] = ()
+        self._drawn: tuple[AnnotationShape, ...] = ()
         self._rate = self._state = self._age = ""
         self._rates = RateText(clock)
         self._silent = False  # the last image is shown because no new one arrives
@@ -144,7 +144,7 @@ class PictureView(QWidget):
         return self._boxes
 
     @property
-    def annotations(self) -> tuple[Shape, ...]:
+    def annotations(self) -> tuple[AnnotationShape, ...]:
         """Annotations on the current image."""
         return self._drawn
 
@@ -166,7 +166,7 @@ class PictureView(QWidget):
         self,
         stream: ImageStream,
         boxes: tuple[DetectionBox, ...] = (),
-        drawn: Callable[[int, int], tuple[Shape, ...]] | None = None,
+        drawn: Callable[[int, int], tuple[AnnotationShape, ...]] | None = None,
     ) -> None:
         """Show the newest image of a stream.
 

@@ -27,8 +27,8 @@ from nep.backends.zeromq.master_session import MasterSession
 from nep.backends.zeromq.subscriber import NativeReadable, Readable, SocketSubscriber
 from nep.backends.zeromq.transport import (
     DIRECT_WAIT_S,
+    MasterPublisher,
     OwnedPublisher,
-    RegisteredPublisher,
     ZeromqTransport,
     close_on_error,
 )
@@ -99,7 +99,7 @@ class NanomsgTransport(ZeromqTransport):
 
     def _new_publisher(
         self, spec: PublisherSpec, closer: Callable[[OwnedPublisher, float], None]
-    ) -> RegisteredPublisher:
+    ) -> MasterPublisher:
         return NanomsgPublisher(spec, closer, self._io.serve_soon)
 
     def _new_readable(self, spec: SubscriberSpec) -> NativeReadable:

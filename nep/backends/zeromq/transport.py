@@ -71,7 +71,7 @@ class OwnedPublisher(PublisherTransport, Pollable, Protocol):
         """Release the socket. The I/O thread must have stopped serving it."""
 
 
-class RegisteredPublisher(OwnedPublisher, SessionPublisher, Protocol):
+class MasterPublisher(OwnedPublisher, SessionPublisher, Protocol):
     """Interface of a publisher that is registered at a master."""
 
     def expect(self, expected: Iterable[ExpectedSubscriber]) -> None:
@@ -147,7 +147,7 @@ class ZeromqTransport:
                 return self._create_direct_publisher(spec, spec.configuration)
             return self._create_native_publisher(spec, spec.configuration)
 
-    def _create_native_publisher(self, spec: PublisherSpec, configuration: Hybrid) -> RegisteredPublisher:
+    def _create_native_publisher(self, spec: PublisherSpec, configuration: Hybrid) -> MasterPublisher:
         session = self._session(configuration.master)
         session.wait_for_address(spec.wait_s)
         closer = self._publisher_closer(lambda: session.remove_publisher(spec.id, publisher.count))
@@ -180,7 +180,7 @@ class ZeromqTransport:
 
     def _new_publisher(
         self, spec: PublisherSpec, closer: Callable[[OwnedPublisher, float], None]
-    ) -> RegisteredPublisher:
+    ) -> MasterPublisher:
         return NativePublisher(self._new_xpub_socket(spec), spec, closer, self._io.serve_soon)
 
     def _create_direct_publisher(self, spec: PublisherSpec, direct: Direct) -> PublisherTransport:

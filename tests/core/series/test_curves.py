@@ -327,7 +327,7 @@ def test_every_list_element_is_a_separate_curve() -> None:
     assert [each.samples.values.tolist() for each in brought] == [[1], [2], [3]], "of the newest message, too"
     assert [each.text for each in brought] == [f"/a.j[{n}].p" for n in range(3)]
     assert case.curves.add("/a.j[*].p") == [], "they are there"
-    with pytest.raises(CurveError, match="is empty now"):
+    with pytest.raises(CurveError, match="has no elements now"):
         case.curves.add("/a.n[*]")
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import nep
 from nep.cli.echo import echo
-from nep.cli.table_file import CsvWriter, FieldExtractor
+from nep.cli.table_file import CsvMessageWriter, FieldExtractor
 from nep.errors import NepError
 from nep.messages.fields import MISSING, leaf_paths, parse_path, path_text, value_at
 from nep.messages.message import Message
@@ -83,7 +83,7 @@ def rows(out):
 
 def test_csv_table_has_header_timestamps_and_quoted_cells():
     out = io.StringIO(newline="")
-    table = CsvWriter(FieldExtractor(["pose.x", "joints[2].name", "a", "."]), out)
+    table = CsvMessageWriter(FieldExtractor(["pose.x", "joints[2].name", "a", "."]), out)
     table(message({"pose": {"x": 1.5}, "joints": [0, 0, {"name": 'say "hi",\nbye'}], "a": False}))
     table(message({"a": None}, stamp_ns=None))
     text = out.getvalue()
@@ -98,7 +98,7 @@ def test_csv_table_has_header_timestamps_and_quoted_cells():
 
 def test_missing_fields_and_undecodable_messages_are_counted(capsys):
     fields = FieldExtractor(["x", "y"])
-    table = CsvWriter(fields, io.StringIO())
+    table = CsvMessageWriter(fields, io.StringIO())
     for each in (message({"x": 1}), message({"x": 1, "y": 2}), message(b"{oops"), message({})):
         table(each)
     fields.report_missing()

@@ -11,7 +11,7 @@ from PySide6.QtTest import QTest
 
 from app.core.storage.settings import Settings
 from app.robots.description.description import Parameter
-from app.ui.panels.console.list import FindField
+from app.ui.panels.console.list import LogFindField
 from app.ui.panels.robots.controls.number import OpenNumber
 from app.ui.shell.actions.shortcuts import FIXED_KEYS, Shortcuts
 from app.ui.shell.bars.app_bar import AppBar
@@ -94,7 +94,7 @@ def test_text_navigation_keys_are_left_to_the_text_field(
     field = FilterField(theme, "Filter")
     qtbot.addWidget(field)
     field.exited.connect(lambda: left.append("filter"))
-    words = FindField(theme)
+    words = LogFindField(theme)
     qtbot.addWidget(words)
     words.exited.connect(lambda: left.append("console"))
     number = OpenNumber(theme, Parameter("n", "n", "number", default=5))

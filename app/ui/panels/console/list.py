@@ -295,7 +295,7 @@ class LineList(QListView):
         self.resized.emit()
 
 
-class FindField(SearchField):
+class LogFindField(SearchField):
     """Search field of the console. Down moves the focus to the list; Esc clears and hides the field."""
 
     exited = Signal()

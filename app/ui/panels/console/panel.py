@@ -15,9 +15,9 @@ from app.ui.panels.console.list import (
     LEVELS,
     RECORD_ROLE,
     ConsoleModel,
-    FindField,
     LineDelegate,
     LineList,
+    LogFindField,
     RecordFilter,
     line_of,
 )
@@ -58,7 +58,7 @@ class ConsolePanel(PanelWidget):
         self.filter = IconButton(self.theme, "filter", _("Choose which lines are shown"), size=26)
         self.filter.clicked.connect(self._show_menu)
         self.header = [self.filter]
-        self.words = FindField(self.theme)
+        self.words = LogFindField(self.theme)
         self.words.textChanged.connect(self.refresh)
         self.words.exited.connect(self._focus_lines)
         self.words.hide()

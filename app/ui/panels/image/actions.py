@@ -14,7 +14,7 @@ from nep.i18n import _, lazy
 
 
 @dataclass(frozen=True)
-class ActionSpec:
+class ImageActionSpec:
     """Definition of an action.
 
     Attributes:
@@ -34,21 +34,21 @@ class ActionSpec:
     is_checkable: bool = False
 
 
-ROWS: tuple[ActionSpec, ...] = (
-    ActionSpec("larger", lazy("Zoom in"), ("+", "Ctrl++"), "zoom-in"),
-    ActionSpec("smaller", lazy("Zoom out"), ("-", "Ctrl+-"), "zoom-out"),
-    ActionSpec("fit", lazy("Fit image"), ("0", "Ctrl+0"), "maximize"),
-    ActionSpec("exact", lazy("Actual size"), ("1",)),
-    ActionSpec("right", lazy("Rotate right"), ("R",), "rotate-cw", has_separator=True),
-    ActionSpec("left", lazy("Rotate left"), ("Shift+R",), "rotate-ccw"),
-    ActionSpec("across", lazy("Flip horizontally"), ("H",), "move-horizontal", is_checkable=True),
-    ActionSpec("down", lazy("Flip vertically"), ("V",), "arrow-up-down", is_checkable=True),
-    ActionSpec(
+ROWS: tuple[ImageActionSpec, ...] = (
+    ImageActionSpec("larger", lazy("Zoom in"), ("+", "Ctrl++"), "zoom-in"),
+    ImageActionSpec("smaller", lazy("Zoom out"), ("-", "Ctrl+-"), "zoom-out"),
+    ImageActionSpec("fit", lazy("Fit image"), ("0", "Ctrl+0"), "maximize"),
+    ImageActionSpec("exact", lazy("Actual size"), ("1",)),
+    ImageActionSpec("right", lazy("Rotate right"), ("R",), "rotate-cw", has_separator=True),
+    ImageActionSpec("left", lazy("Rotate left"), ("Shift+R",), "rotate-ccw"),
+    ImageActionSpec("across", lazy("Flip horizontally"), ("H",), "move-horizontal", is_checkable=True),
+    ImageActionSpec("down", lazy("Flip vertically"), ("V",), "arrow-up-down", is_checkable=True),
+    ImageActionSpec(
         "freeze", lazy("Freeze this image"), ("Space",), "snowflake", has_separator=True, is_checkable=True
     ),
-    ActionSpec("save", lazy("Save as PNG"), ("S",), "download"),
-    ActionSpec("copy", lazy("Copy the picture"), ("Ctrl+C",), "copy"),
-    ActionSpec(
+    ImageActionSpec("save", lazy("Save as PNG"), ("S",), "download"),
+    ImageActionSpec("copy", lazy("Copy the picture"), ("Ctrl+C",), "copy"),
+    ImageActionSpec(
         "point",
         lazy("Publish a point on click"),
         ("P",),

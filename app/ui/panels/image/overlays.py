@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from app.core.messages.annotations import Shape, shapes_in
+from app.core.messages.annotations import AnnotationShape, shapes_in
 from app.core.messages.reader import LARGE_BYTES
 from app.core.network.topics import Topic
 from app.core.network.watches import Suspendable, Watch
@@ -32,7 +32,7 @@ class Overlays:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._watches: dict[str, Watch] = {}
-        self._drawn: dict[str, tuple[Message | None, tuple[int, int], tuple[Shape, ...]]] = {}
+        self._drawn: dict[str, tuple[Message | None, tuple[int, int], tuple[AnnotationShape, ...]]] = {}
 
     @property
     def selected(self) -> tuple[str, ...]:
@@ -60,14 +60,14 @@ class Overlays:
         for topic in chosen:
             self.set_visible(topic, shown=True)
 
-    def annotations_for(self, width: int, height: int) -> tuple[Shape, ...]:
+    def annotations_for(self, width: int, height: int) -> tuple[AnnotationShape, ...]:
         """Return the annotations to draw over an image. Each message is decoded only once.
 
         Args:
             width: Width of the image in px.
             height: Height of the image in px.
         """
-        found: list[Shape] = []
+        found: list[AnnotationShape] = []
         for key in self._watches:
             topic = self._session.topic(key)
             message = topic.newest if topic is not None and topic.gone_s is None else None
@@ -93,7 +93,7 @@ class Overlays:
         self._drawn.clear()
 
 
-def _decode_annotations(message: Message | None, width: int, height: int) -> tuple[Shape, ...]:
+def _decode_annotations(message: Message | None, width: int, height: int) -> tuple[AnnotationShape, ...]:
     # large messages are not decoded on the GUI thread
     if message is None or message.size_bytes > LARGE_BYTES:
         return ()

@@ -302,7 +302,7 @@ class SimulatedSource:
     def submit(self, _what: str, job: Callable[[Any], None]) -> None:
         job(self.node)
 
-    def missed(self) -> Mapping[str, int]:
+    def lost_counts(self) -> Mapping[str, int]:
         return {}
 
     def close(self) -> None:

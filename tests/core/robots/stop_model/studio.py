@@ -88,7 +88,7 @@ class SimulatedRunner:
         self._network.connect()
         for name, publisher in self.publishers.items():
             self.move(name, "drive")
-            self._alive.beat(name, publisher.publish)
+            self._alive.start(name, publisher.publish)
 
     def move(self, name: str, action: str) -> None:
         publisher = self.publishers[name]
