@@ -92,7 +92,7 @@ def test_malformed_log_messages_are_shown_as_one_record_or_reported_as_alerts() 
         record(level="critical", text="x" * (TEXT_LIMIT + 1), node="a", name="a"),
     ])  # fmt: skip
     words, long = console.records
-    assert (words.text, words.origin, words.stamp_s) == ("only words", "someone", 5.0)
+    assert (words.text, words.origin, words.stamp_s) == ("only words", "unknown sender", 5.0)
     assert (long.level, long.logger) == ("critical", "")
     assert long.text.endswith(f"… ({TEXT_LIMIT + 1} characters)")
 

@@ -23,7 +23,7 @@ FULL = """
 import json, resource, signal, sys
 from pathlib import Path
 from app.core.documents.document import Document
-from app.core.documents.journal_name import Journal
+from app.core.documents.journal import Journal
 from app.errors import DocumentError
 path, journals = Path(sys.argv[1]), Path(sys.argv[2])
 document = Document(lambda: Journal(journals))

@@ -13,7 +13,7 @@ from app.core.messages import snapshots
 from app.core.documents.file_format import BehaviourFile, write_file
 from app.core.documents.document import Document
 from app.core.documents.versions import save_version
-from app.core.documents.journal_name import Journal, unsaved_work
+from app.core.documents.journal import Journal, unsaved_work
 from app.core.storage.settings import Settings
 from app.errors import AppError
 from nep.messages.message import Message

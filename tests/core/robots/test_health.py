@@ -122,11 +122,11 @@ def robot(*, virtual: bool, connected: bool = False) -> SimpleNamespace:
         is_connected=connected,
         silent=None,
         robot=shown,
-        goes_on="",
+        unended_actions="",
         rejected=ReportedCount(),
         errors=ReportedCount(),
-        may_move="",
-        not_stopped="",
+        motion_warning="",
+        stop_problem="",
     )
 
 

@@ -60,7 +60,7 @@ def test_facts_of_a_healthy_robot(case: Case) -> None:
         ("Battery", "ok", "84 %"),
         ("Stop", "ok", "confirmed in 41 ms, at 8:40"),
         ("Camera", "ok", "sends 15 images per second"),
-        ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} send"),
+        ("Sensors", "ok", f"all {len(PEPPER.sensors) - 1} are sending"),
         ("Safety stop", "ok", "stops by itself after 1 s"),
         ("Last response", "ok", f"every {PEPPER.beat_s:g} s during actions"),
     ]
@@ -176,7 +176,7 @@ def test_silent_periodic_sensors_are_a_warning(case: Case) -> None:
 
 def test_unsubscribed_sensors_are_not_reported_as_silent(case: Case) -> None:
     case.topics["/Pepper/distance"].age_s = 80.0
-    assert case.says("Sensors") == ("ok", f"all {len(PEPPER.sensors) - 1} send")
+    assert case.says("Sensors") == ("ok", f"all {len(PEPPER.sensors) - 1} are sending")
 
 
 def test_sensors_without_messages_are_not_counted_as_sending(case: Case) -> None:

@@ -118,7 +118,7 @@ def test_robot_moved_by_publishing_needs_permission_for_all_actions(rover) -> No
 
 
 def test_error_names_the_robots() -> None:
-    assert "Rover and Tim may not move yet" in str(MayNotMoveError(["Rover", "Tim"]))
+    assert "Rover and Tim can't move yet" in str(MayNotMoveError(["Rover", "Tim"]))
 
 
 def test_one_answer_permits_all_robots_of_the_question(rover) -> None:

@@ -141,7 +141,7 @@ def test_robot_that_connects_during_a_run_is_not_moved_by_published_messages(
     with Driver(REAL, "Turtle", node):
         tick_until(session, lambda: session.runs.block_errors, FOUND_S)
         said = session.runs.block_errors["p"]
-        assert said.startswith("Publishing on /Turtle/command would move Turtle, which has not been allowed")
+        assert said.startswith("Can't publish on /Turtle/command: this would move Turtle without permission")
         tick_until(session, lambda: session.runs.view().state != "stopping")
 
 
@@ -166,7 +166,7 @@ def test_permission_continues_the_requested_run_without_asking_again(
 def test_trial_continues_after_permission(session: Session, node: nep.Node) -> None:
     with Driver(REAL, "Turtle", node):
         there(session, "Turtle")
-        with pytest.raises(MayNotMoveError, match="Turtle may not move yet"):
+        with pytest.raises(MayNotMoveError, match="Turtle can't move yet"):
             session.fleet.invoke("Turtle", "move", {"distance": -0.1})
         session.fleet.permission.answer(let=False)
         link = session.fleet.link("Turtle")

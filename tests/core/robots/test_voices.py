@@ -19,23 +19,23 @@ class FakeSpeaker:
 
     def __init__(self) -> None:
         self.did: list[object] = []
-        self.busy = False
+        self.is_busy = False
         self.problem = ""
 
     def speak(self, words: str, language: str, volume: float) -> None:
         self.did.append((words, language, volume))
-        self.busy = True
+        self.is_busy = True
 
     def play(self, notes: Notes, volume: float) -> None:
         self.did.append((tuple(notes), volume))
 
     def stop_voice(self) -> None:
         self.did.append("stop voice")
-        self.busy = False
+        self.is_busy = False
 
     def stop(self) -> None:
         self.did.append("stop")
-        self.busy = False
+        self.is_busy = False
 
 
 class Case:
@@ -72,10 +72,10 @@ def test_each_utterance_is_spoken_once_without_a_visible_panel(case) -> None:
         case.tell("Pepper", "Hello", spoken)
     case.tell("Pepper", None)
     assert case.speaker.did == [("Hello", "en", 0.4)]  # its voice may take a little longer than the bubble
-    case.speaker.busy = False
+    case.speaker.is_busy = False
     case.tell("Pepper", "Hello", 0.0)
     case.tell("Pepper", "Hello", 0.9)
-    case.speaker.busy = False
+    case.speaker.is_busy = False
     case.tell("Pepper", "Hello", 0.0)  # the same words at once again
     assert case.said == ["Hello", "Hello", "Hello"]
 
@@ -96,13 +96,13 @@ def test_two_robots_speak_in_turn_and_caption_names_the_speaker(case) -> None:
     assert case.said == ["A long story"]
     case.tell("Ginger", "And I say", 0.95)
     case.tell("Ginger", None)
-    case.speaker.busy = False
+    case.speaker.is_busy = False
     case.session.tick()
     assert case.said == ["A long story", "And I say"]
     said = case.session.voices.current
     assert said is not None
     assert (said.robot, said.text) == ("Ginger", "And I say")
-    case.speaker.busy = False
+    case.speaker.is_busy = False
     case.session.tick()
     assert case.session.voices.current is None
 
@@ -115,7 +115,7 @@ def test_queue_of_waiting_utterances_is_bounded_and_drops_are_logged(case) -> No
     assert lines == ["“word 0” was shown but not spoken: others were speaking"]
     heard = []
     for _turn in range(MAX_WAITING + 2):
-        case.speaker.busy = False
+        case.speaker.is_busy = False
         case.session.tick()
         heard = case.said
     assert heard == ["A long story", *(f"word {count}" for count in range(1, MAX_WAITING + 1))]
@@ -149,7 +149,7 @@ def test_stop_silences_all_speech_including_queued(case) -> None:
     case.session.fleet.apply_stop(words, StopReport((), 0.0))
     case.tell("Pepper", "A long story", 0.3)  # it says so for one more moment
     assert case.speaker.did[-1] == "stop"
-    case.speaker.busy = False
+    case.speaker.is_busy = False
     case.session.tick()
     assert case.said == ["A long story"]
 

@@ -82,7 +82,7 @@ def test_stop_of_one_robot_is_unproven_when_the_stopper_raises(monkeypatch: pyte
 
 
 @pytest.mark.parametrize(
-    "place", ["control.result_words", "stop_news.stop_words", "stop_news.unanswered_words"]
+    "place", ["control.result_text", "stop_news.stop_text", "stop_news.unanswered_texts"]
 )
 def test_error_in_stop_message_does_not_leave_run_stopping(
     session: Session, monkeypatch: pytest.MonkeyPatch, place: str

@@ -29,17 +29,17 @@ def test_program_is_informed_of_unreadable_robots_without_repetition() -> None:
         moving_topics=MovingTopics(),
         revision=1,
         link=lambda _name: None,
-        permission=SimpleNamespace(permits=lambda *_words: True),
+        permission=SimpleNamespace(request_permission=lambda *_words: True),
     )
     program = Program()
     robots = ProgramRobots(fleet)  # type: ignore[arg-type]
     robots.start(program, (), {})  # type: ignore[arg-type]
     robots.update()
     assert program.told == []
-    fleet.moving = MovingTopics([ROVER])
+    fleet.moving_topics = MovingTopics([ROVER])
     robots.update()
     robots.update()
-    fleet.moving = MovingTopics([ROVER])  # another graph, the same robots
+    fleet.moving_topics = MovingTopics([ROVER])  # another graph, the same robots
     robots.update()
     assert program.told == [{"/Rover/command": ("Rover",), "robot_action": ("Rover",)}]
     robots.start(program, (), {})  # type: ignore[arg-type]
