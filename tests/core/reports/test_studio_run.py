@@ -92,9 +92,9 @@ def test_kill_by_the_system_is_reported_as_exit_without_message(place: Place) ->
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_expected_exit_is_reported_only_if_it_crashed(place: Place) -> None:
-    assert place.ends("run.expect_end(); os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
+    assert place.ends("run.expect_exit(); os.kill(os.getpid(), signal.SIGKILL)") == -signal.SIGKILL
     assert place.run().left() == []
-    assert place.ends("run.expect_end(); os.kill(os.getpid(), signal.SIGSEGV)") == -signal.SIGSEGV
+    assert place.ends("run.expect_exit(); os.kill(os.getpid(), signal.SIGSEGV)") == -signal.SIGSEGV
     assert len(place.run().left()) == 1
 
 

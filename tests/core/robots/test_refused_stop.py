@@ -252,7 +252,7 @@ def test_ongoing_action_is_shown_until_robot_reports_its_end(session: Session, p
     pepper._say = say_  # type: ignore[method-assign]
     lives(pepper)
     tick_until(session, lambda: session.runs.view().state == "proven")  # it was asked again
-    assert len(pepper.heard("stop")) == 2
+    assert len({each["id"] for each in pepper.heard("stop")}) == 2  # a stop may be repeated until it is answered
     assert link.state == "ready"
     tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
 

@@ -126,10 +126,10 @@ def test_robot_that_hangs_during_an_action_is_reported(session: Session, turtles
     tick_until(session, lambda: session.runs.view().state == "unanswered", SAID_S)
     tried = session.fleet.invoke("Turtle", "light", {})  # the panel says it too
     tick_until(session, lambda: not tried.is_running, SAID_S)
-    told = ("not responding", "has gone", "can't be reached")  # as soon as the master knows, it is away
+    told = ("not responding", "disconnected", "can't be reached")  # as soon as the master knows, it is away
     assert any(words in (tried.error or "") for words in told)
     if link.is_connected:
-        assert link.chip_text == "virtual, does not answer"
+        assert link.chip_text == "virtual, not responding"
     process.send_signal(signal.SIGCONT)
     tick_until(session, lambda: there(session).state == "ready", FOUND_S)
     with session.fleet.watch_sensors("Turtle"):  # what it was doing does not go on: it was told to stop
