@@ -252,7 +252,8 @@ def test_ongoing_action_is_shown_until_robot_reports_its_end(session: Session, p
     pepper._say = say_  # type: ignore[method-assign]
     lives(pepper)
     tick_until(session, lambda: session.runs.view().state == "proven")  # it was asked again
-    assert len({each["id"] for each in pepper.heard("stop")}) == 2  # a stop may be repeated until it is answered
+    stop_ids = {each["id"] for each in pepper.heard("stop")}  # a stop is repeated until it is answered
+    assert len(stop_ids) == 2
     assert link.state == "ready"
     tick_until(session, lambda: not session.alerts.has("moving:Pepper"))
 
