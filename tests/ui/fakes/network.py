@@ -76,7 +76,7 @@ class Network:
         except Exception as error:  # noqa: BLE001  as the network does: one job that fails must not end all others
             self._post_event(JobFailed(what, error_text(error)))
 
-    def missed(self) -> Mapping[str, int]:
+    def lost_counts(self) -> Mapping[str, int]:
         return dict.fromkeys(self.wanted, 0)
 
     def close(self) -> None:
