@@ -43,7 +43,7 @@ WAIT_S = 30.0
 
 ECHO = """
 import sys, threading, time, nep
-from nep.backends.ros.get_rospy import get_rospy
+from nep.backends.ros.library import get_rospy
 native, carried = nep.node("echo"), nep.node("echo", "ros", master=sys.argv[1])
 def echo(node):
     sub, pub = node.new_sub("ping_nep", "string"), node.new_pub("pong_nep", "string")

@@ -95,7 +95,7 @@ looking.timeout.connect(look)
 looking.start(10)
 window.on_shut = lambda: QTimer.singleShot(0, app.quit)
 soon = module.DeferredSteps(window, module.deferred_steps(window))
-soon.put_first([window.begin])
+soon.prepend([window.begin])
 window.show()
 app.exec()
 """

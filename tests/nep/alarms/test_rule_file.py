@@ -77,7 +77,7 @@ def test_example_file_is_valid() -> None:
         ({"when": {"topic": "/t", "is": "below", "value": "x", "than": "1"}}, "must be a number"),
         (
             {"when": {"topic": "/t", "is": "below", "value": "x[", "than": 1}},
-            "'x[' is not a valid field path; use a path such as pose.x or joints[3]",
+            "'x[' is not a valid field path; use a path such as 'pose.x' or 'joints[3]'",
         ),
         ({"when": {"topic": "/t", "is": "above", "value": "", "than": 1}}, "needs a name"),
         ({"when": {"topic": "/a b", "is": "silent"}}, "'topic'"),
@@ -139,7 +139,7 @@ def test_non_utf_8_missing_and_oversized_files_are_rejected(tmp_path) -> None:
         parse_alarms(b'{\n"\xff": 1}', "f")
     with pytest.raises(NepError, match="cannot be read"):
         read_alarms(tmp_path / "none.json")
-    with pytest.raises(NepError, match="larger than"):
+    with pytest.raises(NepError, match="too large for an alarm file"):
         parse_alarms(b" " * 4_000_001, "f")
 
 

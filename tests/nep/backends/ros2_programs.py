@@ -28,7 +28,7 @@ def a_domain_for_each_test(monkeypatch: pytest.MonkeyPatch) -> None:
 def all_are_patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """However busy the computer is, programs find each other in time."""
     for module in ("participant", "publisher"):
-        monkeypatch.setattr(f"nep.backends.ros2.{module}.HANDSHAKE_S", GREETINGS_S)
+        monkeypatch.setattr(f"nep.backends.ros2.{module}.HANDSHAKE_TIMEOUT_S", GREETINGS_S)
 
 
 def knows(node: nep.Node, topic: str) -> nep.Node:
@@ -53,7 +53,7 @@ def making() -> Iterator[Make]:
 BEGIN = f"""
 import nep, os, sys, threading
 from nep.backends.ros2 import participant, publisher
-participant.HANDSHAKE_S = publisher.HANDSHAKE_S = {GREETINGS_S}
+participant.HANDSHAKE_TIMEOUT_S = publisher.HANDSHAKE_TIMEOUT_S = {GREETINGS_S}
 node = nep.node('other', 'ros2')
 say = lambda it: print(it, flush=True)
 def knows(topic):

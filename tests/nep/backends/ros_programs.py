@@ -25,7 +25,7 @@ NO_ROS = (
 HAS_ROS = shutil.which("rosmaster") is not None and any(
     all((Path(place) / each).is_dir() for each in NEEDED) for place in SEARCH_FOLDERS
 )
-FIND_ROS = "from nep.backends.ros.get_rospy import get_rospy; get_rospy()\nimport rospy\n"
+FIND_ROS = "from nep.backends.ros.library import get_rospy; get_rospy()\nimport rospy\n"
 """With what a program begins that is one of ROS and none of nep."""
 
 

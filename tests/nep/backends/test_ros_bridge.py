@@ -13,14 +13,14 @@ from tests.nep.programs import eventually, running
 
 BRIDGE = """
 import sys
-from nep.programs.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_of
+from nep.programs.bridges import Bridge, BridgeConfiguration, BridgeTopic, TopicEnd, side_configuration
 def topic(name, direction, msg_type=""):
     return BridgeTopic(TopicEnd(name), TopicEnd(name, msg_type), direction)
 topics = (
     topic("/odom", "b->a"), topic("/camera", "b->a"), topic("/cmd_vel", "a->b", "geometry_msgs/Twist"),
     topic("/said", "both", "json"), topic("/picture", "a->b"),
 )
-sides = side_of("zeromq", sys.argv[1]), side_of("ros", sys.argv[2])
+sides = side_configuration("zeromq", sys.argv[1]), side_of("ros", sys.argv[2])
 with Bridge(BridgeConfiguration("test", *sides, topics)) as bridge:
     assert bridge.wait_until_ready(30.0)
     print("ready")

@@ -101,7 +101,7 @@ def test_omitted_fields_are_zero_or_empty() -> None:
         ({"at": math.nan}, "field 'at' is nan; expected a 'time'"),
         ({"at": {"sec": 1}}, "field 'at.sec' does not exist; did you mean 'secs'?"),
         ({"letters": b"ab"}, "field 'letters' has 2 elements; expected 3"),
-        ({"words": ["a"] * 3}, "field 'words' has 3 elements; give 2"),
+        ({"words": ["a"] * 3}, "field 'words' has 3 elements; expected 2"),
         ({"words": "ab"}, "field 'words' is 'ab'; expected a 'string[2]'"),
         ({"data": [256]}, "field 'data' contains a value that is not an integer from 0 to 255"),
         ({"data": "ab"}, "field 'data' is 'ab'; expected a 'uint8[]'"),

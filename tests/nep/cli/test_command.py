@@ -139,7 +139,7 @@ def test_unknown_host_name_is_reported(type_in):
     assert "Can't find a computer named “nosuchhost.invalid”" in doctor.stdout
     assert "Start a master" not in doctor.stdout
     assert type_in("--master", "not an address", "topic", "list").stderr.startswith(
-        "nep: 'not an address:7780' is not an address of a master"
+        "nep: 'not an address:7780' is not a valid address of a master"
     )
 
 
@@ -227,7 +227,7 @@ def test_topic_pub_uses_the_type_of_the_topic(running_master, type_in):
 def test_invalid_input_exits_with_code_1(running_master, type_in):
     done = type_in("topic", "pub", "t", "no JSON at all")
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("nep: 'no JSON at all' is not JSON; ")
+    assert done.stderr.startswith("nep: 'no JSON at all' is not valid JSON; ")
     assert type_in("topic", "pub", "bad topic", "1").returncode == 1
     assert "'bad topic'" in type_in("topic", "pub", "bad topic", "1").stderr
     assert type_in("topic", "pub", "t", "1", "--rate", "0").returncode == 2

@@ -109,7 +109,7 @@ def test_watch_of_one_parameter_ends_with_its_node_or_at_the_timeout(node: nep.N
     try:
         assert watching.process.stdout.readline() == "speed: 0.5\n"
         node.close()
-        assert "the node has left; watch it again" in watching.wait_says("left")
+        assert "the node has left the network; run the command again" in watching.wait_says("left")
         assert watching.process.wait(LONG_S) == 1
     finally:
         watching.close()

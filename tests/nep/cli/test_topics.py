@@ -90,7 +90,7 @@ def test_argument_is_parsed_according_to_the_message_type(text, msg_type, value)
 
 
 def test_invalid_json_error_suggests_the_string_type():
-    with pytest.raises(NepError, match=r"'hello' is not JSON; .* --type string"):
+    with pytest.raises(NepError, match=r"'hello' is not valid JSON; .* --type string"):
         parse_payload("hello", "json")
 
 

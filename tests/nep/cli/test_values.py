@@ -154,7 +154,7 @@ def test_arguments_are_distinguished_as_topics_or_fields(robots, capsys):
         ["x", "joints[0]"],
     )
     assert topics_and_fields("/a", ["battery"], graph) == (["/a", "battery"], [])
-    assert "write .battery for a field" in capsys.readouterr().err
+    assert "use .battery for a field" in capsys.readouterr().err
     assert topics_and_fields("/a", [".battery"], graph) == (["/a"], [".battery"])
 
 

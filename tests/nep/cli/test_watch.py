@@ -194,7 +194,7 @@ def test_lost_master_is_waited_for(type_in, file, monkeypatch) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ((), 1, "give an alarm file"),
+        ((), 1, "specify an alarm file"),
         (("none.json",), 1, "'none.json' cannot be read"),
         (("FILE", "--check"), 0, "the file is valid"),
         (("OFF",), 1, "are switched off"),

@@ -141,12 +141,12 @@ def test_echo_prints_selected_fields_as_text_and_json(odom, capfd):
 
 
 def test_conflicting_or_invalid_echo_options_are_rejected(odom):
-    with pytest.raises(typer.BadParameter, match="name the fields"):
+    with pytest.raises(typer.BadParameter, match="specify the fields"):
         echo("/odom", None, 1, None, odom, as_csv=True)
     with pytest.raises(typer.BadParameter, match="choose one"):
         echo("/odom", ["x"], 1, None, odom, as_json=True, as_csv=True)
     with pytest.raises(
-        NepError, match=r"'x\[' is not a valid field path; use a path such as pose\.x or joints\[3\]"
+        NepError, match=r"'x\[' is not a valid field path; use a path such as 'pose\.x' or 'joints\[3\]'"
     ):
         echo("/odom", ["x["], 1, None, odom, as_csv=True)
 

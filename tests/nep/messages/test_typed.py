@@ -294,10 +294,10 @@ def test_private_fields_are_not_encoded_and_init_false_fields_are_not_decoded() 
         (Vector3, {"x": True}, "x is a 'bool'; expected a 'float'"),
         (Part, {"number": 1.0}, "number is a 'float'; expected a 'int'"),
         (Part, {"number": True}, "number is a 'bool'; expected a 'int'"),
-        (Part, {"word": None}, "word must be a 'str', not 'NoneType'"),
+        (Part, {"word": None}, "word is a 'NoneType'; expected a 'str'"),
         (Tree, {"children": [{}, {"children": [{}, 3]}]},
          "children[1].children[1] is a 'int'; expected a map of the fields of 'Tree'"),
-        (nep.sensor.JointState, {"name": ["a", 1]}, "name[1] must be a 'str', not 'int'"),
+        (nep.sensor.JointState, {"name": ["a", 1]}, "name[1] is a 'int'; expected a 'str'"),
         (nep.sensor.JointState, {"name": "ab"}, "name is a 'str'; expected a 'list'"),
         (nep.sensor.JointState, {"position": [1, 2.0, False]}, "position[2] is a 'bool'; expected a 'float'"),
         (Strict, {"a": 1}, "b is missing; expected a 'str'"),
@@ -311,21 +311,21 @@ def test_mismatched_payload_is_rejected_with_its_path(declared: type, plain: obj
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
-        ("pair", [1], "pair has 1 values; give 2 values"),
-        ("pair", [1, 2], "pair[1] must be a 'str', not 'int'"),
+        ("pair", [1], "pair has 1 values; expected 2 values"),
+        ("pair", [1, 2], "pair[1] is a 'int'; expected a 'str'"),
         ("by_name", {"k": {"number": ""}}, "by_name.k.number is a 'str'; expected a 'int'"),
         ("maybe", {"number": ""}, "maybe.number is a 'str'; expected a 'int'"),
         ("maybe", 3, "maybe is a 'int'; expected a 'Part' or None"),
         ("either", 1.5, "either is a 'float'; expected a 'int' or a 'str'"),
-        ("word", "c", "word is 'c'; give 'a', 'b', 1 or None"),
-        ("word", True, "word is True; give 'a', 'b', 1 or None"),
-        ("word", 1.0, "word is 1.0; give 'a', 'b', 1 or None"),
-        ("colour", "blue", "colour is 'blue'; give 'red' or 1"),
-        ("colour", True, "colour is True; give 'red' or 1"),
-        ("colour", [], "colour is []; give 'red' or 1"),
+        ("word", "c", "word is 'c'; expected 'a', 'b', 1 or None"),
+        ("word", True, "word is True; expected 'a', 'b', 1 or None"),
+        ("word", 1.0, "word is 1.0; expected 'a', 'b', 1 or None"),
+        ("colour", "blue", "colour is 'blue'; expected 'red' or 1"),
+        ("colour", True, "colour is True; expected 'red' or 1"),
+        ("colour", [], "colour is []; expected 'red' or 1"),
         ("rights", -1.5, "rights is -1.5; expected a 'Rights'"),
-        ("day", "2026-02-30", "day is '2026-02-30'; give text such as '2026-01-31'"),
-        ("nothing", 0, "nothing is a 'int'; give None"),
+        ("day", "2026-02-30", "day is '2026-02-30'; expected a string such as '2026-01-31'"),
+        ("nothing", 0, "nothing is a 'int'; expected None"),
         ("strict", {}, "strict.b is missing; expected a 'str'"),
     ],
 )
@@ -365,13 +365,13 @@ def test_error_in_post_init_is_reported_as_decode_error_with_its_path() -> None:
         (Pose(position=Vector3()), "position is a 'Vector3'; expected a 'Point'", "position"),
         (Pose(position={"x": 1}), "position is a 'dict'; expected a 'Point'", "position"),
         (Part(1 << 64), "number does not fit into 64 bits; expected a 'int'", "number"),
-        (Part(-(1 << 63) - 1), "number does not fit into 64 bits; give a 'int'", "number"),
+        (Part(-(1 << 63) - 1), "number does not fit into 64 bits; expected a 'int'", "number"),
         (Part(word="\ud800"), "word contains an unpaired surrogate; use valid Unicode text", "word"),
         (Vector3(10**400), "x is too large; expected a 'float'", "x"),
         (Vector3(y=True), "y is a 'bool'; expected a 'float'", "y"),
         (Vector3(y=None), "y is a 'NoneType'; expected a 'float'", "y"),
         (Vector3(y=np.zeros(2)), "y is a 'ndarray'; expected a 'float'", "y"),
-        (nep.sensor.JointState(name=["a", b"b"]), "name[1] must be a 'str', not 'bytes'", "name[1]"),
+        (nep.sensor.JointState(name=["a", b"b"]), "name[1] is a 'bytes'; expected a 'str'", "name[1]"),
         (nep.sensor.JointState(position={1.0}), "position is a 'set'; expected a 'list'", "position"),
     ],
 )  # fmt: skip
@@ -384,7 +384,7 @@ def test_dict_published_on_a_typed_topic_is_validated() -> None:
     assert json.loads(bytes(encode({"b": "x", "a": 3}).data)) == {"b": "x", "a": 3}
     assert unsent({"b": "x", "aa": 1}, Strict) == ("aa is not a field of 'Strict'; did you mean 'a'?", "aa")
     assert unsent({"a": 1}, Strict) == ("b is missing; expected a 'str'", "b")
-    assert unsent({"b": 1}, Strict) == ("b must be a 'str', not 'int'", "b")
+    assert unsent({"b": 1}, Strict) == ("b is a 'int'; expected a 'str'", "b")
     assert unsent([], Strict) == ("publish a 'Strict'", "")
     assert unsent({1: 1}, Strict)[1] == "1"
 

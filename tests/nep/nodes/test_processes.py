@@ -242,7 +242,7 @@ def test_interpreter_exits_immediately_with_empty_queue(master: Master) -> None:
     code = """
     import nep, time
     from nep import nodes
-    nodes.FLUSH_S = 50.0
+    nodes.FLUSH_TIMEOUT_S = 50.0
     node = nep.node("p")
     pub, sub = node.new_pub("topic"), node.new_sub("topic")
     pub.publish(1)

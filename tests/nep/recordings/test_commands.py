@@ -207,14 +207,14 @@ def test_play_command_publishes_only_the_named_topics(path, master, capfd):
 @pytest.mark.parametrize(
     ("words", "error", "said"),
     [
-        ((), typer.BadParameter, "name the topics"),
+        ((), typer.BadParameter, "specify the topics"),
         (("/arm/joint",), typer.BadParameter, "did you mean '/arm/joints'"),
         (("/pepper/command",), typer.BadParameter, "then add --allow-moving /pepper/command"),
         (("/*/command",), typer.BadParameter, "then add --allow-moving /pepper/command"),
         (("robot_action",), typer.BadParameter, "moves own; .*then add --allow-moving own"),
         (("--all", "--speed", "0"), typer.BadParameter, "^0 .*0\\.1 to 10"),
         (("/arm/joints", "--remap", "/x=/y"), typer.BadParameter, "--remap OLD=NEW"),
-        (("/arm/joints", "--from", "5"), typer.BadParameter, "outside the recording"),
+        (("/arm/joints", "--from", "5"), typer.BadParameter, "within the recording"),
         (("/arm/joints", "--remap", "/arm/joints=robot_action"), typer.BadParameter, "moves own"),
         (
             ("/arm/joints", "--remap", "/arm/joints=/Fido/command"),

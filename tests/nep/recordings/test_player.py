@@ -140,7 +140,7 @@ def test_loop_repeats_a_range_until_it_is_ended(recording, times):
     found = [seq for _at, seq in run(playback, clock, 3.0)]
     assert found[: 2 * COUNT] == [*range(COUNT), *range(COUNT)]  # the first one, too, each time
     for part in ((5, 5), (times[9], times[3])):
-        with pytest.raises(ValueError, match="outside the recording"):
+        with pytest.raises(ValueError, match="within the recording"):
             playback.loop(*part)
 
 

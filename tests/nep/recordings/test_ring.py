@@ -123,9 +123,9 @@ def test_segments_of_dead_processes_are_removed_and_others_kept(tmp_path):
 
 
 def test_invalid_flight_recorder_requests_raise_errors(tmp_path):
-    with pytest.raises(ValueError, match="above 0"):
+    with pytest.raises(ValueError, match="greater than 0"):
         FlightRecorder(tmp_path, seconds=0.0)
-    with pytest.raises(ValueError, match="above 0"):
+    with pytest.raises(ValueError, match="greater than 0"):
         FlightRecorder(tmp_path, seconds=float("nan"))
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(RecordingError):
@@ -156,7 +156,7 @@ def test_saving_an_empty_or_closed_flight_recorder_raises(tmp_path):
         ring.save(tmp_path / "a.mcap", 1.0)
     ring.post([json_message(1)])
     for wrong in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match="above 0"):
+        with pytest.raises(ValueError, match="greater than 0"):
             ring.save(tmp_path / "a.mcap", wrong)
     ring.close()
     ring.close()

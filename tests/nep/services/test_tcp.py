@@ -119,7 +119,7 @@ def test_client_that_shuts_down_its_sending_side_receives_its_replies(node: nep.
     ("said", "reason"),
     [
         (b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", "542393671 bytes"),
-        (b"\0\0\0\0", "declares 0 bytes"),
+        (b"\0\0\0\0", "invalid call size: 0 bytes"),
         (struct.pack("<I", 16 + 2**26 + 1), "67108881 bytes"),
         (b"\xff" * 1000, "4294967295 bytes"),
     ],

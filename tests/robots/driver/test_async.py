@@ -191,7 +191,7 @@ def test_coroutine_that_ignores_cancellation_is_reported_until_it_ends(drone):
 
 def test_function_that_returns_an_awaitable_is_awaited(node):
     class Wrapped:
-        ran: list[str] = []  # noqa: RUF012 - read after the robot has ended
+        ran: list[str] = []  # noqa: RUF012 - read after the robot's driver is closed
 
         @action("go", "Movement", "move")
         def go(self, call: Call):  # as a decorator of the driver's own may make it
@@ -221,7 +221,7 @@ def test_closed_event_loop_rejects_coroutines_without_warning():
 
     loop = EventLoop("test")
     loop.close()
-    with pytest.raises(RuntimeError, match="the robot has ended"):
+    with pytest.raises(RuntimeError, match="the robot's driver is closed"):
         loop.run(never())
 
 

@@ -174,7 +174,7 @@ def test_carrying_the_robot_does_not_count_as_moved_distance(turtle) -> None:
     eventually(lambda: ears.answers("1") and any(a["feedback"] for a in ears.answers("1")))
     body.wheels.apply_change({"hold": True})
     body.wheels.apply_change({"move": "robot", "x": 0.5, "y": 1.2})
-    body.wheels.act({"hold": False})
+    body.wheels.apply_change({"hold": False})
     assert near(ears.final("1")["output"]["moved"], 0.4, 0.05)
     eventually(lambda: math.hypot(pose(ears)[0] - 0.5, pose(ears)[1] - 1.2) > 0.15)
 
@@ -184,7 +184,7 @@ def test_triggered_colour_event_is_validated_against_the_description(turtle) -> 
     for wrong in ({"name": "pink"}, {"name": "red", "area": 3}, {"name": "red", "x": "left"}, {}):
         body.wheels.apply_change({"happen": "colour", **wrong})
     body.wheels.apply_change({"happen": "bump", "side": "top"})
-    body.wheels.act({"happen": "colour", "name": "green", "area": 0.5})
+    body.wheels.apply_change({"happen": "colour", "name": "green", "area": 0.5})
     eventually(lambda: {"name": "green", "x": 0.0, "area": 0.5} in ears.heard["colour"])
     assert all(told["name"] != "pink" and told["area"] <= 1 for told in ears.heard["colour"])
     assert ears.heard["bump"] == []
