@@ -20,7 +20,7 @@ topics = (
     topic("/odom", "b->a"), topic("/camera", "b->a"), topic("/cmd_vel", "a->b", "geometry_msgs/Twist"),
     topic("/said", "both", "json"), topic("/picture", "a->b"),
 )
-sides = side_configuration("zeromq", sys.argv[1]), side_of("ros", sys.argv[2])
+sides = side_configuration("zeromq", sys.argv[1]), side_configuration("ros", sys.argv[2])
 with Bridge(BridgeConfiguration("test", *sides, topics)) as bridge:
     assert bridge.wait_until_ready(30.0)
     print("ready")

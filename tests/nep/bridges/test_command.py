@@ -103,7 +103,7 @@ def test_every_message_between_processes_is_accounted_for(file, nodes):
 def test_ctrl_c_exits_silently_and_removes_the_bridge_nodes(file, nodes):
     on_a, on_b = nodes
     with running(COMMAND, "bridge", file('[[topics]]\na = "/t"\n')) as program:
-        heads = "topic rate received sent lost thinned failed dropped waiting returned"
+        heads = "topic rate received sent lost throttled failed dropped waiting returned"
         assert program.line().split() == heads.split()
         for node, name in ((on_a, "bridge-lab-to-zenoh"), (on_b, "bridge-lab-to-zeromq")):
             eventually(

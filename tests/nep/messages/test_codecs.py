@@ -172,8 +172,8 @@ def test_arbitrary_bytes_after_timestamp_or_map_header_decode_or_raise_decode_er
         ("image", np.zeros((2, 2, 3), bool), "its elements are 'bool'; use uint8, int8, uint16"),
         ("image", np.zeros((2, 2, 3), np.complex64), "its elements are 'complex64'; use uint8"),
         ("image", np.zeros((2, 2, 5), np.uint8), r"\(2, 2, 5\) is not a valid image shape"),
-        ("image", np.zeros((2,), np.uint8), r"\(2,\) is not the shape of an image"),
-        ("image", np.zeros((0, 5, 3), np.uint8), r"\(0, 5, 3\) is not the shape of an image"),
+        ("image", np.zeros((2,), np.uint8), r"\(2,\) is not a valid image shape"),
+        ("image", np.zeros((0, 5, 3), np.uint8), r"\(0, 5, 3\) is not a valid image shape"),
     ],
 )
 def test_unsupported_payload_raises_encode_error(name: str, payload: object, sentence: str) -> None:

@@ -108,10 +108,10 @@ def test_image_unsupported_by_the_format_raises_encode_error(
         ({"kind": "gif"}, "kind is 'gif'; use 'auto', 'jpeg', 'png' or 'raw'"),
         ({"quality": 0}, "quality must be a whole number from 1 to 100, not 0"),
         ({"quality": 101}, "quality must be a whole number from 1 to 100, not 101"),
-        ({"quality": 50.0}, "quality is 50.0; it must be a whole number"),
+        ({"quality": 50.0}, "quality must be a whole number from 1 to 100, not 50.0"),
         ({"width": 0}, "width must be a whole number from 1 to 65535, not 0"),
-        ({"width": -1}, "width is -1; it must be a whole number"),
-        ({"width": True}, "width is True; it must be a whole number"),
+        ({"width": -1}, "width must be a whole number from 1 to 65535, not -1"),
+        ({"width": True}, "width must be a whole number from 1 to 65535, not True"),
     ],
 )
 def test_invalid_image_format_is_rejected(given: dict[str, Any], sentence: str) -> None:

@@ -148,7 +148,7 @@ class Plain:
         (Unhashable, "Unhashable.inner is a "),
         (TwoMaps, "TwoMaps.inner is a 'tests.nep.messages.test_typed_declarations.Part |"),
         (TwoTexts, "TwoTexts.inner is a "),
-        (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', two types that look the same in JSON"),
+        (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', whose types can't be distinguished in JSON"),
         (Unknown, "the type hints of 'Unknown' can't be resolved: name 'NowhereToBeFound' is not defined"),
         (Private, "Private._inner is not sent; add a default value"),
         (
@@ -164,7 +164,7 @@ class Plain:
         ),
         (
             OwnConstructor,
-            "OwnConstructor.another is required by the constructor but is not a field that is sent",
+            "OwnConstructor.another is required by the constructor but is not a field of the message",
         ),
         (Empty, "MSG_TYPE is empty"),
         (Numbered, "MSG_TYPE must be a 'str', not 'int'"),
@@ -200,7 +200,7 @@ def test_too_deeply_nested_types_are_rejected() -> None:
 def test_message_type_that_is_not_a_class_is_rejected(given: Any) -> None:
     with nep.node("n", "memory", master="typed-no-class") as node:
         for make in (node.new_pub, node.new_sub):
-            with pytest.raises(ValueError, match="msg_type is "):
+            with pytest.raises(ValueError, match="msg_type must be a 'str', not "):
                 make("t", given)
-        with pytest.raises(ValueError, match="msg_type is "):
+        with pytest.raises(ValueError, match="msg_type must be a 'str', not "):
             node.new_callback("t", given, print)

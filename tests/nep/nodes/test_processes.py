@@ -241,7 +241,7 @@ def test_interpreter_exit_delivers_queued_large_messages(node: nep.Node) -> None
 def test_interpreter_exits_immediately_with_empty_queue(master: Master) -> None:
     code = """
     import nep, time
-    from nep import nodes
+    import nep.nodes.node as nodes
     nodes.FLUSH_TIMEOUT_S = 50.0
     node = nep.node("p")
     pub, sub = node.new_pub("topic"), node.new_sub("topic")

@@ -248,11 +248,11 @@ def test_invalid_survey_arguments_are_rejected(make: Make) -> None:
     surveyor = node.new_surveyor("/who")
     with pytest.raises(ValueError, match="timeout_s must be .*, not -1"):
         surveyor.ask({}, -1)
-    with pytest.raises(ValueError, match="expect is 0"):
+    with pytest.raises(ValueError, match="expect must be .*, not 0"):
         surveyor.ask({}, expect=0)
     with pytest.raises(nep.EncodeError):
         surveyor.ask({1, 2})
-    with pytest.raises(ValueError, match="callback is a 'str'"):
+    with pytest.raises(ValueError, match="callback must be a function, not 'str'"):
         node.new_respondent("/who", "json")
     with pytest.raises(nep.NepError, match=rf"'{node._backend.name}' .*(master|direct connections)"):
         node.new_surveyor("/who", 1000, node.direct("127.0.0.1", 9000))

@@ -191,7 +191,7 @@ def test_coroutine_that_ignores_cancellation_is_reported_until_it_ends(drone):
 
 def test_function_that_returns_an_awaitable_is_awaited(node):
     class Wrapped:
-        ran: list[str] = []  # noqa: RUF012 - read after the robot's driver is closed
+        ran: list[str] = []  # noqa: RUF012 - read after the robot has ended
 
         @action("go", "Movement", "move")
         def go(self, call: Call):  # as a decorator of the driver's own may make it
