@@ -67,7 +67,7 @@ def test_other_node_sets_parameters_and_receives_rejection_reasons(make: Make) -
         assert (theirs.get("speed"), node.parameters["speed"]) == (1.5, 1.5)
         refusals = {
             "the parameter 'speed' cannot be 7; the maximum is 2": ("speed", 7),
-            "the parameter 'speed' cannot be 'fast'; give a 'float'": ("speed", "fast"),
+            "the parameter 'speed' cannot be 'fast'; it must be of type 'float'": ("speed", "fast"),
             "the parameter 'spead': it does not exist; did you mean 'speed'?": ("spead", 1),
             "the parameter 'serial' cannot be 'X2'; only its node can change it": ("serial", "X2"),
         }

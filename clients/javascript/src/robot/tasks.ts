@@ -353,7 +353,7 @@ export class Tasks {
   private watchPrograms(): void {
     const acting = [...this.running, ...this.queue].map((each) => each.spec.program);
     if (this.watchdog.bites(this.host.clock.now(), acting))
-      this.stop(this.takeUnasked, `its program has been silent for ${this.watchdog.patienceS} s`);
+      this.stop(this.takeUnasked, `its program hasn't responded for ${this.watchdog.patienceS} s`);
   }
 
   private tellBeat(): void {
