@@ -105,7 +105,7 @@ def test_async_receive_with_and_without_timeout(make: Make) -> None:
         assert await sub.receive_async(0.0) is None
         assert await sub.receive_async(0.02) is None
         assert await sub.listen_async(0.02) == (False, {})
-        with pytest.raises(ValueError, match="timeout_s must be .*, not -1"):
+        with pytest.raises(ValueError, match=r"timeout_s must be .*, not -1"):
             await sub.receive_async(-1)
         pub.publish_bytes(b"{no json")
         pub.publish(1)

@@ -236,7 +236,7 @@ def test_spin_rejects_invalid_nodes_and_timeouts(make: Nodes) -> None:
     for wrong in ((), (None,), (node, "b")):
         with pytest.raises(ValueError, match="'spin' requires at least one node"):
             nep.spin(*wrong)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="timeout_s must be .*, not -1"):
+    with pytest.raises(ValueError, match=r"timeout_s must be .*, not -1"):
         nep.spin(node, timeout_s=-1)
     node.new_timer(0.001, node.stop_spin)
     nep.spin(node, node)

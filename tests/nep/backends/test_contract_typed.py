@@ -235,9 +235,9 @@ def test_many_messages_keep_their_order(make: Make) -> None:
 def test_closed_subscriber_raises_closed_error(make: Make) -> None:
     a = make("a")
     sub = a.new_sub("t", Count)
-    with pytest.raises(ValueError, match="timeout_s must be .*, not -1"):
+    with pytest.raises(ValueError, match=r"timeout_s must be .*, not -1"):
         sub.listen(timeout_s=-1)
-    with pytest.raises(ValueError, match="timeout_s must be .*, not 'x'"):
+    with pytest.raises(ValueError, match=r"timeout_s must be .*, not 'x'"):
         sub.listen(timeout_s="x")
     sub.close()
     assert list(sub) == []

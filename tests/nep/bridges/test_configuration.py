@@ -109,7 +109,7 @@ def test_example_file_is_valid(monkeypatch):
         (SIDES + '[[topics]]\na = "x y"\n', "line 6 of 'lab.toml', topics[1].a: 'x y' is not a valid"),
         (SIDES + '[[topics]]\na = "/*"\nb = "/b"\n', "line 7 of 'lab.toml', topics[1].b: '/*' and '/b' have"),
         (SIDES + '[[topics]]\na = "/*/*"\n', "line 6 of 'lab.toml', topics[1].a: '/*/*' has 2 wildcards"),
-        (SIDES + ONE + 'direction = "a=>b"\n', "line 7 of 'lab.toml', topics[1].direction: unknown direction"),
+        (SIDES + ONE + 'direction = "a=>b"\n', "line 7 of 'lab.toml', topics[1].direction: unknown dir"),
         (SIDES + ONE + "max_rate_hz = 0\n", "line 7 of 'lab.toml', topics[1].max_rate_hz: it must be a n"),
         (SIDES + ONE + "max_rate_hz = nan\n", "topics[1].max_rate_hz: it must be a number"),
         (SIDES + ONE + "max_rate_hz = inf\n", "topics[1].max_rate_hz: it must be a number"),

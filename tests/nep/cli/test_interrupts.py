@@ -34,7 +34,7 @@ def looking(event, _arguments):
             os.kill(os.getpid(), signal.SIGINT)
 
 def is_ours():  # before that line of `main` it is Python's time, not ours
-    return "nep.cli.interrupts" in sys.modules and "raise_on_interrupt" in vars(sys.modules["nep.cli.interrupts"])
+    return hasattr(sys.modules.get("nep.cli.interrupts"), "raise_on_interrupt")
 
 sys.addaudithook(looking)
 sys.argv[0] = "nep"

@@ -148,7 +148,10 @@ class Plain:
         (Unhashable, "Unhashable.inner is a "),
         (TwoMaps, "TwoMaps.inner is a 'tests.nep.messages.test_typed_declarations.Part |"),
         (TwoTexts, "TwoTexts.inner is a "),
-        (TwoLists, "TwoLists.inner is a 'list[int] | tuple[str, int]', whose types can't be distinguished in JSON"),
+        (
+            TwoLists,
+            "TwoLists.inner is a 'list[int] | tuple[str, int]', whose types can't be distinguished in JSON",
+        ),
         (Unknown, "the type hints of 'Unknown' can't be resolved: name 'NowhereToBeFound' is not defined"),
         (Private, "Private._inner is not sent; add a default value"),
         (

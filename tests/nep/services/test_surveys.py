@@ -246,9 +246,9 @@ def test_invalid_survey_arguments_are_rejected(make: Make) -> None:
         with pytest.raises(ValueError, match="timeout must be"):
             node.new_surveyor("/who", timeout)
     surveyor = node.new_surveyor("/who")
-    with pytest.raises(ValueError, match="timeout_s must be .*, not -1"):
+    with pytest.raises(ValueError, match=r"timeout_s must be .*, not -1"):
         surveyor.ask({}, -1)
-    with pytest.raises(ValueError, match="expect must be .*, not 0"):
+    with pytest.raises(ValueError, match=r"expect must be .*, not 0"):
         surveyor.ask({}, expect=0)
     with pytest.raises(nep.EncodeError):
         surveyor.ask({1, 2})

@@ -86,4 +86,4 @@ def test_packaged_entry_programs_call_hold_code_before_importing_main() -> None:
     for entry in sorted(entries.glob("*_program.py")):
         lines = entry.read_text("utf-8").splitlines()
         begun = next(number for number, line in enumerate(lines) if "import main" in line)
-        assert any(line.startswith("hold_code()") for line in lines[:begun]), entry.name
+        assert any(line.startswith("keep_archive_open()") for line in lines[:begun]), entry.name

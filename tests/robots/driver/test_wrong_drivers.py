@@ -66,7 +66,7 @@ def test_valid_driver_is_accepted(tmp_path):
          "table.py, line 8: turn: the parameter after 'self' must be the call; write def NAME(self, call"),
         ("def turn(self, call: Call, far: Annotated[float, Range(-1, 1)] = 0.5)",
          "def turn(self, call: Call, *far: float)",
-         "table.py, line 8: turn: 'far' can't take a variable number of arguments; declare each parameter, or use a list"),
+         "table.py, line 8: turn: 'far' can't take a variable number of arguments; declare each"),
         ('"""Turn."""', "yield",
          "table.py, line 8: turn: actions can't be generators (yield); report progress with"),
         ('-> None:\n        """Turn."""', "-> complex: return 1j",

@@ -96,7 +96,7 @@ export class CommandDesk implements Dialect {
   private cancel(id: string, name: string, publisher: bigint | undefined): void {
     let error = this.tasks.cancel(({ spec }) => spec.id === id && spec.publisher === publisher);
     if (error === NOTHING_RUNS && this.openIds.has(id))
-      error = `only the program that started “${name || id}” can cancel it; anyone can stop`;
+      error = `only the program that started “${name || id}” can cancel it; any program can stop the robot`;
     if (error !== undefined) this.answerer(id, "cancel", name)({ state: "failed", error });
   }
 

@@ -68,7 +68,7 @@ export class MessageQueue {
     const size = message.data.length;
     if (size > this.maxMessageBytes) {
       const limit = this.maxMessageBytes / 1000;
-      const error = `the message has ${(size / 1000).toFixed(0)} kB; the limit is ${limit} kB`;
+      const error = `the message is ${(size / 1000).toFixed(0)} kB in size; the limit is ${limit} kB`;
       this.rejected.add(this.topic, error);
       return error;
     }

@@ -12,7 +12,7 @@ const GRACE_S = 1;
 const MAX_QUEUED = 50;
 const MAX_RUNNING = 50;
 const MAX_PENDING_STOPS = 2000;
-const THE_STOP = "the stop itself";
+const THE_STOP = "the stop function";
 const STOPPED_BEFORE: Answer = { state: "canceled", error: "the robot was stopped before this started" };
 
 export const NOTHING_RUNS = "no running task has this id";
@@ -99,7 +99,7 @@ export class Tasks {
         this.clearTimer?.();
         resolve();
       };
-      this.stop(end, "the driver is ending");
+      this.stop(end, "the driver is shutting down");
     });
   }
 
@@ -259,7 +259,7 @@ export class Tasks {
       await stop();
     } catch (problem) {
       if (!(problem instanceof Failed)) this.host.warn(`${this.host.name}: its stop failed. ${errorText(problem)}`);
-      const why = problem instanceof Failed ? errorText(problem) : `its stop failed: ${errorText(problem)}`;
+      const why = problem instanceof Failed ? errorText(problem) : `the stop command failed: ${errorText(problem)}`;
       error = this.mayMove(why);
     }
     this.act(() => this.stopEnded(run, error));
