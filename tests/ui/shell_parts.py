@@ -138,7 +138,7 @@ class Answers:
         if self.path is not None:
             take(self.path)
 
-    def choose_folder(self, folder: str, take: Callable[[Path], None]) -> None:
+    def select_folder(self, folder: str, take: Callable[[Path], None]) -> None:
         self.asked.append(f"folder {folder}")
         if self.path is not None:
             take(self.path)

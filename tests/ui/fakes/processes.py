@@ -84,7 +84,7 @@ class Runner:
     def does(self, *blocks: str, says: str = "") -> None:
         """The program is at these blocks now."""
         self._blocks, self._says = blocks, says
-        self._tell("running", blocks=blocks, says=says)
+        self._tell("running", blocks=blocks, description=says)
 
     def warns(self, block: str, sentence: str, count: int = 1) -> None:
         """A block lost its robot to another script, so often."""
@@ -92,14 +92,14 @@ class Runner:
 
     def fails(self, block: str, sentence: str) -> None:
         """A block fails, and with it the program."""
-        self._tell("error", blocks=(block,), text=sentence, ok=False)
+        self._tell("error", blocks=(block,), text=sentence, is_ok=False)
         self.ends(ok=False)
 
     def ends(self, *, ok: bool = True, why: str = "") -> None:
         """The program comes to its end; ``why`` it did not end well."""
         if self.state != "ended":
             self.state = "ended"
-            self._tell("ended", ok=ok, text=why)
+            self._tell("ended", is_ok=ok, text=why)
 
     def set_pace(self, seconds: float) -> None:
         self.pace_s = seconds
@@ -112,11 +112,11 @@ class Runner:
 
     def pause(self) -> None:
         self.state = "paused"
-        self._tell("paused", blocks=self._blocks, says=self._says)
+        self._tell("paused", blocks=self._blocks, description=self._says)
 
-    def go_on(self) -> None:
+    def resume(self) -> None:
         self.state = "running"
-        self._tell("running", blocks=self._blocks, says=self._says)
+        self._tell("running", blocks=self._blocks, description=self._says)
 
     def step(self) -> None:
         self.pause()

@@ -27,7 +27,7 @@ class Editor:
         self.data = data
         self.asked: list[tuple[str, str]] = []
 
-    def pdf(self, title: str, date: str, _layout: QPageLayout, done: Callable[[bytes], None]) -> None:
+    def render_pdf(self, title: str, date: str, _layout: QPageLayout, done: Callable[[bytes], None]) -> None:
         self.asked.append((title, date))
         done(self.data)
 

@@ -180,7 +180,7 @@ def test_settings_show_whether_the_robot_voice_is_available(
 ) -> None:
     class Silent:
         problem = "This computer has no voice for French."
-        busy = False
+        is_busy = False
 
         def stop(self) -> None:
             """Nobody speaks."""

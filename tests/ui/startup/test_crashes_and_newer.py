@@ -34,7 +34,7 @@ class Run:
     def left(self) -> list[Crash]:
         return [self._left.pop() for _each in list(self._left)]
 
-    def expect_end(self) -> None:
+    def expect_exit(self) -> None:
         self.is_asked = True
 
 

@@ -14,7 +14,7 @@ class Link:
     robot: Robot = field(default_factory=robot)
     values: dict[str, object] = field(default_factory=dict)
     state: str = "ready"
-    connected: bool = True
+    is_connected: bool = True
 
 
 class Fleet:
@@ -41,4 +41,4 @@ def test_unknown_sensor_values_are_blank() -> None:
 def test_values_of_a_silent_robot_are_stale_and_a_disconnected_robot_has_none() -> None:
     _, old = sensor_texts(Fleet(Pepper=Link(values=TOLD, state="silent")), SENSORS)
     assert old == {"Pepper/battery", "Pepper/pose/x", "Pepper/sees_face"}
-    assert sensor_texts(Fleet(Pepper=Link(values=TOLD, connected=False)), SENSORS) == ({}, set())
+    assert sensor_texts(Fleet(Pepper=Link(values=TOLD, is_connected=False)), SENSORS) == ({}, set())
