@@ -74,13 +74,13 @@ def test_no_engine_is_created_before_the_first_speech(speaker, engine) -> None:
 
 def test_voice_is_busy_until_its_engine_has_finished(qtbot, speaker, engine) -> None:
     speaker.speak("Hello", "en", 0.5)
-    assert speaker.busy
+    assert speaker.is_busy
     qtbot.waitUntil(lambda: engine.end is not None)
     assert engine.did == [("Hello", 0.5)]
-    assert speaker.busy
+    assert speaker.is_busy
     assert engine.threads == {"robots' voice"}
     engine.end()
-    qtbot.waitUntil(lambda: not speaker.busy)
+    qtbot.waitUntil(lambda: not speaker.is_busy)
     assert speaker.problem == ""
 
 
@@ -89,9 +89,9 @@ def test_slow_engine_does_not_block_the_caller_and_stop_overtakes_it(qtbot, spea
     speaker.speak("Hello", "en", 0.5)
     speaker.play(((440.0, 0.1),), 0.5)
     assert engine.begins.wait(20)  # the window goes on while it begins
-    assert speaker.busy
+    assert speaker.is_busy
     speaker.stop()
-    assert not speaker.busy
+    assert not speaker.is_busy
     speaker.speak("Again", "en", 0.5)
     engine.may_begin.set()
     qtbot.waitUntil(lambda: engine.end is not None)
@@ -113,7 +113,7 @@ def test_late_end_of_a_stopped_speech_does_not_end_the_next_one(qtbot, speaker, 
 
 def test_language_without_a_voice_ends_at_once_with_a_reason(qtbot, speaker) -> None:
     speaker.speak("Bonjour", "fr", 0.5)
-    qtbot.waitUntil(lambda: not speaker.busy)
+    qtbot.waitUntil(lambda: not speaker.is_busy)
     assert speaker.problem == "This computer has no voice for French."
     speaker.speak("Hello", "en", 0.5)
     qtbot.waitUntil(lambda: speaker.problem == "")
@@ -125,7 +125,7 @@ def test_failing_engine_leaves_the_speaker_silent_with_a_reason(qtbot, caplog) -
 
     speaker = QtSpeaker(broken)
     speaker.speak("Hello", "en", 0.5)
-    qtbot.waitUntil(lambda: not speaker.busy)
+    qtbot.waitUntil(lambda: not speaker.is_busy)
     assert speaker.problem == "This computer plays no sound."
     speaker.close()
     assert "no sound server" in caplog.text
@@ -134,7 +134,7 @@ def test_failing_engine_leaves_the_speaker_silent_with_a_reason(qtbot, caplog) -
 def test_speaker_without_audio_libraries_is_silent_with_a_reason(qtbot) -> None:
     speaker = QtSpeaker(QtEngine)
     speaker.speak("Hello", "en", 0.5)
-    qtbot.waitUntil(lambda: not speaker.busy)
+    qtbot.waitUntil(lambda: not speaker.is_busy)
     assert speaker.problem == "This computer has no voice for English."
     speaker.play(((440.0, 0.1),), 0.5)
     qtbot.waitUntil(lambda: len(speaker._problems) == 2)

@@ -77,7 +77,7 @@ from app.ui.startup.single_instance import StartRequest, pass_to_running
 print("begun", flush=True)
 turn = FileLock(Path(sys.argv[2]))
 there = pass_to_running(sys.argv[1], StartRequest((Path("a.nepb"),)), turn, 60.0)
-print("pass_to_running" if there else "first", flush=True)
+print("passed" if there else "first", flush=True)
 sys.stdin.read()
 """
 
@@ -103,7 +103,7 @@ def test_second_of_two_simultaneous_starts_waits_for_the_window_of_the_first(
     assert process.stdout.readline() == "begun\n"
     meeting = meet(name, asked.append)
     qtbot.waitUntil(lambda: bool(asked), timeout=12 * WAIT_MS)
-    assert process.communicate(timeout=60)[0] == "found\n"
+    assert process.communicate(timeout=60)[0] == "passed\n"
     meeting.close()
     turn.release()
 

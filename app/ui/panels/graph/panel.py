@@ -128,7 +128,7 @@ class GraphPanel(PanelWidget):
         theme = self.theme
         self._own = QAction(_("Show NEP's own topics"), self)
         self._own.setCheckable(True)
-        self._own.toggled.connect(lambda on: self._update_choices(shows_own=on))
+        self._own.toggled.connect(lambda on: self._update_choices(shows_internal=on))
         self._anew = QAction(theme.icon("refresh-cw"), _("Rearrange"), self)
         self._anew.triggered.connect(lambda _on=False: self._reset_layout())
 
@@ -138,7 +138,9 @@ class GraphPanel(PanelWidget):
         tools.filter.exited.connect(lambda: canvas.setFocus(Qt.FocusReason.ShortcutFocusReason))
         tools.group.changed.connect(self._group_by)
         tools.quiet.clicked.connect(
-            lambda: self._update_choices(hides_quiet=tools.quiet.isChecked(), quiet_shown=frozenset())
+            lambda: self._update_choices(
+                hides_quiet=tools.quiet.isChecked(), quiet_visible_groups=frozenset()
+            )
         )
         tools.services.clicked.connect(
             lambda: self._update_choices(shows_services=tools.services.isChecked())
@@ -231,12 +233,12 @@ class GraphPanel(PanelWidget):
         choices = self._choices
         if len(facts.nodes) > MAX_EXPANDED_NODES and not (choices.starts_collapsed or choices.toggled):
             self._layout = None
-            self._update_choices(starts_closed=True)
+            self._update_choices(starts_collapsed=True)
         graph = node_graph(facts, self._choices)
         self.pages.setCurrentIndex(0 if facts.nodes else 1)
         self.export.setVisible(bool(facts.nodes))
         if not facts.nodes:
-            self._update_choices(starts_closed=False)
+            self._update_choices(starts_collapsed=False)
             self._update_empty_state()
         self._update_counts(graph)
         if graph != self._asked:
@@ -321,14 +323,14 @@ class GraphPanel(PanelWidget):
         for group_by in GROUPS:
             if group_by == name:
                 self._layout = None
-                self._update_choices(group_by=group_by, toggled=frozenset(), quiet_shown=frozenset())
+                self._update_choices(group_by=group_by, toggled=frozenset(), quiet_visible_groups=frozenset())
 
     def _toggle(self, group: str) -> None:
         self._layout = None
         self._update_choices(toggled=self._choices.toggled ^ {group})
 
     def _show_quiet(self, group: str) -> None:
-        self._update_choices(quiet_shown=self._choices.quiet_visible_groups | {group})
+        self._update_choices(quiet_visible_groups=self._choices.quiet_visible_groups | {group})
 
     def _reset_layout(self) -> None:
         self._layout = self._asked = self._coming = None
@@ -347,7 +349,7 @@ class GraphPanel(PanelWidget):
             now = GROUPS.index(self._choices.group_by)
             self._group_by(GROUPS[(now + 1) % len(GROUPS)])
         elif letter == "h":
-            self._update_choices(hides_quiet=not self._choices.hides_quiet, quiet_shown=frozenset())
+            self._update_choices(hides_quiet=not self._choices.hides_quiet, quiet_visible_groups=frozenset())
         elif letter == "s":
             self._update_choices(shows_services=not self._choices.shows_services)
 

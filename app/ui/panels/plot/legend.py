@@ -147,7 +147,7 @@ def columns(
         is_gone: Returns True for a curve whose topic no longer exists.
     """
     cells = _Cells(figures, is_gone)
-    between = {"figures": True, "when": has_cursors}
+    between = {"is_numeric": True, "is_available": has_cursors}
     return (
         Column("eye", "", 34, cells.eye, label=lazy("Shown")),
         Column("stroke", "", 48, cells.stroke, label=lazy("Colour and axis")),

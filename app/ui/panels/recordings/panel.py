@@ -85,9 +85,9 @@ class RecordingsPanel(TablePanel[RecordingFacts]):
 
     def _connect(self) -> None:
         details = self.details
-        self.table.chosen.connect(lambda _key: self._show_details())  # type: ignore[attr-defined]
-        self.table.rename_wanted.connect(self._rename)  # type: ignore[attr-defined]
-        self.table.delete_wanted.connect(self._delete)  # type: ignore[attr-defined]
+        self.table.selected.connect(lambda _key: self._show_details())  # type: ignore[attr-defined]
+        self.table.rename_requested.connect(self._rename)  # type: ignore[attr-defined]
+        self.table.delete_requested.connect(self._delete)  # type: ignore[attr-defined]
         details.open.clicked.connect(lambda: self._run_on_selected(self.open_row))
         details.rename.clicked.connect(lambda: self._run_on_selected(self._rename))
         details.delete.clicked.connect(lambda: self._run_on_selected(self._delete))

@@ -168,7 +168,7 @@ class RecordSheet(Overlay):
         self.ends_min.setAccessibleName(_("Stop after (minutes)"))
         self.ends_gb = NumberEdit(theme, MIN_GB, MAX_GB, "GB", 1, empty=True)
         self.ends_gb.setAccessibleName(_("Stop at (GB)"))
-        for field, name in ((self.ends_min, "ends_min"), (self.ends_gb, "ends_gb")):
+        for field, name in ((self.ends_min, "max_minutes"), (self.ends_gb, "max_gb")):
             field.setFixedWidth(round(theme.scaled(NUMBER_WIDE)))
             field.number.connect(lambda value, name=name: self._change(**{name: value}))
             field.cleared.connect(lambda name=name: self._change(**{name: None}))
@@ -569,7 +569,7 @@ class RecordSheet(Overlay):
         if problem:
             self._show_ring_problem(problem)
         else:
-            self._update_flight_recorder(patterns=wanted, left_out=unwanted)
+            self._update_flight_recorder(patterns=wanted, excluded=unwanted)
 
     def _show_ring_problem(self, sentence: str) -> None:
         self.ring_words.setText(sentence or self.ring_words.text())
