@@ -98,16 +98,16 @@ def test_blocks_dropped_elsewhere_return_and_on_plus_create_a_behaviour(studio: 
 def test_tab_opens_under_dragged_blocks_and_the_drag_continues_there(studio: Studio) -> None:
     before = shown(studio)
     carry(studio, "say Two", *place_of(studio, "Quiz"))
-    picture = studio.find(kind="CarriedPicture")["rect"]
+    picture = studio.find(kind="DragImage")["rect"]
     x, y = place_of(studio, "Quiz")
     assert 0 < picture[0] - x < 40, "it is at the mouse"
     assert 0 < picture[1] - y < 40
     until(lambda: "say Four" in shown(studio), "the tab has opened")
-    assert studio.find(kind="CarriedPicture"), "the blocks are still in the hand"
+    assert studio.find(kind="DragImage"), "the blocks are still in the hand"
     left, top, wide, high = studio.spot(PATH.format("say Four"))
     bottom = top + high
     studio.screen.move(*middle(studio.spot(f"{VISIBLE} .blocklyToolbox")))
-    until(lambda: not studio.all(kind="CarriedPicture"), "the page shows them itself")
+    until(lambda: not studio.all(kind="DragImage"), "the page shows them itself")
     studio.screen.glide(left + 60, bottom + 60)
     there = studio.spot(PATH.format("say Four"))
     assert there == pytest.approx((left, top, wide, high), abs=1), "nothing on the page moves for them"

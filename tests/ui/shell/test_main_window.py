@@ -791,7 +791,7 @@ def test_demo_option_starts_the_demo_except_in_self_drive_mode(
 ) -> None:
     begun: list[str] = []
     monkeypatch.setattr(window, "start_session", lambda: None)
-    monkeypatch.setattr(commands.behaviours, "demo", lambda: begun.append("demo"))
+    monkeypatch.setattr(commands.behaviours, "start_demo", lambda: begun.append("demo"))
     for step in show_first_page(window, Options(demo=True, self_drive=tmp_path)):
         step()
     assert begun == []

@@ -134,12 +134,12 @@ def test_image_of_a_paused_recording_is_not_silent_and_keeps_its_recorded_age(
     image.show_topic("/camera")
     until(qtbot, window, lambda: image.view.picture is not None)
     stream, later = image._stream, time.monotonic() + 60.0
-    assert stream.stamped_s == pytest.approx((whole[47][0] - image.view.picture.stamp_ns) / 1e9, abs=1e-3)
+    assert stream.stamp_age_s == pytest.approx((whole[47][0] - image.view.picture.stamp_ns) / 1e9, abs=1e-3)
     replay.images.clock = lambda: later
     assert stream.silent_s > 50.0
     window.tick()
     assert stream.silent_s == 0.0
-    assert "Last image" not in image.view.words
+    assert "Last image" not in image.view.label_text
 
 
 def test_robots_and_alarms_use_the_live_network_during_a_replay(qtbot, window, session, path):

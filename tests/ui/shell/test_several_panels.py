@@ -150,7 +150,7 @@ def test_panels_are_restored_with_their_topics_after_restart(qtbot, bench, windo
     qtbot.waitUntil(
         lambda: all(bench.docks[key].is_displayed() for key in ("inspector", "inspector#2", "image#2"))
     )
-    places = {key: dock.geometry() for key, dock in bench.docks.items() if dock.shown()}
+    places = {key: dock.geometry() for key, dock in bench.docks.items() if dock.is_displayed()}
     kept = json.loads(json.dumps(bench.save()))
     bench.reset_layout()
     assert "inspector#2" not in bench.docks
@@ -225,7 +225,7 @@ def test_menu_and_palette_list_the_additional_panels(bench, window) -> None:
     assert entries["Inspector 2"].isChecked()
     entries["Inspector 2"].trigger()
     assert "inspector#2" not in bench.docks
-    found = {entry.words: entry for entry in window.commands.view._entries.all()}
+    found = {entry.text: entry for entry in window.commands.view._entries.all()}
     window.commands.view.run_entry(found["Another panel: Inspector"])
     assert "inspector#2" in bench.docks
 

@@ -130,7 +130,7 @@ def test_topic_figures_are_updated_in_place_and_keep_selection_and_expansion(des
     server, model, table = with_pages(desk), desk.sheet.model, desk.sheet.table
     table.setExpanded(model.index(0, 0), False)
     table.setCurrentIndex(model.index(0, 0, model.index(1, 0)))
-    server.change_topic(2, rate=12.0)
+    server.change_topic(2, rate_hz=12.0)
     server.pages = (*server.pages, page(3, CAMERA))
     desk.sheet.refresh()
     assert [table.isExpanded(model.index(row, 0)) for row in range(3)] == [False, True, True]
@@ -171,7 +171,7 @@ def test_refreshing_many_pages_takes_less_than_a_frame(desk: Desk) -> None:
     assert sheet.model.rowCount() == 100
     told: list[int] = []
     sheet.model.dataChanged.connect(lambda *_args: told.append(1))
-    server.change_topic(7, rate=2.0)
+    server.change_topic(7, rate_hz=2.0)
     sheet.refresh()
     assert len(told) == 2  # the page and its topic; nothing else is repainted
 
