@@ -209,7 +209,7 @@ def test_f1_explains_the_focused_block_and_otherwise_reaches_the_window(qtbot, v
     goes_to(them, "wait")
     qtbot.waitUntil(lambda: view._on_block, timeout=WAIT_MS)
     press(them, Qt.Key_F1)
-    them.wait_for(f"({CARD}).includes('Waits that many seconds')")
+    them.wait_for(f"({CARD}).includes('Waits this number of seconds')")
     goes_to(them, "Close help")
     assert "secondsa number; 2 by default" in them.ask(CARD)
     press(them, Qt.Key_Escape)
@@ -228,7 +228,7 @@ def test_context_menu_help_explains_blocks_on_canvas_and_in_the_toolbox(view, th
     them.wait_for(f"{number_of} >= 0")
     them.ask(f"document.querySelectorAll('.blocklyMenuItem')[{number_of}].setAttribute('data-test', 'help')")
     them.click("[data-test=help]")
-    them.wait_for(f"({CARD}).includes('Waits that many seconds')")
+    them.wait_for(f"({CARD}).includes('Waits this number of seconds')")
 
 
 def test_colour_is_chosen_with_the_keyboard(qtbot, view, person):

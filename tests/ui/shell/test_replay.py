@@ -234,9 +234,9 @@ def test_keys_play_step_bookmark_and_zoom(qtbot, window, session, path, whole):
     press(Qt.Key.Key_L)
     until(qtbot, window, lambda: not replay.player.is_looping)
     press(Qt.Key.Key_Plus)
-    assert not canvas.scale.is_whole
+    assert not canvas.scale.is_full
     press(Qt.Key.Key_0)
-    assert canvas.scale.is_whole
+    assert canvas.scale.is_full
     press(Qt.Key.Key_Down)
     assert replay.chosen == "/camera"
     press(Qt.Key.Key_Space)
@@ -252,7 +252,7 @@ def test_mouse_seeks_selects_and_zooms(qtbot, window, session, path, whole):
     QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(x, 10))
     at_ns = canvas.time_at(x)
     until(qtbot, window, lambda: replay.player.position_ns == at_ns)
-    y = round(canvas._top() + 1.5 * canvas._row())
+    y = round(canvas._lanes_top() + 1.5 * canvas._row_height())
     QTest.mouseClick(canvas.viewport(), Qt.MouseButton.LeftButton, pos=QPoint(20, y))
     assert replay.chosen == "/camera"
     assert replay.player.position_ns == at_ns

@@ -157,8 +157,8 @@ def columns(
         Column("a", "A", 70, cells.at_a, hide_order=2, **between),  # type: ignore[arg-type]
         Column("b", "B", 70, cells.at_b, hide_order=2, **between),  # type: ignore[arg-type]
         Column("difference", f"B {MINUS} A", 86, cells.difference, hide_order=1, **between),  # type: ignore[arg-type]
-        Column("min", lazy("Min"), 70, cells.stat("least"), is_numeric=True, hide_order=4),
-        Column("max", lazy("Max"), 70, cells.stat("most"), is_numeric=True, hide_order=4),
+        Column("min", lazy("Min"), 70, cells.stat("minimum"), is_numeric=True, hide_order=4),
+        Column("max", lazy("Max"), 70, cells.stat("maximum"), is_numeric=True, hide_order=4),
         Column("mean", lazy("Mean"), 70, cells.stat("mean"), is_numeric=True, hide_order=3),
     )
 
