@@ -295,7 +295,7 @@ def test_menus_of_topics_and_nodes_offer_an_alarm(qtbot, window) -> None:
         for widget in made.header_widgets():
             qtbot.addWidget(widget)
         made.rebuild()
-        made.table.choose(key or made.model.key_of(made.model.row_at(made.model.index(0, 0))))
+        made.table.select_key(key or made.model.key_of(made.model.row_at(made.model.index(0, 0))))
         at = made.table.visualRect(made.table.currentIndex()).center()
         reason = QContextMenuEvent.Reason.Mouse
         QApplication.sendEvent(

@@ -27,18 +27,18 @@ class Editor(QWidget):
     history_changed = Signal(bool, bool)
     key_pressed = Signal(str)
     recovered = Signal()
-    sensors_offered = Signal(tuple)
-    command_wanted = Signal(str)
-    values_watched = Signal(tuple)
-    wanted = Signal(str)
-    try_asked = Signal(str)
+    visible_sensors_changed = Signal(tuple)
+    command_requested = Signal(str)
+    watched_variables_changed = Signal(tuple)
+    canvas_button_pressed = Signal(str)
+    try_requested = Signal(str)
     toolbox_pinned = Signal(bool)
     blocks_deleted = Signal(int)
-    block_carried = Signal(object, str)
-    carried_seen = Signal(bytes, float)
-    block_dropped = Signal(QPoint)
-    blocks_brought = Signal(int, str, str)
-    backpack_asked = Signal(str)
+    blocks_dragged_outside = Signal(object, str)
+    drag_picture_rendered = Signal(bytes, float)
+    blocks_dropped_outside = Signal(QPoint)
+    blocks_transferred = Signal(int, str, str)
+    backpack_requested = Signal(str)
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -190,10 +190,10 @@ def test_sensors_in_the_open_flyout_are_watched_until_it_closes(panel, window) -
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
     assert window.session.looked_at == []
-    editor(panel).sensors_offered.emit((("Pepper", "battery"), ("NAO", "battery")))
+    editor(panel).visible_sensors_changed.emit((("Pepper", "battery"), ("NAO", "battery")))
     assert window.session.looked_at == ["Pepper"]
     assert editor(panel).last("set_live_values") == {"Pepper/battery": "84 %"}
-    editor(panel).sensors_offered.emit(())
+    editor(panel).visible_sensors_changed.emit(())
     assert window.session.looked_at == []
     assert editor(panel).last("set_live_values") == {}
 
@@ -201,7 +201,7 @@ def test_sensors_in_the_open_flyout_are_watched_until_it_closes(panel, window) -
 def test_robot_that_connects_while_its_sensors_are_shown_is_watched(panel, window) -> None:
     window.session.document.sensors, window.session.document.edits = (), 5
     panel.refresh()
-    editor(panel).sensors_offered.emit((("Ada", "battery"),))
+    editor(panel).visible_sensors_changed.emit((("Ada", "battery"),))
     assert window.session.looked_at == []
     window.session.join(pepper("Ada"))
     ticks(window, panel, 6)
@@ -260,8 +260,8 @@ def test_empty_canvas_shows_the_first_step_and_its_buttons_run_commands(qtbot, q
     assert isinstance(panel, BehaviourPanel)
     qtbot.addWidget(panel.title_widget())
     assert editor(panel).told[-1] == ("set_first_step", "when started", False)
-    editor(panel).wanted.emit("robot")
-    editor(panel).wanted.emit("examples")
+    editor(panel).canvas_button_pressed.emit("robot")
+    editor(panel).canvas_button_pressed.emit("examples")
     assert window.commands == ["robots.virtual", "help.examples"]
     window.session.join(pepper())
     panel.refresh()
@@ -346,11 +346,11 @@ def test_block_dropped_on_its_own_tab_or_outside_tabs_is_not_moved(panel, window
     tabs = title.tabs
     own = tabs.tabs[window.session.document.key]
     for place in (own.mapToGlobal(own.rect().center()), own.mapToGlobal(QPoint(10, 300))):
-        editor(panel).block_carried.emit(place, window.session.document.key)
-        assert not own.is_aimed
-        editor(panel).block_dropped.emit(place)
+        editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
+        assert not own.is_drop_target
+        editor(panel).blocks_dropped_outside.emit(place)
     assert window.commands == []
-    assert editor(panel).count("bring_blocks") == 0
+    assert editor(panel).count("move_dragged_blocks") == 0
 
 
 def test_dragging_a_block_to_the_end_of_the_tab_bar_scrolls_to_hidden_tabs(
@@ -366,14 +366,14 @@ def test_dragging_a_block_to_the_end_of_the_tab_bar_scrolls_to_hidden_tabs(
         return len(asked) < 3
 
     monkeypatch.setattr(title.tabs, "scroll_at", scroll_at)
-    editor(panel).block_carried.emit(place, window.session.document.key)
+    editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
     qtbot.waitUntil(lambda: len(asked) == 3)
     scrolling = panel._carried._scrolling
     assert asked == [place] * 3
     assert not scrolling.isActive(), "nothing moved: it waits for the mouse"
-    editor(panel).block_carried.emit(place, window.session.document.key)
+    editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
     assert scrolling.isActive()
-    editor(panel).block_carried.emit(None, window.session.document.key)
+    editor(panel).blocks_dragged_outside.emit(None, window.session.document.key)
     assert not scrolling.isActive()
 
 
@@ -390,27 +390,27 @@ def test_tab_under_a_dragged_block_opens_and_the_drag_image_follows(qtbot, panel
     tab = title.tabs.tabs[other.key]
     place = tab.mapToGlobal(tab.rect().center())
     carried = panel._carried
-    editor(panel).block_carried.emit(place, home.key)
-    assert tab.is_aimed
+    editor(panel).blocks_dragged_outside.emit(place, home.key)
+    assert tab.is_drop_target
     assert carried._opening.isActive()
-    editor(panel).block_carried.emit(place + QPoint(0, 400), home.key)
+    editor(panel).blocks_dragged_outside.emit(place + QPoint(0, 400), home.key)
     assert not carried._opening.isActive(), "moved away: it stays closed"
-    editor(panel).block_carried.emit(place, home.key)
+    editor(panel).blocks_dragged_outside.emit(place, home.key)
     picture = QPixmap(60, 40)
     picture.fill(QColor("#00ff00"))
     data = QBuffer()
     data.open(QIODevice.OpenModeFlag.WriteOnly)
     picture.save(data, "PNG")
-    editor(panel).carried_seen.emit(bytes(data.data()), 2.0)
+    editor(panel).drag_picture_rendered.emit(bytes(data.data()), 2.0)
     shown = title.window().findChild(DragImage)
     assert shown is not None
     assert shown.isVisible()
     assert (shown.width(), shown.height()) == (30, 20)
     assert shown.pos() == title.window().mapFromGlobal(place) + POINTER_OFFSET
     qtbot.waitUntil(lambda: window.commands == [f"tab:{other.key}"])
-    editor(panel).block_carried.emit(None, home.key)
+    editor(panel).blocks_dragged_outside.emit(None, home.key)
     assert not shown.isVisible()
-    editor(panel).carried_seen.emit(bytes(data.data()), 2.0)
+    editor(panel).drag_picture_rendered.emit(bytes(data.data()), 2.0)
     assert not shown.isVisible(), "it came too late"
 
 
@@ -426,11 +426,11 @@ def test_block_dropped_on_a_tab_opened_during_the_drag_goes_to_that_tab(panel, w
     for key, times in ((home.key, 0), (other.key, 1)):
         tab = title.tabs.tabs[key]
         place = tab.mapToGlobal(tab.rect().center())
-        editor(panel).block_carried.emit(place, home.key)
-        assert tab.is_aimed == bool(times)
-        editor(panel).block_carried.emit(None, other.key)
-        editor(panel).block_dropped.emit(place)
-        assert editor(panel).count("bring_blocks") == times
+        editor(panel).blocks_dragged_outside.emit(place, home.key)
+        assert tab.is_drop_target == bool(times)
+        editor(panel).blocks_dragged_outside.emit(None, other.key)
+        editor(panel).blocks_dropped_outside.emit(place)
+        assert editor(panel).count("move_dragged_blocks") == times
 
 
 def test_plus_button_is_highlighted_under_a_dragged_block_and_creates_a_behaviour(panel, window) -> None:
@@ -439,13 +439,13 @@ def test_plus_button_is_highlighted_under_a_dragged_block_and_creates_a_behaviou
     title.show()
     tabs = title.tabs
     place = tabs.add.mapToGlobal(tabs.add.rect().center())
-    editor(panel).block_carried.emit(place, window.session.document.key)
-    assert tabs.add.is_aimed
-    editor(panel).block_carried.emit(None, window.session.document.key)
-    assert not tabs.add.is_aimed
-    editor(panel).block_dropped.emit(place)
+    editor(panel).blocks_dragged_outside.emit(place, window.session.document.key)
+    assert tabs.add.is_drop_target
+    editor(panel).blocks_dragged_outside.emit(None, window.session.document.key)
+    assert not tabs.add.is_drop_target
+    editor(panel).blocks_dropped_outside.emit(place)
     assert window.commands == ["file.new"]
-    assert editor(panel).count("bring_blocks") == 0, "no new one came: the block stays"
+    assert editor(panel).count("move_dragged_blocks") == 0, "no new one came: the block stays"
 
 
 def test_missing_system_libraries_replace_the_blocks_by_a_message_and_python_still_works(

@@ -63,11 +63,11 @@ def test_each_step_is_completed_by_its_evidence_and_stays_completed() -> None:
     now, done = TutorialState(), frozenset[str]()
     for change, step in (
         ({"can_speak": True}, "robot"),
-        ({"built": TutorialBlocks(started=True)}, "start"),
-        ({"built": TutorialBlocks(True, frozenset({"a"}))}, "say"),
-        ({"ran": ("a",)}, "run"),
-        ({"built": TutorialBlocks(True, frozenset({"a"}), True), "ran": ()}, "turn"),
-        ({"stopped": True}, "stop"),
+        ({"blocks": TutorialBlocks(started=True)}, "start"),
+        ({"blocks": TutorialBlocks(True, frozenset({"a"}))}, "say"),
+        ({"executed_ids": ("a",)}, "run"),
+        ({"blocks": TutorialBlocks(True, frozenset({"a"}), True), "executed_ids": ()}, "turn"),
+        ({"was_stopped": True}, "stop"),
     ):
         now = replace(now, **change)
         done, before = completed_steps(now, done), done

@@ -358,7 +358,7 @@ def test_unchanged_items_are_not_repainted(qtbot, case: Case, layout: str) -> No
 
 def test_unchanged_camera_image_is_not_repainted(qtbot, case: Case, monkeypatch) -> None:
     for module in ("app.ui.pictures.view", "app.ui.panels.camera"):
-        monkeypatch.setattr(f"{module}.SILENT_AFTER_S", 1e9)  # however busy the computer is
+        monkeypatch.setattr(f"{module}.STALE_AFTER_S", 1e9)  # however busy the computer is
     bench = case.window.show_layout("behaviour")
     camera = bench.docks["camera"]
     settle(qtbot, case, camera)

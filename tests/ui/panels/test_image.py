@@ -84,10 +84,10 @@ def test_caption_shows_frame_rate_and_image_size(view) -> None:
 
 
 def test_fluctuating_frame_rate_is_updated_once_per_second() -> None:
-    now, rates = [100.0], SimpleNamespace(shown_hz=15.4, arriving_hz=15.4)
+    now, rates = [100.0], SimpleNamespace(displayed_hz=15.4, arriving_hz=15.4)
     words = RateText(lambda: now[0])
     assert words.for_stream(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
-    rates.shown_hz = rates.arriving_hz = 15.6
+    rates.displayed_hz = rates.arriving_hz = 15.6
     now[0] += 0.9
     assert words.for_stream(rates) == "15 fps (15 shown)"  # type: ignore[arg-type]
     now[0] += 0.2
@@ -249,7 +249,7 @@ def test_image_panel_marks_detections_of_the_camera_robot(qtbot, qapp) -> None:
     assert panel.view.boxes == ()
     panel.show_topic("/Pepper/camera")
     panel.refresh()
-    assert [box.words for box in panel.view.boxes] == ["face"]
+    assert [box.label for box in panel.view.boxes] == ["face"]
     assert window.session.looked_at == ["Pepper"]
     panel.show_topic("/robot/camera")
     panel.refresh()

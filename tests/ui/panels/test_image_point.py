@@ -229,7 +229,7 @@ def test_two_clicks_at_two_positions_publish_two_points(qtbot, window, panel) ->
         for x in (20, 300):
             QTest.mouseClick(panel.view, LEFT, Qt.KeyboardModifier.NoModifier, at(panel, x + 0.5, 50.5))
     ticks(window, panel)
-    words = [each.words for each in window.session.acting.sent.records if each.asker == "image"]
+    words = [each.result_text for each in window.session.acting.sent.records if each.origin == "image"]
     assert words == ["Point (20, 50), received by 1", "Point (300, 50), received by 1"]
 
 

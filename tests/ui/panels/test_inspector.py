@@ -103,7 +103,7 @@ def test_latched_message_shows_when_it_was_sent(panel, window) -> None:
 def test_latency_of_another_computer_is_shown_with_its_uncertainty(took_ns, known, words) -> None:
     message = Message("/a", bytes(412), "bytes", "bytes", stamp_ns=10**18)
     message.kind = message_kind("/a", "bytes", "bytes", clock=PublisherClock(known))
-    message.seen_ns = 10**18 + took_ns + (0 if known is None else known.add_ns)
+    message.seen_ns = 10**18 + took_ns + (0 if known is None else known.offset_ns)
     assert message_facts(message).split("   ")[-1] == words
 
 

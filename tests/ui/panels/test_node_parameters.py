@@ -41,8 +41,8 @@ class World:
         ticks(self.window, self.panel, 2)
 
     def choose(self, node: str) -> None:
-        row = next(row for row in self.panel.model._rows.shown if row.node.name == node)
-        self.panel.table.choose(row.key)
+        row = next(row for row in self.panel.model._rows.rows if row.node.name == node)
+        self.panel.table.select_key(row.key)
         ticks(self.window, self.panel, 2)
 
     def settle(self, qtbot) -> None:

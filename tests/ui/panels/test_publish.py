@@ -251,7 +251,7 @@ def test_publish_is_in_the_menu_of_every_topic(qtbot, window) -> None:
     qtbot.addWidget(table)
     for widget in table.header_widgets():
         qtbot.addWidget(widget)
-    action = next(each for each in table.row_actions("/blackboard") if each.words == "Publish to this topic")
+    action = next(each for each in table.row_actions("/blackboard") if each.text == "Publish to this topic")
     action.run()
     assert window.commands == ["publish.topic:/blackboard"]
     assert "Publish to this topic" not in [each.words for each in table.row_actions("/robot/camera")]

@@ -353,7 +353,7 @@ def test_topic_is_recorded_from_its_menu(qtbot, folder):
     qtbot.addWidget(panel)
     for widget in panel.header_widgets():
         qtbot.addWidget(widget)
-    (run,) = (each.run for each in panel.row_actions("/odom") if each.words == "Record topic")
+    (run,) = (each.run for each in panel.row_actions("/odom") if each.text == "Record topic")
     run()
     assert window.commands == ["record.topic:/odom"]
     panel.dispose()

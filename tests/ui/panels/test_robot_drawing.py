@@ -39,8 +39,8 @@ def differing(first: QImage, second: QImage) -> int:
     [
         {"x": 1.5}, {"y": 1.0}, {"theta_deg": 30.0}, {"theta_deg": 90.0}, {"theta_deg": 180.0},
         {"head_yaw_deg": 40.0}, {"head_pitch_deg": 20.0}, {"speech": "Hello"}, {"eyes": "#ff0000"},
-        {"shoulders": "#00ff00"}, {"arm_left_deg": 90.0}, {"arm_right_deg": 180.0}, {"moving": True},
-        {"touched": ("head",)}, {"objects": (Thing("ball", 0, 1),)},
+        {"shoulders": "#00ff00"}, {"arm_left_deg": 90.0}, {"arm_right_deg": 180.0}, {"is_moving": True},
+        {"touched_parts": ("head",)}, {"objects": (Thing("ball", 0, 1),)},
             {"objects": (Thing("person", -2, 1, "Aiko"),)},
         {"objects": (Thing("person", 2, 0, "Aiko"),)}, {"objects": (Thing("marker", -2, 1),)},
     ],

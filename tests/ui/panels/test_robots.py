@@ -55,7 +55,7 @@ def test_rejected_input_is_reported_below_its_row(panel, window) -> None:
     field.set_text("")
     press(card.try_button)
     assert "not be empty" in card.form._sentences["text"].text()
-    assert field.wrong
+    assert field.is_invalid
     assert window.session.fleet.links[0].invocations == {}
 
 

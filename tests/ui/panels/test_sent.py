@@ -133,7 +133,7 @@ def test_calls_and_messages_sent_from_a_recording_have_their_own_menus(qtbot, wi
         ["Call again", "Copy the line", "Copy the request", "Open the service"],
         ["Send again (not armed)", "Copy the line", "Copy the message", "Show messages"],
     ]
-    called = next(each for each in acting.sent.records if each.asker == "service")
+    called = next(each for each in acting.sent.records if each.origin == "service")
     panel.table.opened.emit(str(called.number))
     assert window.commands[-1] == "service.call:remember_face"
     panel.table.opened.emit("12345")

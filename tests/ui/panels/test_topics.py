@@ -83,11 +83,11 @@ def test_new_topics_are_bold_until_selected(panel, window) -> None:
 def test_topics_of_robots_started_by_studio_are_not_marked_as_new(panel, window) -> None:
     window.session.launcher.restart_virtual_robot("Pepper")
     topics = [
-        Topic("/Pepper/pose", new=True, publisher_nodes=("Pepper",)),
-        Topic("/Pepper/command", new=True, publisher_nodes=("Pepper", "studio")),
-        Topic("/Pepper/world", new=True, publisher_nodes=()),
-        Topic("/Turtle/pose", new=True, publisher_nodes=("Turtle",)),
-        Topic("/nobody", new=True, publisher_nodes=()),
+        Topic("/Pepper/pose", is_new=True, publisher_nodes=("Pepper",)),
+        Topic("/Pepper/command", is_new=True, publisher_nodes=("Pepper", "studio")),
+        Topic("/Pepper/world", is_new=True, publisher_nodes=()),
+        Topic("/Turtle/pose", is_new=True, publisher_nodes=("Turtle",)),
+        Topic("/nobody", is_new=True, publisher_nodes=()),
     ]
     for topic in topics:
         window.session.put(topic)
@@ -104,7 +104,7 @@ def test_type_is_shortened_to_its_last_part_and_has_an_icon_without_a_publisher(
 
 
 def test_vanished_topics_are_struck_through_and_show_since_when() -> None:
-    gone = Topic("/x", gone_s=4.7, new=True)
+    gone = Topic("/x", gone_s=4.7, is_new=True)
     assert name_cell(gone).struck
     assert name_cell(gone).chip is None
     assert age_cell(gone).text == "gone 4 s"
