@@ -98,7 +98,7 @@ def test_words_of_an_alarm_sentence_are_chosen_by_keyboard(panel) -> None:
     panel.alarms.set_rule(BELOW)
     panel.refresh()
     press(slot(panel, "kind"))
-    choose("A value is above a limit a limit")
+    choose("A value is above a limit")
     assert panel.alarms.rules[0].condition.kind == "above"
     assert panel.alarms.rules[0].condition.path == "robots.Pepper.battery"
     slot(panel, "limit").setFocus()

@@ -154,14 +154,14 @@ def test_toolbox_shows_which_robots_may_still_move_or_do_not_respond(panel, wind
     link = window.session.fleet.links[0]
     assert editor(panel).last("set_alarms") == {}
     for fact, state, words, status in (
-        ({"stopping": True}, "stopping", "stopping", "running"),
+        ({"is_stopping": True}, "stopping", "stopping", "running"),
         (
-            {"not_stopped": "Pepper may still move: a joint stuck"},
+            {"stop_problem": "Pepper may still move: a joint stuck"},
             "not stopped",
             "may still move",
             "error",
         ),
-        ({"mute": True}, "silent", "not responding", "warn"),
+        ({"is_unresponsive": True}, "silent", "not responding", "warn"),
     ):
         for name, value in fact.items():
             monkeypatch.setattr(link, name, value)

@@ -492,7 +492,7 @@ def test_positions_are_stable_when_nodes_leave_and_join(panel: GraphPanel, windo
     assert scene is not None
     gone = scene.nodes[key_of(panel, "RIZE")]
     assert gone.node.is_gone
-    assert gone.line == "gone 0 s"
+    assert gone.line == "gone for 0 s"
     show(
         window,
         graph(3, nodes=(*NODES[:-1], replace(NODES[-1], id="55"), replace(NODES[1], id="66", name="new"))),

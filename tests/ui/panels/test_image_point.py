@@ -116,7 +116,7 @@ def test_panel_names_what_to_arm_and_one_click_publishes_one_message(qtbot, wind
     session.runs.stop()
     ticks(window, panel)
     assert not panel.view.accepts_clicks
-    assert session.acting.repeat(entry.number).startswith("Not armed for")
+    assert session.acting.repeat(entry.number).endswith(" is not armed. Arm it first.")
 
 
 def test_keys_move_the_pixel_cursor_and_enter_publishes_it(qtbot, window, panel) -> None:

@@ -330,7 +330,7 @@ def test_large_message_is_never_decoded_in_the_gui_thread(qtbot, panel, window, 
     )
     panel.show_topic("/speech/words")
     panel.refresh()
-    press(button(panel.body.large, "Decode the newest message message"))
+    press(button(panel.body.large, "Decode the newest message"))
     qtbot.waitUntil(lambda: (panel.refresh(), panel.body.page == TREE)[1])
     assert threads["looked into"]
     assert threads["decoded"]
@@ -349,7 +349,7 @@ def test_other_large_messages_are_decoded_only_on_request(qtbot, panel, window) 
     panel.refresh()
     assert panel.body.page == LARGE
     assert panel.body.large._title.text() == "Large message (1.2 MB)"
-    press(button(panel.body.large, "Decode the newest message message"))
+    press(button(panel.body.large, "Decode the newest message"))
     assert panel.is_frozen  # the next large one would hide it again
     topic.newest = Message("/speech/words", b"y" * 1_200_000, "string", "string", seq=2)
     qtbot.waitUntil(lambda: (ticks(window, panel), panel.body.page == TREE)[1])
@@ -416,7 +416,7 @@ def test_vanished_topic_shows_since_when_and_keeps_its_last_message(panel, windo
     panel.refresh()
     window.session.topics["/blackboard"].gone_s = 3.2
     panel.refresh()
-    assert panel.live.text == "gone 3 s"
+    assert panel.live.text == "gone for 3 s"
     window.session.remove("/blackboard")
     panel.refresh()
     assert panel.live.text == "gone"

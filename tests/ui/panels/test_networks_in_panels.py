@@ -114,7 +114,7 @@ def test_ros_topics_are_listed_with_native_ones_and_mark_unknown_values(
     assert (theirs["topic"], theirs["network"], theirs["type"]) == ("/blackboard", "ROS 1", "String")
     assert (theirs["rate"], theirs["bandwidth"], theirs["loss"]) == ("", "", "unknown on ROS 1")
     told = tips(panel, "ros /blackboard")
-    assert "doesn't report it" in told["rate"]
+    assert "doesn't report this" in told["rate"]
     assert "doesn't count" in told["loss"]
     assert "ROS 1 report neither rates nor losses" in panel.foot.text()
     panel.filter.setText("ros 1 camera")

@@ -149,7 +149,7 @@ def test_vanished_node_is_struck_through_for_ten_seconds(panel, window) -> None:
     nodes.update_ages(5.2)
     panel.refresh()
     line = shown(panel)[0]
-    assert (line[0], line[5]) == ("camera_driver", "gone 4 s")
+    assert (line[0], line[5]) == ("camera_driver", "gone for 4 s")
     cell = panel.model.data(panel.model.index(0, 0), CELL_ROLE)
     assert (cell.struck, cell.role) == (True, "textDisabled")
     nodes.update_ages(11.1)

@@ -83,7 +83,7 @@ def test_missing_robot_is_one_row_with_the_robots_that_can_replace_it(panel, win
         for n in range(3)
     ]  # fmt: skip
     document.found, document.edits, document.absent_blocks = tuple(absent), 7, ("b0", "b1", "b2")
-    monkeypatch.setattr(type(document), "absent", (pepper("Pepper 2"),))
+    monkeypatch.setattr(type(document), "absent_robots", (pepper("Pepper 2"),))
     say = {"type": "robot_virtual_pepper_do_say", "fields": {"ROBOT": "Pepper 2"}}
     document.workspace = {"blocks": {"blocks": [{**say, "id": f"b{n}"} for n in range(3)]}}
     panel.refresh()

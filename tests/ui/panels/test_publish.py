@@ -186,7 +186,7 @@ def test_last_message_is_the_template(window, panel) -> None:
     panel.open_for("/blackboard")
     assert panel.message is not None
     assert (panel.message.topic, panel.message.msg_type) == ("/blackboard", "json")
-    assert panel.form.template.text() == "Waiting for per message"
+    assert panel.form.template.text() == "Waiting for a message"
     window.session.send("/blackboard", {"mood": "happy", "n": [1, 2]})
     ticks(window, panel)
     kept = panel.message
@@ -254,7 +254,7 @@ def test_publish_is_in_the_menu_of_every_topic(qtbot, window) -> None:
     action = next(each for each in table.row_actions("/blackboard") if each.text == "Publish to this topic")
     action.run()
     assert window.commands == ["publish.topic:/blackboard"]
-    assert "Publish to this topic" not in [each.words for each in table.row_actions("/robot/camera")]
+    assert "Publish to this topic" not in [each.text for each in table.row_actions("/robot/camera")]
 
 
 def test_nothing_can_be_armed_while_a_recording_is_shown(window, panel, monkeypatch) -> None:

@@ -89,7 +89,7 @@ def test_each_recording_is_listed_with_its_facts_and_badges(qtbot, panel, window
     assert panel.count.text().startswith("3 recordings, ")
     row = panel.model.index_of(str(folder / "arm.mcap"))
     cells = [panel.model.cell_at(row.row(), place) for place in range(panel.model.columnCount())]
-    assert cells[0].said == "arm, first try"
+    assert cells[0].accessible_text == "arm, first try"
     assert [cell.text for cell in cells[4:]] == ["5", "0"]
     qtbot.waitUntil(lambda: panel._collect_thumbnails() or bool(panel._pictures))
     choose(panel, folder, "arm")

@@ -84,9 +84,9 @@ def test_words_that_the_behaviour_waits_for_are_suggested(panel, window) -> None
 def test_other_events_are_simulated_from_a_menu(panel, window) -> None:
     press(panel.say.events)
     entries = [action.text() for action in menu(panel).actions()]
-    assert {"Sees a face", "Bumps with its front", "Left hand is touched"} <= set(entries)
+    assert {"Sees a face", "Bumps into something with its front", "Left hand is touched"} <= set(entries)
     assert not any("hears" in entry for entry in entries)
-    choose(panel, "Bumps with its front")
+    choose(panel, "Bumps into something with its front")
     assert window.session.changes("Pepper") == [{"happen": "bumped", "side": "front"}]
 
 

@@ -48,7 +48,7 @@ def sign(panel: SentPanel, row: int) -> str:
 def test_sent_messages_are_listed_copied_and_resent_while_armed(qtbot, window) -> None:
     session, panel = window.session, made(qtbot, window)
     acting = session.acting
-    press(button(panel, "Publish per message"))
+    press(button(panel, "Publish a message"))
     assert window.commands == ["publish.new"]
     heard = session.source.listen("/words", "json")
     assert acting.send(WORD) == ""

@@ -179,7 +179,7 @@ def test_rejected_timed_out_and_cancelled_calls_are_reported(window, panel, qtbo
     ticks(window, panel)
     assert panel.call_button.text().startswith("Waiting ")
     press(panel.give_up)
-    assert panel.answer.chip.text.startswith("canceled")
+    assert panel.answer.chip.text.startswith("cancelled")
     assert not panel.give_up.isVisible()
     go_on.set()
 

@@ -54,7 +54,7 @@ def test_every_topic_is_listed_with_its_figures(panel) -> None:
     assert panel.model.rowCount() == 13
     assert row(panel, "/robot/depth") == ["/robot/depth", "image", "1", "60.0", "5.1 MB/s", "21 ms", "0.4 %"]
     assert row(panel, "/speech/words")[:5] == ["/speech/words", "string", "2", "0.2", "14 B/s"]
-    assert row(panel, "/lidar/scan") == ["/lidar/scan", "bytes", "0", "", "", "gone 4 s", ""]
+    assert row(panel, "/lidar/scan") == ["/lidar/scan", "bytes", "0", "", "", "gone for 4 s", ""]
     assert panel.count.text() == "13 topics, 7 nodes"
 
 
@@ -107,7 +107,7 @@ def test_vanished_topics_are_struck_through_and_show_since_when() -> None:
     gone = Topic("/x", gone_s=4.7, is_new=True)
     assert name_cell(gone).struck
     assert name_cell(gone).chip is None
-    assert age_cell(gone).text == "gone 4 s"
+    assert age_cell(gone).text == "gone for 4 s"
     assert loss_cell(gone).text == ""
     assert loss_cell(Topic("/y", lost=3, loss_ratio=None)).text == "3"
 

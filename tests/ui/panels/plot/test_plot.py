@@ -430,7 +430,7 @@ def test_fields_are_suggested_with_values_and_accepted_by_enter(adding, window) 
     assert "/odom" in window.session.watched
     QTest.keyClicks(panel.add, "pos")
     offered = {
-        line.entry.words: line.entry.note
+        line.entry.text: line.entry.note
         for line in panel.add.matches.list.lines.lines
         if hasattr(line, "entry")
     }
