@@ -154,7 +154,7 @@ def test_states_have_lanes_and_booleans_show_only_true(panel) -> None:
     send(panel, "/odom", sine(0, 60))
     panel._curves_changed()
     look(panel)
-    words = [(curve.name, run.word) for curve, run, _box in panel.lanes.boxes()]
+    words = [(curve.name, run.value) for curve, run, _box in panel.lanes.boxes()]
     assert {word for name, word in words if name == "/odom.mode"} == {"up", "down"}
     assert {word for name, word in words if name == "/odom.on"} == {"true"}
     assert cell(panel, "/odom.mode", "axis") == "text"
