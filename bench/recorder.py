@@ -28,6 +28,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -37,6 +38,7 @@ from mcap.writer import Writer
 
 from nep.messages.clocks import OWN_CLOCK
 from nep.messages.message import Message, message_kind, received_message
+from nep.recordings.file_reader import FileReader
 from nep.recordings.formats.destination import WriterLimits
 from nep.recordings.formats.mcap_file import FileWriter
 from nep.recordings.formats.records import ChunkInfo
@@ -204,9 +206,9 @@ def large_file(folder: Path, gigabytes: float) -> bool:
         for at in range(0, 1000, 5):
             writer.post(pictures(5))
             writer.post(states(at // 5 + 40)[at // 5 :])
-    with Recording(made) as small, made.open("rb") as file:
+    with closing(FileReader(made)) as small, made.open("rb") as file:
         large = FileWriter(path)
-        for number, each in small._index.definitions.channels.items():  # noqa: SLF001 - the copy's channels
+        for number, each in small.facts.channels.items():
             large.table.add_numbered(number, each)
         chunks = small.chunks()
         shift = 0
@@ -217,7 +219,7 @@ def large_file(folder: Path, gigabytes: float) -> bool:
                 index = file.read(chunk.index_bytes)
                 struct.pack_into("<QQ", head, 9, chunk.start_ns + shift, chunk.end_ns + shift)
                 large.copy_chunk(bytes(head), _later(chunk, shift), _indexes(index, shift))
-            shift += small.end_ns - small.start_ns + 1_000_000
+            shift += small.facts.end_ns - small.facts.start_ns + 1_000_000
         large.finish()
     started = time.perf_counter()
     recording = Recording(path)
@@ -231,8 +233,10 @@ def large_file(folder: Path, gigabytes: float) -> bool:
     started = time.perf_counter()
     recording.densities(recording.start_ns, recording.end_ns, 1000)
     counted = time.perf_counter() - started
-    size, topics, count = path.stat().st_size, len(recording.topics), len(recording.chunks())
+    size, topics = path.stat().st_size, len(recording.topics)
     recording.close()
+    with closing(FileReader(path)) as raw:
+        count = len(raw.chunks())
     path.unlink()
     sought.sort()
     print(
